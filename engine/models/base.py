@@ -1,0 +1,50 @@
+"""The contract of every learned string.
+
+A displacement is *encoded* to a state; the state is *advanced* by any number of samples, which yields the
+displacement of each; what comes out is *decoded* on the grid, or only at listening points. The state is a
+value: blocks chain, and nothing is remembered behind the caller's back.
+
+Models work in the preset's normalised units (displacement divided by its scale) and at the sample rate that
+they were trained at. Adding a model: one file with its configuration (a frozen dataclass), its state and a
+final subclass of `StringModel`, and one line in `engine/models/__init__.py`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
+
+from torch import Tensor, nn
+
+State = TypeVar("State")
+
+
+class StringModel(nn.Module, ABC, Generic[State]):
+    """A learned map from an initial displacement to the motion that follows."""
+
+    grid_points: int
+
+    @abstractmethod
+    def encode(self, displacement: Tensor) -> State:
+        """The state at frame 0 for displacements (batch, grid_points)."""
+
+    @abstractmethod
+    def advance(self, state: State, steps: int, readout: Tensor | None = None) -> tuple[Tensor, State]:
+        """The next `steps` frames and the state after them.
+
+        Args:
+            readout: (grid_points, points) linear map applied to every frame, for example
+                `sine_transform.listening_weights`; None decodes on the whole grid. Fewer points cost less.
+
+        Returns:
+            displacement (batch, steps, points or grid_points) in normalised units, and the last state.
+        """
+
+    def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
+        """Frames 1 … steps after `displacement` (batch, grid_points): (batch, steps, points)."""
+        return self.advance(self.encode(displacement), steps, readout)[0]
+
+
+def count_parameters(model: nn.Module) -> int:
+    """Trainable numbers, a complex one counted as two."""
+    return sum(p.numel() * (2 if p.is_complex() else 1) for p in model.parameters() if p.requires_grad)

@@ -1,0 +1,60 @@
+"""A musician's pluck: a shape at a place, of a width and an amplitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from torch import Tensor
+
+from engine import excitation
+
+Shape = Literal["gaussian", "triangular", "raised_cosine"]
+SHAPES: tuple[Shape, ...] = get_args(Shape)
+POSITION_RANGE = (0.02, 0.98)
+WIDTH_RANGE = (0.02, 0.5)
+LARGEST_AMPLITUDE_MM = 20.0
+
+
+@dataclass(frozen=True)
+class Pluck:
+    """Where and how the string is pulled before it is let go.
+
+    Attributes:
+        position: 0 and 1 are the fixed ends, 0.5 the middle.
+        amplitude_mm: peak displacement; 0 is silence.
+        width: of the Gaussian (its s) or the raised cosine (all of it), in lengths; a triangle has none.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it and the range.
+    """
+
+    position: float = 0.35
+    amplitude_mm: float = 4.0
+    shape: Shape = "gaussian"
+    width: float = 0.06
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in {
+            "position": POSITION_RANGE,
+            "width": WIDTH_RANGE,
+            "amplitude_mm": (0.0, LARGEST_AMPLITUDE_MM),
+        }.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} must lie in {low:g} … {high:g}, not {value:g}")
+        if self.shape not in SHAPES:
+            raise ValueError(f"shape {self.shape!r} is not one of {', '.join(SHAPES)}")
+
+    def moved(self, **changes: float | str) -> Pluck:
+        """A copy with some values changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def displacement(self, grid_points: int) -> Tensor:
+        """The raw shape in m before any projection on modes, float64 (grid_points,)."""
+        peak_m = self.amplitude_mm / 1000
+        if self.shape == "gaussian":
+            return excitation.gaussian(self.position, self.width, peak_m, grid_points)
+        if self.shape == "triangular":
+            return excitation.triangular(self.position, peak_m, grid_points)
+        return excitation.raised_cosine(self.position, self.width, peak_m, grid_points)

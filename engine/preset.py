@@ -1,0 +1,322 @@
+"""Presets: trained weights with what they were trained on, in one safetensors file. Data, never code.
+
+The metadata of a safetensors file maps strings to strings; ours is one JSON text under `learned_strings`,
+read into `PresetInfo`. Everything is checked before anything is used: the file's size, the metadata, then
+each tensor's name, type and shape, then that every number is finite.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from engine.models import MODELS, StringModel, count_parameters
+from engine.pluck import Pluck
+from engine.schema import SchemaError, read, write
+from engine.string import StringParameters
+
+FORMAT_VERSION = 1
+METADATA_KEY = "learned_strings"
+LARGEST_FILE_BYTES = 256 * 2**20
+SHIPPED = Path(__file__).parents[1] / "presets"
+
+
+class PresetError(ValueError):
+    """A preset that cannot be used. The message names the file, what is wrong with it and the remedy."""
+
+
+@dataclass(frozen=True)
+class TrainedRange:
+    """What the initial displacements of the training set covered; None: not a parameter of that kind."""
+
+    position: tuple[float, float] | None
+    width: tuple[float, float] | None
+    peak_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class PresetInfo:
+    """What a preset says of itself.
+
+    Attributes:
+        horizon_steps: number of frames after the initial one that the model was trained on.
+        modes: modes kept in the training data; the initial displacement is projected on them.
+        scale_m: the model's unit of displacement.
+        rel_mse, rel_mae: validation errors over the horizon (the paper's metrics), test errors beside them.
+        training: the complete training configuration, so that the run can be repeated.
+    """
+
+    title: str
+    model: str
+    model_configuration: dict[str, Any]
+    string: StringParameters
+    tension_modulated: bool
+    initial: Literal["gaussian", "noise"]
+    rate_hz: int
+    modes: int
+    grid_points: int
+    horizon_steps: int
+    scale_m: float
+    trained_range: TrainedRange
+    initialisation: str
+    seed: int
+    rel_mse: float | None = None
+    rel_mae: float | None = None
+    test_rel_mse: float | None = None
+    test_rel_mae: float | None = None
+    training_seconds: float | None = None
+    training: dict[str, Any] = field(default_factory=dict)
+    description: str = ""
+    licence: str = "MIT"
+    format_version: int = FORMAT_VERSION
+
+    def __post_init__(self) -> None:
+        if self.model not in MODELS:
+            raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        for name in ("rate_hz", "modes", "horizon_steps", "scale_m"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
+        if self.rate_hz > 1_000_000:
+            raise ValueError(f"rate_hz must be at most 1000000, not {self.rate_hz}")
+        if not 3 <= self.grid_points <= 10_001 or self.modes > self.grid_points - 2:
+            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
+
+    @property
+    def horizon_s(self) -> float:
+        return self.horizon_steps / self.rate_hz
+
+    @property
+    def string_kind(self) -> str:
+        """The command line's word: "linear" or "nonlinear"."""
+        return "nonlinear" if self.tension_modulated else "linear"
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A loaded preset: its file's stem as name, its facts and its model, ready to be used."""
+
+    name: str
+    path: Path
+    info: PresetInfo
+    model: StringModel[Any]
+
+    @property
+    def parameters(self) -> int:
+        return count_parameters(self.model)
+
+
+def save_preset(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
+    """Writes a preset whole or not at all.
+
+    Raises:
+        PresetError: a weight is not finite.
+        OSError: the folder cannot be written or the disk is full.
+    """
+    tensors = {name: t.detach().cpu().contiguous() for name, t in model.state_dict().items()}
+    for name, tensor in tensors.items():
+        _check_finite(path, name, tensor)
+    text = json.dumps(write(info), allow_nan=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, unfinished = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".unfinished", dir=path.parent)
+    os.close(handle)
+    try:
+        save_file(tensors, unfinished, metadata={METADATA_KEY: text})
+        Path(unfinished).chmod(0o644)
+        Path(unfinished).replace(path)
+    finally:
+        Path(unfinished).unlink(missing_ok=True)
+
+
+def read_info(path: Path) -> PresetInfo:
+    """The metadata alone, checked; no weight is read.
+
+    Raises:
+        PresetError: the file is missing, damaged, oversized, of a newer format, or says something impossible.
+    """
+    with _open(path) as file:
+        return _info_of(path, file)
+
+
+def load_preset(path: Path) -> Preset:
+    """A preset with its model in evaluation mode.
+
+    Raises:
+        PresetError: see `read_info`; also a tensor that is missing, unknown, re-shaped, re-typed or not finite.
+    """
+    with _open(path) as file:
+        info = _info_of(path, file)
+        model = _empty_model(path, info)
+        expected = model.state_dict()
+        found = set(file.keys())
+        if missing := sorted(set(expected) - found):
+            raise PresetError(f"{path}: tensor {missing[0]!r} is missing; get the preset again or train it again")
+        if unknown := sorted(found - set(expected)):
+            raise PresetError(f"{path}: tensor {unknown[0]!r} is unknown to a {info.model}; get the preset again")
+        for name, tensor in expected.items():
+            _check_form(path, name, tensor, file.get_slice(name))
+        tensors = {name: file.get_tensor(name) for name in expected}
+    for name, tensor in tensors.items():
+        _check_finite(path, name, tensor)
+    model.load_state_dict(tensors, assign=True)
+    for parameter in model.parameters():
+        parameter.requires_grad_(True)
+    return Preset(path.stem, path, info, model.eval())
+
+
+def described_parameters(path: Path, info: PresetInfo) -> int:
+    """The number of parameters of the model that `info` describes, without reading or making a weight.
+
+    Raises:
+        PresetError: the description is of an impossible model; `path` names it in the message.
+    """
+    return count_parameters(_empty_model(path, info))
+
+
+def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
+    """How a pluck differs from what the preset was trained on, in plain words; empty where it does not."""
+    if info.initial == "noise":
+        found = [f"a {pluck.shape.replace('_', ' ')} pluck is not the noise that this preset was trained on"]
+    elif pluck.shape != "gaussian":
+        found = [f"shape {pluck.shape.replace('_', ' ')} is not the trained gaussian"]
+    else:
+        found = _beyond("width", pluck.width, info.trained_range.width)
+    peak_mm = (1000 * info.trained_range.peak_m[0], 1000 * info.trained_range.peak_m[1])
+    return [
+        *_beyond("position", pluck.position, info.trained_range.position),
+        *found,
+        *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
+    ]
+
+
+def _beyond(name: str, value: float, trained: tuple[float, float] | None, unit: str = "") -> list[str]:
+    if trained is None or trained[0] <= value <= trained[1]:
+        return []
+    return [f"{name} {value:g}{unit} is outside the trained {trained[0]:g} … {trained[1]:g}{unit}"]
+
+
+def preset_files(*folders: Path) -> list[Path]:
+    """The preset files of the given folders (the shipped ones by default), by name."""
+    return sorted((p for folder in folders or (SHIPPED,) for p in folder.glob("*.safetensors")), key=lambda p: p.stem)
+
+
+def find_preset(name_or_path: str) -> Path:
+    """The file of a preset given by its name among the shipped ones, or by path.
+
+    Raises:
+        PresetError: there is none; the message lists the names.
+    """
+    by_name = {path.stem: path for path in preset_files()}
+    if name_or_path in by_name:
+        return by_name[name_or_path]
+    path = Path(name_or_path)
+    if path.exists():
+        return path
+    known = ", ".join(by_name) or "none is installed"
+    raise PresetError(f"no preset {name_or_path!r}; give a file or one of: {known}")
+
+
+class _open:
+    """`safe_open` with the file checked first and every failure told in our words."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> Any:
+        try:
+            size = self._path.stat().st_size
+            if not self._path.is_file():
+                raise PresetError(f"{self._path}: not a file; give a .safetensors preset")
+            if size > LARGEST_FILE_BYTES:
+                raise PresetError(
+                    f"{self._path}: {size / 2**20:.0f} MiB is more than the {LARGEST_FILE_BYTES // 2**20} MiB that a "
+                    "preset may have; it is not one of ours"
+                )
+            self._file = safe_open(self._path, framework="pt")
+            return self._file.__enter__()
+        except FileNotFoundError:
+            raise PresetError(f"{self._path}: no such preset file; check the path") from None
+        except SafetensorError as error:
+            raise PresetError(
+                f"{self._path}: not a whole safetensors file ({error}); get the preset again"
+            ) from error
+        except OSError as error:
+            raise PresetError(f"{self._path}: cannot be read ({error.strerror or error})") from error
+
+    def __exit__(self, *exception: Any) -> None:
+        self._file.__exit__(*exception)
+
+
+def _info_of(path: Path, file: Any) -> PresetInfo:
+    text = (file.metadata() or {}).get(METADATA_KEY)
+    if text is None:
+        raise PresetError(f"{path}: has no {METADATA_KEY!r} metadata; it is not a preset of this program")
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise PresetError(f"{path}: metadata is not JSON ({error}); get the preset again") from error
+    version = data.get("format_version") if isinstance(data, dict) else None
+    if isinstance(version, int) and version > FORMAT_VERSION:
+        raise PresetError(
+            f"{path}: format_version {version} is newer than this program's {FORMAT_VERSION}; update the program"
+        )
+    if version != FORMAT_VERSION:
+        raise PresetError(f"{path}: format_version {version!r} is not known; get the preset again")
+    try:
+        info = read(PresetInfo, data, "metadata")
+        read(MODELS[info.model][1], info.model_configuration, "metadata.model_configuration")
+    except SchemaError as error:
+        raise PresetError(f"{path}: {error}; get the preset again or train it again") from error
+    return info
+
+
+def _empty_model(path: Path, info: PresetInfo) -> StringModel[Any]:
+    """The model without memory behind it, so that absurd sizes in the metadata cost nothing."""
+    kind, configuration_kind = MODELS[info.model]
+    configuration: Any = read(configuration_kind, info.model_configuration, "metadata.model_configuration")
+    try:
+        with torch.device("meta"):
+            model = kind(configuration)
+    except (RuntimeError, OverflowError, MemoryError) as error:
+        raise PresetError(f"{path}: metadata.model_configuration asks for an impossible model ({error})") from error
+    if model.grid_points != info.grid_points:
+        raise PresetError(
+            f"{path}: metadata.grid_points is {info.grid_points}, the model's grid has {model.grid_points}; "
+            "get the preset again"
+        )
+    return model
+
+
+_SAFETENSORS_TYPES = {
+    torch.float32: "F32",
+    torch.float64: "F64",
+    torch.complex64: "C64",
+    torch.int64: "I64",
+    torch.bool: "BOOL",
+}
+
+
+def _check_form(path: Path, name: str, expected: Tensor, found: Any) -> None:
+    shape, kind = tuple(found.get_shape()), found.get_dtype()
+    if shape != tuple(expected.shape):
+        raise PresetError(
+            f"{path}: tensor {name!r} has shape {shape}, expected {tuple(expected.shape)}; get the preset again"
+        )
+    if kind != _SAFETENSORS_TYPES[expected.dtype]:
+        raise PresetError(
+            f"{path}: tensor {name!r} is of type {kind}, expected {_SAFETENSORS_TYPES[expected.dtype]}; "
+            "get the preset again"
+        )
+
+
+def _check_finite(path: Path, name: str, tensor: Tensor) -> None:
+    if not bool(torch.isfinite(tensor).all()):
+        raise PresetError(f"{path}: tensor {name!r} holds values that are not finite; the preset cannot be used")

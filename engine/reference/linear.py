@@ -1,0 +1,31 @@
+"""Exact motion of damped, uncoupled modes."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from engine.reference.state import ModalState
+from engine.string import StringParameters
+
+
+def damped_rotation(string: StringParameters, modes: int, time_s: Tensor) -> Tensor:
+    """The exact flow of q̈ + 2σq̇ + ω²q = 0 over `time_s` (...): float64 (..., 2, 2, modes).
+
+    Entry [i, j] maps component j of (amplitude, velocity) to component i.
+    """
+    eigenvalue = string.eigenvalues(modes)
+    sigma, omega = -eigenvalue.real, eigenvalue.imag
+    t = time_s.to(torch.float64)[..., None]
+    decay, cos, sin = torch.exp(-sigma * t), torch.cos(omega * t), torch.sin(omega * t) / omega
+    rows = [
+        torch.stack([decay * (cos + sigma * sin), decay * sin], dim=-2),
+        torch.stack([-decay * (sigma**2 + omega**2) * sin, decay * (cos - sigma * sin)], dim=-2),
+    ]
+    return torch.stack(rows, dim=-3)
+
+
+def solve_linear(string: StringParameters, state: ModalState, times_s: Tensor) -> Tensor:
+    """Modal amplitudes of the linear string at `times_s` (times,): float64 (batch, times, modes)."""
+    flow = damped_rotation(string, state.modes, times_s)
+    return state.amplitude[:, None] * flow[:, 0, 0] + state.velocity[:, None] * flow[:, 0, 1]

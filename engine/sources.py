@@ -1,0 +1,124 @@
+"""What can be heard: a preset's model and the physics that it learned, behind one face, in metres.
+
+A source is given initial displacements, yields frames in blocks, and keeps nothing: the state is passed. Rendering,
+comparing, the command line and the app treat model and truth alike through it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from engine.preset import Preset, PresetInfo
+from engine.reference import ModalState, SplittingSolver
+from engine.sine_transform import synthesis_matrix, to_grid, to_modes
+
+FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
+RUNAWAY_FACTOR = 20.0  # a string let go never exceeds about its initial peak
+
+
+class Runaway(RuntimeError):
+    """A model's output stopped being a string's: not finite, or far beyond its initial displacement."""
+
+    def __init__(self, time_s: float) -> None:
+        super().__init__(f"the model's output runs away {time_s:.3f} s after the pluck; shorten it or play the truth")
+        self.time_s = time_s
+
+
+@dataclass(frozen=True)
+class SourceState:
+    """Where a source is: its own state, the frames done, and the largest displacement that is believable."""
+
+    inner: Any
+    frame: int
+    limit_m: float
+
+
+class StringSource(ABC):
+    """Frames of displacement in m after an initial displacement at rest."""
+
+    rate_hz: int
+    grid_points: int
+
+    @abstractmethod
+    def start(self, displacement_m: Tensor) -> SourceState:
+        """The state at frame 0 for displacements (batch, grid_points), already projected on the modes in use."""
+
+    @abstractmethod
+    def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
+        """The next frames, (batch, steps, grid_points), or (…, points) where `readout` (grid_points, points) says.
+
+        Raises:
+            Runaway: see there.
+        """
+
+
+class ModelSource(StringSource):
+    """A preset's model."""
+
+    def __init__(self, preset: Preset) -> None:
+        self._model = preset.model
+        self._scale_m = preset.info.scale_m
+        self.rate_hz = preset.info.rate_hz
+        self.grid_points = preset.info.grid_points
+
+    @torch.inference_mode()
+    def start(self, displacement_m: Tensor) -> SourceState:
+        _check_grid(displacement_m, self.grid_points)
+        inner = self._model.encode((displacement_m / self._scale_m).float())
+        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(displacement_m.abs().max()), 1e-4))
+
+    @torch.inference_mode()
+    def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
+        frames, inner = self._model.advance(state.inner, steps, readout)
+        frames = frames * self._scale_m
+        believable = frames.abs() <= state.limit_m  # False for a NaN
+        if not bool(believable.all()):
+            first = int((~believable).any(dim=2).any(dim=0).nonzero()[0])
+            raise Runaway((state.frame + 1 + first) / self.rate_hz)
+        return frames, SourceState(inner, state.frame + steps, state.limit_m)
+
+
+class TruthSource(StringSource):
+    """The physics of a preset's string, at the preset's rate and with its modes.
+
+    Args:
+        substeps: of the solver (see `SplittingSolver`); None is its default, exact to 1e-7.
+    """
+
+    def __init__(self, info: PresetInfo, substeps: int | None = None) -> None:
+        self.rate_hz = info.rate_hz
+        self.grid_points = info.grid_points
+        self._modes = info.modes
+        self._synthesis = synthesis_matrix(info.grid_points, info.modes)
+        self._solver = SplittingSolver(
+            info.string, info.modes, info.rate_hz, tension_modulated=info.tension_modulated, substeps=substeps
+        )
+
+    def start(self, displacement_m: Tensor) -> SourceState:
+        _check_grid(displacement_m, self.grid_points)
+        return SourceState(ModalState.at_rest(to_modes(displacement_m.double(), self._modes)), 0, float("inf"))
+
+    def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
+        amplitudes, inner = self._solver.advance(state.inner, steps)
+        to_points = self._synthesis if readout is None else self._synthesis @ readout.double()
+        return amplitudes @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
+
+
+def project(displacement_m: Tensor, modes: int) -> Tensor:
+    """Displacement (..., grid_points) without what lies outside the first `modes` modes."""
+    return to_grid(to_modes(displacement_m, modes), displacement_m.shape[-1])
+
+
+def _check_grid(displacement: Tensor, grid_points: int) -> None:
+    if displacement.ndim != 2 or displacement.shape[1] != grid_points:
+        raise ValueError(
+            f"initial displacement must have shape (batch, {grid_points}), not {tuple(displacement.shape)}"
+        )
+
+
+__all__ = ["FULL_SCALE_M", "ModelSource", "Runaway", "SourceState", "StringSource", "TruthSource", "project"]

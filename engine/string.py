@@ -1,0 +1,88 @@
+"""The stiff string: its physical parameters and what follows from them in closed form.
+
+Source: Diaz, De La Vega Martin, Sandler, "Towards Efficient Modelling of String Dynamics", DAFx24
+(below: the paper), Eq. 1-5 and Table 1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class StringParameters:
+    """Physical parameters of a simply supported stiff string. Default: the paper's Table 1, nylon, B3.
+
+    Raises:
+        ValueError: a parameter is not finite, negative, or zero where that has no meaning.
+    """
+
+    length_m: float = 0.65
+    area_m2: float = 0.5188e-6
+    second_moment_m4: float = 0.141e-12
+    density_kg_m3: float = 1140.0
+    youngs_modulus_pa: float = 5.4e9
+    damping_d1_kg_m_s: float = 8.0e-5
+    damping_d3_kg_m_s: float = 1.4e-5
+    tension_n: float = 60.97
+
+    def __post_init__(self) -> None:
+        may_be_zero = {"second_moment_m4", "youngs_modulus_pa", "damping_d1_kg_m_s", "damping_d3_kg_m_s"}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or value < 0 or (value == 0 and field.name not in may_be_zero):
+                raise ValueError(f"string parameter {field.name} must be positive and finite, not {value}")
+
+    @property
+    def mass_per_length_kg_m(self) -> float:
+        """ρA."""
+        return self.density_kg_m3 * self.area_m2
+
+    def wavenumbers(self, modes: int) -> Tensor:
+        """η_μ = μπ/ℓ in rad/m, float64 (modes,)."""
+        return torch.arange(1, modes + 1, dtype=torch.float64) * (math.pi / self.length_m)
+
+    def decay_rates(self, modes: int) -> Tensor:
+        """σ_μ = (d₁ + d₃η²) / 2ρA in 1/s, float64 (modes,): a free mode decays as exp(-σt)."""
+        eta = self.wavenumbers(modes)
+        return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
+
+    def undamped_frequencies(self, modes: int) -> Tensor:
+        """ω_μ = √((EIη⁴ + T₀η²) / ρA) in rad/s, float64 (modes,)."""
+        eta = self.wavenumbers(modes)
+        bending = self.youngs_modulus_pa * self.second_moment_m4
+        return ((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m).sqrt()
+
+    def eigenvalues(self, modes: int) -> Tensor:
+        """Continuous-time eigenvalues -σ + i√(ω² - σ²) of the linear string, complex128 (modes,).
+
+        Raises:
+            ValueError: a mode is damped so strongly that it no longer oscillates.
+        """
+        sigma = self.decay_rates(modes)
+        squared = self.undamped_frequencies(modes) ** 2 - sigma**2
+        if bool((squared <= 0).any()):
+            first = int((squared <= 0).nonzero()[0]) + 1
+            raise ValueError(f"mode {first} is overdamped: lower damping_d1/damping_d3 or keep fewer modes")
+        return torch.complex(-sigma, squared.sqrt())
+
+    def tension_coupling(self, modes: int) -> Tensor:
+        """k_μ = EAη_μ² / 4ρA in 1/(m² s²)·m², float64 (modes,).
+
+        The tension-modulated string adds the acceleration -k_μ q_μ Σ η_m² q_m² (Eq. 3-5 on modal amplitudes).
+        """
+        return self.youngs_modulus_pa * self.area_m2 * self.wavenumbers(modes) ** 2 / (4 * self.mass_per_length_kg_m)
+
+    def relative_tension_rise(self, amplitudes: Tensor) -> Tensor:
+        """ΔT/T₀ for modal amplitudes (..., modes) in m; result (...)."""
+        stretch = (self.wavenumbers(amplitudes.shape[-1]) * amplitudes).square().sum(-1)
+        return self.youngs_modulus_pa * self.area_m2 / 4 * stretch / self.tension_n
+
+    def modes_below(self, frequency_hz: float) -> int:
+        """The number of modes whose undamped frequency lies below `frequency_hz`."""
+        most = max(1, int(2 * self.length_m * frequency_hz * (self.mass_per_length_kg_m / self.tension_n) ** 0.5))
+        return int((self.undamped_frequencies(most) < 2 * math.pi * frequency_hz).sum())

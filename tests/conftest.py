@@ -1,0 +1,44 @@
+"""A small preset that needs no training, for every test that reads, renders or plays one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.models import KoopmanVar, KoopmanVarConfiguration
+from engine.models.koopman_var import initialise
+from engine.preset import PresetInfo, TrainedRange, save_preset
+from engine.schema import write
+from engine.string import StringParameters
+
+
+@pytest.fixture(scope="session")
+def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A Koopman_var of 16 states at 4 kHz that is nearly the linear string; horizon 400 frames (0.1 s)."""
+    configuration = KoopmanVarConfiguration(state_size=16, multiplier_widths=(8,))
+    model = KoopmanVar(configuration)
+    string = StringParameters()
+    initialise(model, "physics", string=string, modes=10, rate_hz=4000, generator=torch.Generator().manual_seed(0))
+    info = PresetInfo(
+        title="A small string",
+        model="koopman_var",
+        model_configuration=write(configuration),
+        string=string,
+        tension_modulated=True,
+        initial="gaussian",
+        rate_hz=4000,
+        modes=10,
+        grid_points=101,
+        horizon_steps=400,
+        scale_m=1e-3,
+        trained_range=TrainedRange((0.3, 0.7), (0.02, 0.1), (1e-3, 1e-2)),
+        initialisation="physics",
+        seed=0,
+        rel_mse=0.5,
+        rel_mae=0.25,
+    )
+    path = tmp_path_factory.mktemp("presets") / "small.safetensors"
+    save_preset(path, info, model)
+    return path

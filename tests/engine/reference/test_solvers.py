@@ -1,0 +1,151 @@
+"""The fast solver against the oracle, the exact linear solution and its own laws."""
+
+import math
+
+import pytest
+import torch
+
+from engine.excitation import DRAWS, draw_noise
+from engine.reference import ModalState, SplittingSolver, default_substeps, solve_dop853, solve_linear
+from engine.reference.splitting import KICKS, ROTATIONS
+from engine.sine_transform import to_modes
+from engine.string import StringParameters
+
+STRING = StringParameters()
+PROTOCOL = [("gaussian", 4_000, 10), ("noise", 4_000, 10), ("gaussian", 16_000, 25), ("noise", 16_000, 25)]
+
+
+def worst_of_protocol(initial: str, modes: int, seed: int = 0) -> ModalState:
+    """The string with the largest tension rise among a thousand draws: the hardest to integrate."""
+    amplitudes = to_modes(DRAWS[initial](1000, 101, torch.Generator().manual_seed(seed)), modes)
+    worst = int(STRING.relative_tension_rise(amplitudes).argmax())
+    return ModalState.at_rest(amplitudes[worst : worst + 1])
+
+
+def relative_l2(found: torch.Tensor, expected: torch.Tensor) -> float:
+    return float((found - expected).norm() / expected.norm())
+
+
+def random_state(batch: int, modes: int) -> ModalState:
+    generator = torch.Generator().manual_seed(5)
+    return ModalState(
+        1e-3 * torch.randn(batch, modes, generator=generator, dtype=torch.float64),
+        torch.randn(batch, modes, generator=generator, dtype=torch.float64),
+    )
+
+
+@pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
+def test_default_accuracy_on_the_worst_of_the_protocol(initial: str, rate_hz: int, modes: int) -> None:
+    """1e-7 over 4000 samples is the promise; a shorter stretch keeps the suite quick (`bench solver` has it all)."""
+    state = worst_of_protocol(initial, modes)
+    truth = solve_dop853(STRING, state, rate_hz, 600, tension_modulated=True)
+    found = SplittingSolver(STRING, modes, rate_hz, tension_modulated=True).solve(state, 600)
+    assert relative_l2(found, truth) < 1e-7
+
+
+def test_order_of_convergence() -> None:
+    """Order 4 in the perturbation at least: halving the step divides the error by 16 or more."""
+    state = worst_of_protocol("noise", 25)
+    truth = SplittingSolver(STRING, 25, 16_000, tension_modulated=True, substeps=96).solve(state, 100)
+    errors = [
+        relative_l2(SplittingSolver(STRING, 25, 16_000, tension_modulated=True, substeps=n).solve(state, 100), truth)
+        for n in (12, 24)
+    ]
+    assert errors[0] / errors[1] > 14
+
+
+def test_the_scheme_is_consistent_and_symmetric() -> None:
+    assert math.fsum(ROTATIONS) == pytest.approx(1, abs=1e-15)
+    assert math.fsum(KICKS) == pytest.approx(1, abs=1e-15)
+    assert ROTATIONS[::-1] == ROTATIONS
+    assert KICKS[::-1] == KICKS
+
+
+def test_the_linear_string_is_exact() -> None:
+    state = random_state(3, 25)
+    found = SplittingSolver(STRING, 25, 16_000, tension_modulated=False).solve(state, 2000)
+    times_s = torch.arange(2001, dtype=torch.float64) / 16_000
+    assert relative_l2(found, solve_linear(STRING, state, times_s)) < 1e-11
+
+
+def test_the_linear_solution_agrees_with_the_oracle() -> None:
+    state = random_state(1, 10)
+    truth = solve_dop853(STRING, state, 4_000, 200, tension_modulated=False)
+    found = solve_linear(STRING, state, torch.arange(201, dtype=torch.float64) / 4_000)
+    assert relative_l2(found, truth) < 1e-9
+
+
+def test_a_small_nonlinear_string_is_a_linear_one() -> None:
+    state = ModalState.at_rest(torch.tensor([[1e-8, 0, 1e-8]]))
+    linear, modulated = (
+        SplittingSolver(STRING, 3, 16_000, tension_modulated=on).solve(state, 500) for on in (False, True)
+    )
+    assert relative_l2(modulated, linear) < 1e-6
+
+
+@pytest.mark.parametrize("tension_modulated", [False, True])
+def test_both_kernels_agree(tension_modulated: bool) -> None:
+    solver = SplittingSolver(STRING, 25, 16_000, tension_modulated=tension_modulated, substeps=2)
+    state = random_state(4, 25)
+    compiled, last = solver.advance(state, 20)
+    q, v, tensors = state.amplitude.clone(), state.velocity.clone(), torch.empty_like(compiled)
+    solver._advance_tensors(q, v, tensors)
+    torch.testing.assert_close(tensors, compiled, rtol=1e-11, atol=1e-17)
+    torch.testing.assert_close(v, last.velocity, rtol=1e-10, atol=1e-12)
+
+
+def test_going_on_from_a_state_is_the_same_motion() -> None:
+    solver = SplittingSolver(STRING, 25, 16_000, tension_modulated=True, substeps=3)
+    state = random_state(3, 25)
+    before = state.amplitude.clone()
+    whole, _ = solver.advance(state, 257)
+    parts = []
+    for steps in (1, 64, 65, 127):
+        part, state = solver.advance(state, steps)
+        parts.append(part)
+    assert torch.equal(torch.cat(parts, 1), whole)
+    assert not torch.equal(before, state.amplitude)
+
+
+def test_the_callers_state_is_not_touched() -> None:
+    state = random_state(2, 5)
+    kept = (state.amplitude.clone(), state.velocity.clone())
+    SplittingSolver(STRING, 5, 8_000, tension_modulated=True).advance(state, 10)
+    assert torch.equal(state.amplitude, kept[0])
+    assert torch.equal(state.velocity, kept[1])
+
+
+def test_energy_decays_as_the_damping_says() -> None:
+    """Without damping the energy of the tension-modulated string stays; with it, it falls."""
+    free = StringParameters(damping_d1_kg_m_s=0, damping_d3_kg_m_s=0)
+    amplitudes = to_modes(draw_noise(1, 101, torch.Generator().manual_seed(1)), 10)
+
+    def energy(string: StringParameters, state: ModalState) -> float:
+        q, v = state.amplitude, state.velocity
+        stretch = (string.wavenumbers(10) * q).square().sum(-1)
+        linear = (v.square() + (string.undamped_frequencies(10) * q).square()).sum(-1) / 2
+        tension = string.youngs_modulus_pa * string.area_m2 / (16 * string.mass_per_length_kg_m) * stretch**2
+        return float(linear + tension)
+
+    for string, low, high in ((free, 1 - 1e-7, 1 + 1e-7), (STRING, 0.0, 0.9)):
+        state = ModalState.at_rest(amplitudes)
+        before = energy(string, state)
+        _, state = SplittingSolver(string, 10, 16_000, tension_modulated=True).advance(state, 4000)
+        assert low < energy(string, state) / before < high
+
+
+def test_default_substeps_follow_the_highest_mode() -> None:
+    assert default_substeps(STRING, 25, 16_000) == 4 * default_substeps(STRING, 25, 64_000)
+    assert default_substeps(STRING, 50, 16_000) > default_substeps(STRING, 25, 16_000)
+
+
+def test_bad_requests_are_named() -> None:
+    with pytest.raises(ValueError, match="sample rate must be above 0"):
+        SplittingSolver(STRING, 5, 0, tension_modulated=True)
+    with pytest.raises(ValueError, match="substeps must be at least 1"):
+        SplittingSolver(STRING, 5, 4_000, tension_modulated=True, substeps=0)
+    solver = SplittingSolver(STRING, 5, 4_000, tension_modulated=True)
+    with pytest.raises(ValueError, match="holds 5 modes, the state 4"):
+        solver.advance(random_state(1, 4), 3)
+    with pytest.raises(ValueError, match="one shape"):
+        ModalState(torch.zeros(1, 3), torch.zeros(1, 4))

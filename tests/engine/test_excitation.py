@@ -1,0 +1,46 @@
+"""Plucks and the paper's random initial displacements."""
+
+import pytest
+import torch
+
+from engine import excitation
+from engine.pluck import SHAPES, Pluck
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_pluck_peaks_where_and_as_far_as_asked(shape: str) -> None:
+    displacement = Pluck(position=0.3, amplitude_mm=2.5, shape=shape, width=0.1).displacement(101)  # type: ignore[arg-type]
+    assert int(displacement.argmax()) == 30
+    assert float(displacement.max()) == pytest.approx(2.5e-3)
+    assert displacement[[0, -1]].eq(0).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("position", 0.0), ("position", 1.2), ("amplitude_mm", -1), ("amplitude_mm", 99), ("width", 0)],
+)
+def test_a_pluck_out_of_range_names_the_field_and_the_range(field: str, value: float) -> None:
+    with pytest.raises(ValueError, match=rf"{field} must lie in .* not"):
+        Pluck(**{field: value})
+
+
+@pytest.mark.parametrize("kind", excitation.DRAWS)
+def test_draws_follow_the_protocol(kind: str) -> None:
+    draws = excitation.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
+    peaks = draws.amax(1)
+    assert draws.shape == (500, 101)
+    assert draws[:, [0, -1]].eq(0).all()
+    assert draws.min() >= 0
+    # a narrow Gaussian between two grid points peaks a little below its parameter
+    assert peaks.min() >= 0.9 * excitation.PEAK_RANGE_M[0]
+    assert peaks.max() <= excitation.PEAK_RANGE_M[1]
+    assert float(peaks.mean()) == pytest.approx(5.5e-3, rel=0.1)
+    again = excitation.DRAWS[kind](500, 101, torch.Generator().manual_seed(3))
+    assert torch.equal(draws, again)
+
+
+def test_gaussians_lie_where_the_protocol_says() -> None:
+    draws = excitation.draw_gaussians(500, 101, torch.Generator().manual_seed(0))
+    centres = draws.argmax(1) / 100
+    assert 0.29 <= float(centres.min()) <= 0.33
+    assert 0.67 <= float(centres.max()) <= 0.71

@@ -1,0 +1,33 @@
+"""The transform is exact on the grid."""
+
+import pytest
+import torch
+
+from engine.sine_transform import listening_weights, mode_shapes, to_grid, to_modes
+
+
+@pytest.mark.parametrize("modes", [1, 10, 25, 99])
+def test_round_trip(modes: int) -> None:
+    amplitudes = torch.randn(4, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    displacement = to_grid(amplitudes, 101)
+    assert displacement[:, [0, -1]].eq(0).all()
+    torch.testing.assert_close(to_modes(displacement, modes), amplitudes)
+
+
+def test_a_grid_point_listens_to_itself() -> None:
+    displacement = torch.zeros(101, dtype=torch.float64)
+    displacement[37] = 1
+    heard = displacement @ listening_weights(torch.tensor([0.37, 0.36], dtype=torch.float64), 101)
+    torch.testing.assert_close(heard, torch.tensor([1.0, 0.0], dtype=torch.float64), atol=1e-12, rtol=0)
+
+
+def test_listening_between_points_is_exact_for_band_limited_shapes() -> None:
+    amplitudes = torch.tensor([1.0, 0.5, -0.25], dtype=torch.float64)
+    position = torch.tensor([0.4321], dtype=torch.float64)
+    heard = to_grid(amplitudes, 101) @ listening_weights(position, 101)
+    torch.testing.assert_close(heard, amplitudes @ mode_shapes(position, 3))
+
+
+def test_too_many_modes_are_refused() -> None:
+    with pytest.raises(ValueError, match="holds 1 to 99 modes, not 100"):
+        to_modes(torch.zeros(101), 100)

@@ -1,0 +1,76 @@
+"""Model and truth behind one face, in metres; runaway output is detected."""
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.models import KoopmanVar
+from engine.pluck import Pluck
+from engine.preset import Preset, load_preset, read_info
+from engine.reference import ModalState, solve_dop853
+from engine.sine_transform import listening_weights, to_grid, to_modes
+from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
+
+
+def both(preset_file: Path) -> tuple[StringSource, StringSource, torch.Tensor]:
+    preset = load_preset(preset_file)
+    initial = project(Pluck(0.4, 3.0).displacement(101), preset.info.modes)[None]
+    return ModelSource(preset), TruthSource(preset.info), initial
+
+
+def test_blocks_chain_and_listening_is_the_grid_there(preset_file: Path) -> None:
+    weights = listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)
+    for source in both(preset_file)[:2]:
+        initial = both(preset_file)[2]
+        whole, _ = source.advance(source.start(initial), 300)
+        state, heard = source.start(initial), []
+        for steps in (1, 64, 235):
+            block, state = source.advance(state, steps, weights)
+            heard.append(block)
+        assert state.frame == 300
+        scale = float(whole.abs().max())
+        torch.testing.assert_close(torch.cat(heard, 1).double(), whole.double() @ weights, rtol=0, atol=1e-5 * scale)
+
+
+def test_truth_is_the_oracle(preset_file: Path) -> None:
+    _, truth, initial = both(preset_file)
+    info = read_info(preset_file)
+    state = ModalState.at_rest(to_modes(initial, info.modes))
+    expected = to_grid(solve_dop853(info.string, state, info.rate_hz, 200, tension_modulated=True), 101)
+    found, _ = truth.advance(truth.start(initial), 200)
+    assert float((found - expected[:, 1:]).norm() / expected.norm()) < 1e-8
+
+
+def test_the_model_speaks_metres(preset_file: Path) -> None:
+    """The physics initialisation is nearly the linear string, so its first frames lie near the truth."""
+    model, truth, initial = both(preset_file)
+    found, expected = (source.advance(source.start(initial), 8)[0].double() for source in (model, truth))
+    assert float((found - expected).norm() / expected.norm()) < 0.2
+
+
+@pytest.mark.parametrize(("factor", "what"), [(float("nan"), "not a number"), (1e9, "far too large")])
+def test_runaway_output_is_detected_with_its_time(
+    preset_file: Path, factor: float, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    preset: Preset = load_preset(preset_file)
+    assert isinstance(preset.model, KoopmanVar)
+    decode = preset.model.decode
+
+    def faulty(latents: torch.Tensor, readout: torch.Tensor | None = None) -> torch.Tensor:
+        frames = decode(latents, readout)
+        frames[:, 30:] *= factor
+        return frames
+
+    monkeypatch.setattr(preset.model, "decode", faulty)
+    source = ModelSource(preset)
+    state = source.start(project(Pluck().displacement(101), 10)[None])
+    with pytest.raises(Runaway, match=r"runs away 0\.008 s after the pluck") as caught:
+        source.advance(state, 64)
+    assert caught.value.time_s == pytest.approx(31 / 4_000), what
+
+
+def test_the_grid_is_checked(preset_file: Path) -> None:
+    for source in both(preset_file)[:2]:
+        with pytest.raises(ValueError, match=r"must have shape \(batch, 101\), not \(1, 50\)"):
+            source.start(torch.zeros(1, 50))
