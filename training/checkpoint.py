@@ -1,0 +1,75 @@
+"""Checkpoints of a run: safetensors with a JSON text, so that no pickle is ever read.
+
+A run's random numbers are functions of its seed and the iteration (see `fit`), so that weights, optimiser
+moments and the iteration are all that a bit-for-bit continuation needs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A moment of a run. `facts` holds the configuration, the iteration and the history as plain data."""
+
+    model: Mapping[str, Tensor]
+    best_model: Mapping[str, Tensor]
+    optimiser: Mapping[str, Mapping[str, Tensor]]  # parameter index -> name of the moment -> value
+    facts: Mapping[str, Any]
+
+    def save(self, path: Path) -> None:
+        """Writes whole or not at all."""
+        tensors = {f"model/{name}": t for name, t in self.model.items()}
+        tensors |= {f"best/{name}": t for name, t in self.best_model.items()}
+        for index, moments in self.optimiser.items():
+            tensors |= {f"optimiser/{index}/{name}": t for name, t in moments.items()}
+        # clones: safetensors refuses tensors that share memory
+        whole = {name: t.detach().to("cpu", copy=True).contiguous() for name, t in tensors.items()}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = path.with_suffix(f".{os.getpid()}.unfinished")
+        try:
+            save_file(whole, unfinished, metadata={"facts": json.dumps(self.facts)})
+            unfinished.replace(path)
+        finally:
+            unfinished.unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: Path) -> Checkpoint:
+        """Raises ValueError, naming the file and the remedy, where it is damaged."""
+        model: dict[str, Tensor] = {}
+        best: dict[str, Tensor] = {}
+        optimiser: dict[str, dict[str, Tensor]] = {}
+        try:
+            with safe_open(path, framework="pt") as file:
+                facts = json.loads(file.metadata()["facts"])
+                for key in file.keys():  # noqa: SIM118 - not a mapping
+                    part, _, name = key.partition("/")
+                    if part == "optimiser":
+                        index, _, moment = name.partition("/")
+                        optimiser.setdefault(index, {})[moment] = file.get_tensor(key)
+                    else:
+                        {"model": model, "best": best}[part][name] = file.get_tensor(key)
+        except (SafetensorError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path}: damaged checkpoint ({error}); delete it to start the run again") from error
+        return cls(model, best, optimiser, facts)
+
+
+def optimiser_moments(optimiser: torch.optim.Optimizer) -> dict[str, dict[str, Tensor]]:
+    """The optimiser's state by parameter index."""
+    return {str(index): dict(moments) for index, moments in optimiser.state_dict()["state"].items()}
+
+
+def restore_moments(optimiser: torch.optim.Optimizer, moments: Mapping[str, Mapping[str, Tensor]]) -> None:
+    state = {int(index): dict(values) for index, values in moments.items()}
+    optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
