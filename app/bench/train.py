@@ -1,0 +1,58 @@
+"""A train step at the size of the paper's own: a batch of 50 trajectories, all of 400 frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+
+from app.bench.machine import Machine, median_s
+from engine.models import MODELS
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.fit import new_model
+from training.losses import koopman_terms
+
+BATCH = 50
+FRAMES = 400
+REPEATS = 5
+
+
+@dataclass(frozen=True)
+class TrainTiming:
+    """Seconds of one step: forward, backward and AdamW."""
+
+    model: str
+    batch: int
+    frames: int
+    step_s: float
+
+
+@dataclass(frozen=True)
+class TrainBenchmark:
+    machine: Machine
+    models: tuple[TrainTiming, ...]
+
+
+def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
+    """Every model at the paper's size, on random data: its values do not matter to its cost."""
+    found = []
+    for number, name in enumerate(MODELS):
+        report(number / len(MODELS), name)
+        found.append(TrainTiming(name, BATCH, FRAMES, _step_s(name)))
+    return TrainBenchmark(Machine.here(), tuple(found))
+
+
+def _step_s(name: str) -> float:
+    data = DatasetConfiguration(initial="gaussian", rate_hz=4_000, modes=10)
+    model = new_model(TrainingConfiguration("benchmark", name, data, Recipe(epochs=1)))
+    optimiser = torch.optim.AdamW(model.parameters())
+    target = torch.randn(BATCH, FRAMES, model.grid_points, generator=torch.Generator().manual_seed(0))
+    frames = torch.arange(1, FRAMES + 1)
+
+    def step() -> None:
+        optimiser.zero_grad(set_to_none=True)
+        torch.stack(koopman_terms(model, target[:, 0], frames, target)).sum().backward()
+        optimiser.step()
+
+    return median_s(step, REPEATS)

@@ -1,0 +1,5 @@
+"""The sub-commands of the command line, one module per topic.
+
+Every heavy import (torch, SciPy, sound files) stands inside the command that needs it: `--help` is quick, and
+what a command does not need may be missing from the machine.
+"""

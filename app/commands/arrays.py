@@ -1,0 +1,98 @@
+"""Displacements in NumPy files: U0.npy (batch, points) is read, OUT.npy (batch, frames, points) written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.lib import format as npy
+from torch import Tensor
+
+from app.commands.console import Failure, Report
+from app.whole_file import whole_file
+
+LARGEST_RESULT_BYTES = 4 * 2**30
+BYTES_AT_ONCE = 16 * 2**20  # of a result; the file does not depend on it
+FRAMES_AT_ONCE = 4096
+IMPLAUSIBLE_PEAK_M = 0.1  # more is likely millimetres
+
+# displacements (batch, points) -> blocks (batch, frames, points) from frame 0 to the last
+Motion = Callable[[Tensor], Iterator[Tensor]]
+
+
+def read_displacements(path: Path) -> Tensor:
+    """Initial displacements in m, float64 (batch, points).
+
+    Raises:
+        Failure: missing, not a NumPy file, of another shape or type, or not finite.
+    """
+    array = _load(path)
+    if array.ndim != 2 or 0 in array.shape:
+        hint = "; for one string save u[None]" if array.ndim == 1 else ""
+        raise Failure(f"{path}: has shape {array.shape}, expected (batch, points){hint}")
+    if array.dtype.kind not in "fiu":
+        raise Failure(f"{path}: holds {array.dtype}, expected real numbers; save u.astype(float)")
+    values = np.array(array, dtype=np.float64)
+    if not np.isfinite(values).all():
+        row, point = np.argwhere(~np.isfinite(values))[0]
+        raise Failure(f"{path}: entry [{row}, {point}] is {values[row, point]}; replace it by a displacement in m")
+    return torch.from_numpy(values)
+
+
+def check_result_size(batch: int, frames: int, points: int) -> None:
+    """Refuses what would surely not fit, before any work."""
+    size = 8 * batch * frames * points
+    if size > LARGEST_RESULT_BYTES:
+        raise Failure(
+            f"the result ({batch}, {frames}, {points}) would take {size / 2**30:.1f} GiB, more than the "
+            f"{LARGEST_RESULT_BYTES / 2**30:g} GiB allowed; lower --steps or split U0"
+        )
+
+
+def write_motion(path: Path, initial: Tensor, steps: int, motion: Motion, report: Report) -> None:
+    """Writes float64 (batch, steps + 1, points) in m, whole or not at all.
+
+    A few trajectories at a time, so that memory holds no more than those.
+    """
+    batch, points = initial.shape
+    rows = max(1, BYTES_AT_ONCE // (8 * (steps + 1) * points))
+    header = {"descr": "<f8", "fortran_order": False, "shape": (batch, steps + 1, points)}
+    done = 0
+    with whole_file(path) as file:
+        npy.write_array_header_1_0(file, header)
+        for few in initial.split(rows):
+            frames: Iterator[Tensor] = motion(few)
+            if len(few) > 1:  # a trajectory's frames lie together in the file
+                frames = iter([torch.cat(list(frames), dim=1)])
+            for block in frames:
+                file.write(_finite(block).numpy().astype("<f8").tobytes())
+                done += block.shape[0] * block.shape[1]
+                report(done / (batch * (steps + 1)))
+
+
+def blocks_of(steps: int) -> Iterator[int]:
+    """Lengths of the blocks that make up `steps`."""
+    for first in range(0, steps, FRAMES_AT_ONCE):
+        yield min(FRAMES_AT_ONCE, steps - first)
+
+
+def _load(path: Path) -> np.ndarray:
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a false header claims no memory
+    except FileNotFoundError:
+        raise Failure(f"{path}: no such file; give a NumPy .npy file of shape (batch, points) in m") from None
+    except (ValueError, EOFError) as error:
+        raise Failure(f"{path}: not a whole NumPy .npy file of numbers ({error}); save it with numpy.save") from error
+    except OSError as error:
+        raise Failure(f"{path}: cannot be read ({error.strerror or error}); give a NumPy .npy file") from error
+    if not isinstance(array, np.ndarray):
+        raise Failure(f"{path}: an archive of arrays; save the one array with numpy.save")
+    return array
+
+
+def _finite(block: Tensor) -> Tensor:
+    if not bool(torch.isfinite(block).all()):
+        raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
+    return block

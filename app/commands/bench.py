@@ -1,0 +1,116 @@
+"""bench solver, render, train: what the program costs here."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands.arguments import Json
+from app.commands.console import print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from app.bench.machine import Machine
+
+bench = typer.Typer(help="Measure speed on this machine: medians of repeats.", no_args_is_help=True)
+
+
+@bench.command()
+def solver(
+    json: Json = False,
+    batch: Annotated[int, typer.Option(min=1, max=1000, help="Trajectories at once.")] = 100,
+    steps: Annotated[int, typer.Option(min=1, help="Samples of each trajectory.")] = 4000,
+) -> None:
+    """Cost and error of the fast solver against DOP853, on the worst case of the paper's data sets."""
+    from app.bench.solver import measure
+
+    with progress("bench solver") as report:
+        found = measure(batch, steps, report)
+    if json:
+        protocol = [{**asdict(timing), "speed_up": timing.speed_up} for timing in found.protocol]
+        print_json({**asdict(found), "protocol": protocol})
+        return
+    _print_machine(found.machine)
+    columns = (
+        "data",
+        "rise",
+        "sub-steps",
+        "error",
+        "fast s",
+        "DOP853 s",
+        "times faster",
+        "loose",
+        "error",
+        "fast s",
+    )
+    rows = [
+        (
+            f"{t.initial} {t.rate_hz} Hz, {t.modes} modes",
+            f"{t.tension_rise:.0%}",
+            t.substeps,
+            t.relative_l2,
+            t.fast_s,
+            t.dop853_s,
+            round(t.speed_up),
+            t.loose_substeps,
+            t.loose_relative_l2,
+            t.loose_fast_s,
+        )
+        for t in found.protocol
+    ]
+    print_table(columns, rows)
+    for t in found.audio:
+        print(
+            f"{t.rate_hz} Hz, {t.modes} modes, {t.substeps} sub-steps, one thread: "
+            f"{t.real_time_factor:.2f} times real time"
+        )
+
+
+@bench.command()
+def render(json: Json = False) -> None:
+    """Real-time factor and first-block latency of every model, on one thread."""
+    from app.bench.render import measure
+
+    with progress("bench render") as report:
+        found = measure(report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    columns = ("model", "rate Hz", "grid × real time", "point × real time", "first block ms", "worst ms")
+    rows = [
+        (
+            t.model,
+            t.rate_hz,
+            t.grid_factor,
+            t.point_factor,
+            1000 * t.first_block_s,
+            1000 * t.worst_first_block_s,
+        )
+        for t in found.models
+    ]
+    print_table(columns, rows)
+
+
+@bench.command()
+def train(json: Json = False) -> None:
+    """Seconds of a train step of every model: 50 trajectories, 400 frames."""
+    from app.bench.train import measure
+
+    with progress("bench train") as report:
+        found = measure(report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    print_table(
+        ("model", "batch", "frames", "step s"), [(t.model, t.batch, t.frames, t.step_s) for t in found.models]
+    )
+
+
+def _print_machine(machine: Machine) -> None:
+    print(
+        f"{machine.processor}, {machine.cpu_count} cores, {machine.threads} threads, "
+        f"torch {machine.torch}, Python {machine.python}, {machine.system}"
+    )

@@ -1,0 +1,75 @@
+"""presets, models: what there is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from app.commands.arguments import Json
+from app.commands.console import print_json, print_table, say
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PRESET_FIELDS = (
+    "name",
+    "model",
+    "string",
+    "initial",
+    "rate_hz",
+    "horizon_steps",
+    "parameters",
+    "rel_mse",
+    "rel_mae",
+    "file",
+)
+
+
+def presets(json: Json = False) -> None:
+    """List the presets. A broken file is told on standard error and does not hide the others."""
+    from engine.preset import PresetError, preset_files
+
+    found = []
+    for path in preset_files():
+        try:
+            found.append(_facts(path))
+        except PresetError as error:
+            say(str(error))
+    if json:
+        print_json(found)
+    else:
+        print_table(PRESET_FIELDS, [list(facts.values()) for facts in found])
+
+
+def models(json: Json = False) -> None:
+    """List the models and their parameters at the paper's sizes."""
+    import torch
+
+    from engine.models import MODELS, count_parameters
+
+    found = []
+    with torch.device("meta"):  # sizes without memory
+        for name, (kind, configuration) in MODELS.items():
+            found.append({"name": name, "parameters": count_parameters(kind(configuration()))})
+    if json:
+        print_json(found)
+    else:
+        print_table(("name", "parameters"), [list(facts.values()) for facts in found])
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    from engine.preset import described_parameters, read_info
+
+    info = read_info(path)
+    values = (
+        path.stem,
+        info.model,
+        info.string_kind,
+        info.initial,
+        info.rate_hz,
+        info.horizon_steps,
+        described_parameters(path, info),
+        info.rel_mse,
+        info.rel_mae,
+        str(path),
+    )
+    return dict(zip(PRESET_FIELDS, values, strict=True))

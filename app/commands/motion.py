@@ -1,0 +1,242 @@
+"""simulate, predict, compare: motion of the whole string, from physics and from models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from app.commands import arguments
+from app.commands.console import Failure, number, print_json, print_table, progress, say
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from torch import Tensor
+
+    from app.commands.arrays import Motion
+    from engine.metrics import ErrorSums
+    from engine.pluck import Pluck
+    from engine.preset import Preset, PresetInfo
+
+InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
+OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
+Steps = Annotated[int, typer.Option(min=1, help="Frames after the initial one.")]
+StringKind = Literal["linear", "nonlinear"]
+Solver = Literal["fast", "dop853"]
+LONGEST_S = 600.0  # of a comparison
+
+
+def simulate(
+    u0: InputFile,
+    out: OutputFile,
+    string: Annotated[StringKind, typer.Option(help="The nonlinear string is tension-modulated.")],
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate in Hz.")],
+    modes: Annotated[int, typer.Option(min=1, help="Modes kept.")],
+    steps: Steps,
+    solver: Annotated[Solver, typer.Option(help="dop853 is slow: what the fast one is checked against.")] = "fast",
+    substeps: Annotated[
+        int | None,
+        typer.Option(min=1, help="Of the fast solver, per sample: fewer are faster. Default: exact to 1e-7."),
+    ] = None,
+) -> None:
+    """Simulate the string by its physics.
+
+    U0 is in metres, at rest, on any grid of at least MODES + 2 points.
+    """
+    arguments.check_range("--rate", rate, 1, 1_000_000, "Hz")
+    if substeps is not None and (solver, string) != ("fast", "nonlinear"):
+        raise typer.BadParameter(
+            "only the fast solver of the nonlinear string has sub-steps", param_hint="--substeps"
+        )
+    from app.commands import arrays
+
+    initial = arrays.read_displacements(u0)
+    points = initial.shape[1]
+    if modes > points - 2:
+        raise typer.BadParameter(
+            f"a grid of {points} points holds 1 … {points - 2} modes, not {modes}", param_hint="--modes"
+        )
+    arrays.check_result_size(len(initial), steps + 1, points)
+    if (peak_m := float(initial.abs().max())) > arrays.IMPLAUSIBLE_PEAK_M:
+        say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
+    solve = _fast if solver == "fast" else _dop853
+    with progress("simulate") as report:
+        arrays.write_motion(out, initial, steps, solve(string == "nonlinear", rate, modes, steps, substeps), report)
+
+
+def predict(preset: arguments.PresetName, u0: InputFile, out: OutputFile, steps: Steps) -> None:
+    """Predict the motion with a preset's model, at its rate.
+
+    U0 is in metres, at rest, on the preset's grid.
+    """
+    loaded = arguments.open_preset(preset)
+    from app.commands import arrays
+
+    initial = arrays.read_displacements(u0)
+    points = loaded.info.grid_points
+    if initial.shape[1] != points:
+        raise Failure(
+            f"{u0}: has shape {tuple(initial.shape)}, expected (batch, {points}), the grid of {loaded.name}; "
+            f"sample the displacement at {points} points with both ends"
+        )
+    arrays.check_result_size(len(initial), steps + 1, points)
+    with progress("predict") as report:
+        arrays.write_motion(out, initial, steps, _predicted(loaded, steps), report)
+
+
+def compare(
+    preset: arguments.PresetName,
+    position: arguments.Position,
+    amplitude_mm: arguments.AmplitudeMm,
+    seconds: arguments.Seconds,
+    shape: arguments.Shape = arguments.DEFAULT_SHAPE,
+    width: arguments.Width = arguments.DEFAULT_WIDTH,
+    json: arguments.Json = False,
+) -> None:
+    """Compare a preset's model with the physics on one pluck.
+
+    Relative errors over the whole grid, in total and by window.
+    """
+    pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
+    arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
+    loaded = arguments.open_preset(preset)
+    info = loaded.info
+    steps = round(seconds * info.rate_hz)
+    if steps < 1:
+        raise typer.BadParameter(
+            f"must hold a sample of {info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
+        )
+    found = _comparison(loaded, pluck, steps)
+    for warning in found["warnings"]:
+        say(f"warning: {warning}")
+    if json:
+        print_json(found)
+        return
+    print(f"{loaded.name}: rel. MSE {number(found['rel_mse'])}, rel. MAE {number(found['rel_mae'])}")
+    columns = ("from s", "to s", "rel. MSE", "rel. MAE", "")
+    rows = [
+        [*list(w.values())[:4], "past the training horizon" if w["past_horizon"] else ""] for w in found["windows"]
+    ]
+    print_table(columns, rows)
+
+
+def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
+    from engine.preset import outside_training
+
+    info = preset.info
+    seconds = steps / info.rate_hz
+    sums = _compared(preset, pluck, steps)
+    total = sums.total()
+    windows = [
+        {
+            "start_s": w.start_s,
+            "stop_s": w.stop_s,
+            "rel_mse": w.rel_mse,
+            "rel_mae": w.rel_mae,
+            "past_horizon": w.start_s >= info.horizon_s,
+        }
+        for w in sums.windows(info.rate_hz, window_edges(seconds, info))
+    ]
+    return {
+        "preset": preset.name,
+        "rate_hz": info.rate_hz,
+        "position": pluck.position,
+        "amplitude_mm": pluck.amplitude_mm,
+        "shape": pluck.shape,
+        "width": pluck.width,
+        "seconds": seconds,
+        "horizon_s": info.horizon_s,
+        "rel_mse": total.rel_mse,
+        "rel_mae": total.rel_mae,
+        "windows": windows,
+        "warnings": outside_training(info, pluck),
+    }
+
+
+def window_edges(seconds: float, info: PresetInfo) -> list[float]:
+    """Whole seconds and the training horizon, from 0 to `seconds`."""
+    inner = {float(second) for second in range(int(seconds) + 1)} | {info.horizon_s}
+    return [*sorted(edge for edge in inner if edge < seconds), seconds]
+
+
+def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
+    from app.commands import arrays
+    from engine.metrics import ErrorSums
+    from engine.sources import ModelSource, TruthSource, project
+
+    info = preset.info
+    initial = project(pluck.displacement(info.grid_points), info.modes)[None]
+    model, truth = ModelSource(preset), TruthSource(info)
+    model_state, truth_state = model.start(initial), truth.start(initial)
+    sums, done = ErrorSums(steps), 0
+    with progress("compare") as report:
+        for count in arrays.blocks_of(steps):
+            predicted, model_state = model.advance(model_state, count)
+            true, truth_state = truth.advance(truth_state, count)
+            sums.add(predicted.double(), true, first=done)
+            done += count
+            report(done / steps)
+    return sums
+
+
+def _fast(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
+    from app.commands.arrays import blocks_of
+    from engine.reference import ModalState, SplittingSolver
+    from engine.sine_transform import to_grid, to_modes
+    from engine.string import StringParameters
+
+    solver = SplittingSolver(
+        StringParameters(), modes, rate_hz, tension_modulated=tension_modulated, substeps=substeps
+    )
+
+    def motion(initial: Tensor) -> Iterator[Tensor]:
+        points = initial.shape[1]
+        state = ModalState.at_rest(to_modes(initial, modes))
+        yield to_grid(state.amplitude[:, None], points)
+        for count in blocks_of(steps):
+            amplitudes, state = solver.advance(state, count)
+            yield to_grid(amplitudes, points)
+
+    return motion
+
+
+def _dop853(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
+    import torch
+
+    from engine.reference import ModalState, solve_dop853
+    from engine.sine_transform import to_grid, to_modes
+    from engine.string import StringParameters
+
+    def motion(initial: Tensor) -> Iterator[Tensor]:
+        solved = [
+            solve_dop853(
+                StringParameters(),
+                ModalState.at_rest(to_modes(one[None], modes)),
+                rate_hz,
+                steps,
+                tension_modulated=tension_modulated,
+            )
+            for one in initial
+        ]
+        yield to_grid(torch.cat(solved), initial.shape[1])
+
+    return motion
+
+
+def _predicted(preset: Preset, steps: int) -> Motion:
+    from app.commands.arrays import blocks_of
+    from engine.sources import ModelSource, project
+
+    source = ModelSource(preset)
+
+    def motion(initial: Tensor) -> Iterator[Tensor]:
+        start = project(initial, preset.info.modes)
+        yield start[:, None]
+        state = source.start(start)
+        for count in blocks_of(steps):
+            frames, state = source.advance(state, count)
+            yield frames.double()
+
+    return motion

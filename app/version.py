@@ -1,0 +1,15 @@
+"""The program's name and version, as files and reports carry them."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+
+PROGRAM = "Learned Strings"
+
+
+def program_version() -> str:
+    """The installed version; "development" where the source runs without being installed."""
+    try:
+        return version("learned-strings")
+    except PackageNotFoundError:
+        return "development"

@@ -1,0 +1,55 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+REMEDIES = {
+    errno.ENOSPC: "free some space, or choose another disk",
+    errno.EDQUOT: "free some space, or choose another disk",
+    errno.EFBIG: "choose another disk, or a shorter result",
+    errno.EACCES: "choose a folder that you may write to",
+    errno.EPERM: "choose a folder that you may write to",
+    errno.EROFS: "choose a folder that you may write to",
+    errno.ENOENT: "make the folder first, or choose another",
+    errno.ENOTDIR: "choose another folder",
+    errno.ENAMETOOLONG: "choose a shorter name",
+}
+
+
+class WriteError(Exception):
+    """A file could not be written. The message names the path, what happened and the remedy."""
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """An open file beside `path` that takes its place when the block ends well; an error leaves nothing.
+
+    Raises:
+        WriteError: for every OSError within the block, so that a folder that cannot be written is told before
+            the work, and a full disk after it.
+    """
+    try:
+        target = path.resolve()  # through a link, to the file that it names
+        if target.exists() and not target.is_file():  # a folder, or a device that must not be replaced
+            raise WriteError(f"{path}: not a file that can be replaced; choose another name")
+        unfinished = target.with_name(f".{target.name[:100]}.{os.getpid()}.unfinished")
+        try:
+            with unfinished.open("wb") as file:
+                yield file
+            unfinished.replace(target)
+        finally:
+            unfinished.unlink(missing_ok=True)
+    except OSError as error:
+        raise WriteError(explain(path, error)) from error
+
+
+def explain(path: Path, error: OSError) -> str:
+    """One line: the path, the system's words and what to do."""
+    remedy = REMEDIES.get(error.errno or 0, "choose another place")
+    return f"{path}: cannot be written ({error.strerror or error}); {remedy}"

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import main
+from engine.excitation import gaussian
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command line did."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def failure(self) -> str:
+        """The one line of a failure."""
+        lines = self.err.splitlines()
+        assert self.status == 1
+        assert len(lines) == 1, self.err
+        assert self.out == ""
+        return lines[0]
+
+    @property
+    def usage(self) -> str:
+        """The message of bad usage."""
+        assert self.status == 2
+        assert self.out == ""
+        return self.err
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+    """Runs a command line in this process."""
+
+    def run(*words: object) -> Outcome:
+        capsys.readouterr()
+        status = main([str(word) for word in words])
+        return Outcome(status, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def u0(tmp_path: Path) -> Path:
+    """Three plucks (3, 101) in m."""
+    plucks = [gaussian(0.3 + 0.1 * i, 0.05, (2 + i) * 1e-3, 101).numpy() for i in range(3)]
+    path = tmp_path / "u0.npy"
+    np.save(path, np.stack(plucks))
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """An empty folder for results."""
+    path = tmp_path / "results"
+    path.mkdir()
+    return path

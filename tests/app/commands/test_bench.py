@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+
+def test_bench_solver_tells_cost_and_error(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.bench.solver.AUDIO_S", 0.005)
+    found = json.loads(run("bench", "solver", "--json", "--batch", 2, "--steps", 20).out)
+    assert [(case["initial"], case["rate_hz"]) for case in found["protocol"]] == [
+        ("gaussian", 16_000),
+        ("noise", 16_000),
+        ("gaussian", 4000),
+        ("noise", 4000),
+    ]
+    assert all(case["relative_l2"] < 1e-7 for case in found["protocol"])
+    assert all(case["loose_relative_l2"] < 1e-6 for case in found["protocol"])
+    assert found["audio"][0]["rate_hz"] == 48_000
+    assert found["machine"]["torch"]
+
+
+def test_bench_render_measures_every_model(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.bench.render.AUDIO_S", 0.02)
+    monkeypatch.setattr("app.bench.render.PLUCKS", 2)
+    found = json.loads(run("bench", "render", "--json").out)
+    assert {(case["model"], case["rate_hz"]) for case in found["models"]} >= {
+        ("koopman_var", 4000),
+        ("koopman_var", 16_000),
+    }
+    assert found["machine"]["threads"] == 1
+    assert all(case["worst_first_block_s"] >= case["first_block_s"] > 0 for case in found["models"])
+    assert "first block ms" in run("bench", "render").out
+
+
+def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.bench.train.BATCH", 2)
+    monkeypatch.setattr("app.bench.train.FRAMES", 5)
+    (case, *_) = json.loads(run("bench", "train", "--json").out)["models"]
+    assert (case["model"], case["batch"], case["frames"]) == ("koopman_var", 2, 5)
+    assert case["step_s"] > 0

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from app.commands import console
+
+
+def test_progress_off_a_terminal_is_a_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    with console.progress("work") as report:
+        for second in range(31):
+            now[0] = float(second)
+            report(second / 60, f"step {second}")
+    assert capsys.readouterr().err.splitlines() == [
+        "learned-strings: work: 17%, 50.0 s left step 10",
+        "learned-strings: work: 33%, 40.0 s left step 20",
+        "learned-strings: work: 50%, 30.0 s left step 30",
+    ]
+
+
+def test_progress_on_a_terminal_is_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with console.progress("work") as report:
+        report(0.5, "half", left_s=90)
+    found = capsys.readouterr()
+    assert found.out == ""
+    assert "work" in found.err
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(8.24, "8.2 s"), (200, "3 min 20 s"), (7500, "2 h 5 min"), (59.99, "60.0 s")]
+)
+def test_durations_are_words(seconds: float, text: str) -> None:
+    assert console.duration(seconds) == text
+
+
+def test_json_is_valid_for_any_number(capsys: pytest.CaptureFixture[str]) -> None:
+    console.print_json({"a": [float("inf"), float("nan"), 1.5], "b": (1, None)})
+    assert json.loads(capsys.readouterr().out) == {"a": [None, None, 1.5], "b": [1, None]}
+
+
+def test_a_table_keeps_a_long_cell_on_its_line(capsys: pytest.CaptureFixture[str]) -> None:
+    console.print_table(("a", "b"), [("x" * 300, 1234.5678), ("y", None)])
+    lines = capsys.readouterr().out.splitlines()
+    assert any("x" * 300 in line and "1235" in line for line in lines)
+    assert any("y" in line and "-" in line for line in lines)

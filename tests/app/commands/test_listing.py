@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of shipped presets with one good and one broken file."""
+    shutil.copy(small_preset, tmp_path / "good.safetensors")
+    (tmp_path / "broken.safetensors").write_bytes(b"not a preset")
+    monkeypatch.setattr("engine.preset.SHIPPED", tmp_path)
+    return tmp_path
+
+
+def test_presets_lists_every_field(run, installed: Path) -> None:
+    found = run("presets", "--json")
+    assert found.status == 0
+    (preset,) = json.loads(found.out)
+    assert preset == {
+        "name": "good",
+        "model": "koopman_var",
+        "string": "nonlinear",
+        "initial": "gaussian",
+        "rate_hz": 4000,
+        "horizon_steps": 400,
+        "parameters": 7053,
+        "rel_mse": 0.5,
+        "rel_mae": 0.25,
+        "file": str(installed / "good.safetensors"),
+    }
+
+
+def test_a_broken_preset_is_told_and_hides_no_other(run, installed: Path) -> None:
+    found = run("presets")
+    assert found.status == 0
+    assert "good" in found.out
+    assert found.err.startswith(f"learned-strings: {installed / 'broken.safetensors'}: not a whole safetensors file")
+    assert found.err.count("\n") == 1
+
+
+def test_a_preset_is_found_by_its_name(run, installed: Path) -> None:
+    words = ("--position", 0.5, "--amplitude-mm", 2, "--seconds", 0.01)
+    assert run("compare", "good", *words).status == 0
+    assert "give a file or one of: broken, good" in run("compare", "other", *words).failure
+
+
+def test_models_counts_the_real_modules_at_the_papers_sizes(run) -> None:
+    found = {entry["name"]: entry["parameters"] for entry in json.loads(run("models", "--json").out)}
+    assert found["koopman_var"] == 134_885
+    assert "134,885" in run("models").out

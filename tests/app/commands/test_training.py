@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from engine.preset import load_preset
+from training.checkpoint import Checkpoint
+
+CONFIGURATION = """
+title = "Tiny"
+model = "koopman_var"
+model_configuration = { state_size = 8, multiplier_widths = [4] }
+[data]
+initial = "gaussian"
+rate_hz = 4000
+modes = 5
+steps = 50
+count = 20
+[recipe]
+epochs = 3
+batch_size = 8
+steps_per_batch = 8
+first_horizon = 10
+validate_every = 1
+"""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a test trains."""
+
+    folder: Path
+
+    @property
+    def cache(self) -> list[Any]:
+        return ["--cache", self.folder / "cache"]
+
+    @property
+    def configuration(self) -> Path:
+        path = self.folder / "tiny.toml"
+        path.write_text(CONFIGURATION, encoding="utf-8")
+        return path
+
+    def train(self, name: str) -> list[Any]:
+        runs, preset = self.folder / name, self.folder / f"{name}.safetensors"
+        return ["train", self.configuration, "--runs", runs, "--output", preset, *self.cache]
+
+    def log(self, name: str) -> list[dict[str, str]]:
+        with (self.folder / name / "tiny" / "log.csv").open(newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return Place(tmp_path)
+
+
+def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place) -> None:
+    found = run(*place.train("a"))
+    assert (found.status, found.err) == (0, "")
+    path = place.folder / "a.safetensors"
+    info = load_preset(path).info
+    lines = found.out.splitlines()
+    assert lines[0] == str(path)
+    assert f"rel. MSE {info.rel_mse:.4g}, rel. MAE {info.rel_mae:.4g}" in lines[1]
+    assert f"rel. MSE {info.test_rel_mse:.4g}, rel. MAE {info.test_rel_mae:.4g}" in lines[2]
+    assert info.trained_range.position == (0.3, 0.7)
+    assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
+
+    again = json.loads(run("evaluate", path, "--json", "--split", "both", *place.cache).out)
+    assert again["rel_mae"] == pytest.approx(info.rel_mae, rel=1e-5)
+    assert again["validation"]["rel_mse"] == pytest.approx(again["validation"]["stored_rel_mse"], rel=1e-5)
+    assert again["test"]["rel_mse"] == pytest.approx(info.test_rel_mse, rel=1e-5)
+    assert [w["stop_s"] for w in again["test"]["windows"]] == pytest.approx([0.003125, 0.00625, 0.009375, 0.0125])
+    assert "stored in the preset" in run("evaluate", path, *place.cache).out
+
+
+def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("training.fit.CHECKPOINT_EVERY_S", -1)
+    assert run(*place.train("whole")).status == 0
+
+    save = Checkpoint.save
+
+    def save_and_kill(self: Checkpoint, path: Path) -> None:
+        if self.facts["epoch"] == 2:
+            raise KeyboardInterrupt  # epoch 2 is in the log, and its checkpoint is not written
+        save(self, path)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Checkpoint, "save", save_and_kill)
+        killed = run(*place.train("cut"))
+    assert killed.status == 130
+    assert "the same command goes on with" in killed.err
+    assert not (place.folder / "cut.safetensors").exists()
+
+    assert run(*place.train("cut")).status == 0
+    whole, cut = (load_preset(place.folder / f"{name}.safetensors").model.state_dict() for name in ("whole", "cut"))
+    assert all(torch.equal(whole[name], cut[name]) for name in whole)
+    rows = place.log("cut")
+    assert [row["epoch"] for row in rows] == ["1", "2", "3"]
+    assert [row["loss"] for row in rows] == [row["loss"] for row in place.log("whole")]
+
+
+def test_a_run_of_another_configuration_is_refused(run, place: Place) -> None:
+    run(*place.train("a"))
+    text = CONFIGURATION.replace("epochs = 3", "epochs = 4")
+    other = place.folder / "other"
+    other.mkdir()
+    (other / "tiny.toml").write_text(text, encoding="utf-8")
+    words = [
+        "train",
+        other / "tiny.toml",
+        "--runs",
+        place.folder / "a",
+        "--output",
+        place.folder / "b",
+        *place.cache,
+    ]
+    assert "belongs to another configuration; delete it" in run(*words).failure
+
+
+def test_a_data_set_is_described(run, place: Place) -> None:
+    facts = json.loads(run("dataset", place.configuration, *place.cache, "--json").out)
+    assert facts["shape"] == [20, 51, 5]
+    assert Path(facts["folder"], "amplitudes.npy").exists()
+    assert 0 < facts["tension_rise"]["median"] < facts["tension_rise"]["max"] < 1
+    told = run("dataset", place.configuration, *place.cache)
+    assert (told.status, facts["key"] in told.out, "tension rise" in told.out) == (0, True, True)
+
+
+@pytest.mark.parametrize("command", ["dataset", "train"])
+def test_a_configuration_that_is_not_there_is_told(run, command: str) -> None:
+    assert "no training configuration 'nothing'" in run(command, "nothing").failure
+
+
+def test_a_wrong_field_is_told(run, place: Place) -> None:
+    path = place.folder / "wrong.toml"
+    path.write_text(CONFIGURATION.replace("epochs", "epoch"), encoding="utf-8")
+    assert f"{path}.recipe: unknown field 'epoch'" in run("train", path).failure
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
+def test_a_device_that_is_not_there_is_told(run, place: Place) -> None:
+    assert "no CUDA device can be used here" in run(*place.train("a"), "--device", "cuda").failure
+
+
+def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: Path) -> None:
+    assert "metadata.training: field 'title' is missing" in run("evaluate", small_preset).failure

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+import torch
+
+from app import export
+from app.export import (
+    ExportCancelled,
+    ExportError,
+    SoundRequest,
+    WavSettings,
+    default_file_name,
+    export_sound,
+    render_signal,
+    render_sound,
+    write_wav,
+)
+from engine.pluck import Pluck
+from engine.preset import load_preset
+from engine.sine_transform import listening_weights
+from engine.sources import FULL_SCALE_M, ModelSource, StringSource, TruthSource, project
+
+PLAIN = WavSettings("32f", fade_out_s=0)
+
+
+@pytest.fixture
+def request_(small_preset: Path) -> SoundRequest:
+    return SoundRequest(load_preset(small_preset), Pluck(0.35, 4.0), listen=0.37, seconds=0.2)
+
+
+def test_the_first_sample_is_the_pluck_itself(request_: SoundRequest) -> None:
+    info = request_.preset.info
+    shape_m = project(request_.pluck.displacement(101), info.modes)
+    for source in ("model", "truth"):
+        signal = render_sound(replace(request_, listen=0.4, source=source))  # type: ignore[arg-type]
+        assert signal[0] * FULL_SCALE_M == pytest.approx(float(shape_m[40]), abs=1e-12)
+        assert len(signal) == 800
+
+
+@pytest.mark.parametrize("block", [1, 64, 65, 300])
+@pytest.mark.parametrize("kind", [ModelSource, TruthSource])
+def test_the_signal_is_the_whole_motion_at_the_listening_point_for_any_block(
+    request_: SoundRequest, kind: type[StringSource], block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    preset = request_.preset
+    source = ModelSource(preset) if kind is ModelSource else TruthSource(preset.info)
+    start_m = project(request_.pluck.displacement(101), 10)
+    frames, _ = source.advance(source.start(start_m[None]), 299)
+    whole_m = torch.cat([start_m[None], frames[0].double()]) @ listening_weights(torch.tensor([0.37]), 101)[:, 0]
+    monkeypatch.setattr(export, "BLOCK_FRAMES", block)
+    signal = render_signal(source, start_m, 300 / 4000, 0.37)
+    assert signal == pytest.approx(whole_m.numpy() / FULL_SCALE_M, abs=1e-6)
+
+
+def test_the_difference_is_model_minus_truth(request_: SoundRequest) -> None:
+    model, truth, difference = (render_sound(replace(request_, source=s)) for s in export.SOURCES)  # type: ignore[arg-type]
+    assert np.abs(difference).max() > 1e-3
+    assert (difference == model - truth).all()
+
+
+@pytest.mark.parametrize("bits", export.BITS)
+def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: export.Bits, tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    settings = WavSettings(bits, fade_out_s=0)
+    report = export_sound(request_, path, settings)
+    expected = render_sound(request_)
+    with soundfile.SoundFile(path) as file:
+        found = file.read(dtype="float64")
+        recipe = json.loads(file.comment)
+        assert (file.title, file.samplerate) == ("A small string", 4000)
+        assert file.software.startswith("Learned Strings ")
+    assert np.abs(found - expected).max() < {"16": 5e-5, "24": 1e-7, "32f": 1e-7}[bits]
+    assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
+    assert report.peak_db == pytest.approx(20 * np.log10(np.abs(expected).max()))
+    assert report.size_bytes == path.stat().st_size
+    assert recipe == export.recipe(request_, settings)
+    assert recipe["preset_sha256"] == hashlib.sha256(request_.preset.path.read_bytes()).hexdigest()
+    assert Pluck(**recipe["pluck"]) == request_.pluck
+
+
+def test_the_duration_is_the_same_at_every_rate(request_: SoundRequest, tmp_path: Path) -> None:
+    report = export_sound(request_, tmp_path / "a.wav", WavSettings(rate_hz=44_100))
+    assert (report.rate_hz, report.frames) == (44_100, 8820)
+
+
+def test_normalising_keeps_the_ratio_of_model_and_truth(request_: SoundRequest, tmp_path: Path) -> None:
+    gains = set()
+    for source in ("model", "truth"):
+        settings = WavSettings("24", normalise=True)
+        report = export_sound(replace(request_, source=source), tmp_path / "a.wav", settings)  # type: ignore[arg-type]
+        gains.add(round(report.gain_db, 9))
+        assert report.peak_db <= -1 + 1e-9
+    assert len(gains) == 1
+
+
+def test_progress_rises_to_one(request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(export, "BLOCK_FRAMES", 100)
+    shares: list[float] = []
+    export_sound(replace(request_, source="difference"), tmp_path / "a.wav", progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+
+
+def test_cancelling_leaves_no_file(request_: SoundRequest, tmp_path: Path) -> None:
+    with pytest.raises(ExportCancelled):
+        export_sound(request_, tmp_path / "a.wav", cancelled=lambda: True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_refuses_is_told_before_the_work(request_: SoundRequest, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"missing.a\.wav: cannot be written .*; make the folder first"):
+        export_sound(request_, tmp_path / "missing" / "a.wav", progress=lambda share: pytest.fail("rendered"))
+
+
+def test_a_full_disk_leaves_what_was_there(
+    request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"old")
+
+    def full(self: Path, target: Path) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(ExportError, match=r"a\.wav: cannot be written .*; free some space"):
+        export_sound(request_, path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_preset_that_vanished_is_told(request_: SoundRequest, tmp_path: Path) -> None:
+    gone = replace(request_, preset=replace(request_.preset, path=tmp_path / "gone.safetensors"))
+    with pytest.raises(ExportError, match=r"gone\.safetensors: the preset cannot be read any more"):
+        export_sound(gone, tmp_path / "a.wav")
+
+
+def test_samples_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"a\.wav: .*not finite"):
+        write_wav(tmp_path / "a.wav", np.array([np.inf]), 4000)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_samples_can_be_written_with_several_channels(tmp_path: Path) -> None:
+    report = write_wav(tmp_path / "a.wav", np.zeros((50, 2)), 4000, PLAIN, title="two", recipe={"a": 1})
+    with soundfile.SoundFile(tmp_path / "a.wav") as file:
+        assert (file.channels, file.frames, file.title, json.loads(file.comment)) == (2, 50, "two", {"a": 1})
+    assert report.frames == 50
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"listen": 1.2}, "0 … 1, not 1.2"),
+        ({"seconds": 0.0}, "at most 600, not 0"),
+        ({"seconds": 601.0}, "at most 600, not 601"),
+        ({"seconds": float("nan")}, "not nan"),
+        ({"source": "both"}, "model, truth, difference"),
+    ],
+)
+def test_a_request_out_of_range_is_refused(request_: SoundRequest, change: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(request_, **change)
+
+
+def test_the_file_name_tells_what_is_in_it() -> None:
+    assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth") == "nylon_x0.35_a4.0_48000_truth.wav"
