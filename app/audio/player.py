@@ -1,0 +1,294 @@
+"""The player: a mixer, an output, and the feeder thread between them.
+
+    any thread ── commands ──► feeder thread ── blocks ──► device callback ──► loudspeaker
+    any thread ◄── status() ── (owns mixer and output)
+
+Only the feeder touches the mixer and the output. Public methods put a command into its queue and return at
+once; it obeys them right before it renders a block, so none waits longer than the short block queue takes to
+play.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.audio.devices import AudioDevice, default_device, find
+from app.audio.mixer import DECLICK_S, METER_FLOOR_DB, Mixer
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, vanished
+from app.audio.silent import SilentOutput
+from app.audio.stream import BUFFER_S, OutputStream
+from app.audio.timeline import Timeline
+from app.audio.track import Track
+
+DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
+
+_WAIT_S = 0.05  # the longest time that the feeder looks at neither its commands nor the device's pulse
+_JOIN_TIMEOUT_S = 5.0
+
+
+class Output(Protocol):
+    """Where blocks go: an `OutputStream` or a `SilentOutput`."""
+
+    @property
+    def device(self) -> AudioDevice | None: ...
+    @property
+    def rate_hz(self) -> int: ...
+    @property
+    def block_frames(self) -> int: ...
+    @property
+    def latency_s(self) -> float: ...
+    @property
+    def underruns(self) -> int: ...
+    @property
+    def frames_written(self) -> int: ...
+    @property
+    def frames_queued(self) -> int: ...
+    def wait_for_space(self, timeout_s: float) -> bool: ...
+    def write(self, block: NDArray[np.float32]) -> None: ...
+    def lost(self) -> bool: ...
+    def close(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class PlayerStatus:
+    """A snapshot of the player, some 10 ms old at most."""
+
+    position_s: float = 0.0  # of what is heard now: written to the device, less its latency
+    playing: bool = False  # as rendered: the last of it is heard a queue and `latency_s` later
+    waiting: bool = False  # playing, but rendering has not arrived at the playhead
+    source: str | None = None
+    peak_db: float = METER_FLOOR_DB  # dBFS, after volume and limiter
+    gain_reduction_db: float = 0.0
+    limiting: bool = False  # the safety limiter changes what is heard
+    non_finite: bool = False  # samples of the loaded track were replaced by silence
+    underruns: int = 0  # of the present device
+    device: AudioDevice | None = None  # None: silent
+    rate_hz: int = DEFAULT_RATE_HZ  # of the tracks; opening a device may change it and unload the track
+    latency_s: float = 0.0
+    problem: str | None = None  # why there is no sound, or why the last device could not be opened
+
+
+def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
+    """The device as it is now, or, for None, the system's default."""
+    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
+
+
+class Player:
+    """Plays one track at a time through a device, or silently against a clock as long as there is none.
+
+    Every public method may be called from any thread and returns at once. After `close` commands do nothing.
+
+    Args:
+        on_problem: Called once for each fault of a device, from the feeder thread.
+        rate_hz: Rate until a device is open.
+        look_up, open_output: Find and open a device; tests put others in.
+    """
+
+    def __init__(
+        self,
+        on_problem: Callable[[AudioProblem], None] | None = None,
+        rate_hz: int = DEFAULT_RATE_HZ,
+        look_up: Callable[[AudioDevice | None, bool], AudioDevice] = look_up,
+        open_output: Callable[[AudioDevice, float], Output] = OutputStream,
+    ) -> None:
+        self._on_problem = on_problem
+        self._look_up = look_up
+        self._open_output = open_output
+        self._mixer = Mixer(rate_hz)
+        self._output: Output = SilentOutput(rate_hz)
+        self._buffer_s = BUFFER_S
+        self._timeline = Timeline(0)
+        self._problem: str | None = None
+        self._track: Track | None = None  # the caller's latest, to refuse a wrong `select` on the spot
+        self._commands: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._closing = threading.Event()
+        self._status = PlayerStatus(rate_hz=rate_hz)
+        self._feeder = threading.Thread(target=self._feed, name="audio-feeder", daemon=True)
+        self._feeder.start()
+
+    def open(self, device: AudioDevice | None = None, buffer_s: float = BUFFER_S) -> None:
+        """Changes to another device, known by name and host API, or, for None, to the system's default.
+
+        The present one stays until the new one plays; if that fails, `on_problem` hears of it. A device of
+        another rate stops playback and unloads the track: load it again at `status().rate_hz`. A longer
+        buffer cures crackles and delays commands; see `OutputStream`.
+        """
+        self._commands.put(lambda: self._change_output(device, buffer_s))
+
+    def load(self, track: Track, keep_position: bool = False) -> None:
+        """Takes another track, from its beginning or at the same position; see `Mixer.load`."""
+        rate_hz = self.rate_hz
+        if track.rate_hz != rate_hz:
+            raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
+        self._track = track
+        self._commands.put(lambda: self._load(track, keep_position))
+
+    def play(self) -> None:
+        self._commands.put(lambda: self._mixer.play())
+
+    def stop(self) -> None:
+        self._commands.put(lambda: self._mixer.stop())
+
+    def seek(self, position_s: float) -> None:
+        if not math.isfinite(position_s):
+            raise ValueError(f"The playhead cannot go to {position_s} s.")
+        self._commands.put(lambda: self._mixer.seek(position_s))
+
+    def select(self, source: str) -> None:
+        """Cross-fades to another source of the track, at the same position."""
+        track = self._track
+        if track is not None and source not in track.sources:
+            raise ValueError(f"The track has no source {source!r}, only {track.sources}.")
+        self._commands.put(lambda: self._select(source))
+
+    def set_loop(self, on: bool) -> None:
+        self._commands.put(lambda: self._mixer.set_loop(on))
+
+    def set_volume_db(self, volume_db: float) -> None:
+        """0 dB plays the samples as they are, minus infinity mutes."""
+        if math.isnan(volume_db) or volume_db == math.inf:
+            raise ValueError(f"The volume cannot be {volume_db} dB.")
+        self._commands.put(lambda: self._mixer.set_volume_db(volume_db))
+
+    @property
+    def rate_hz(self) -> int:
+        """The rate that tracks need now."""
+        return self._status.rate_hz
+
+    def status(self) -> PlayerStatus:
+        return self._status
+
+    def close(self) -> None:
+        """Cuts the sound, ends the thread and frees the device; may be called again."""
+        self._closing.set()
+        if threading.current_thread() is not self._feeder:
+            self._feeder.join(_JOIN_TIMEOUT_S)
+
+    def __enter__(self) -> Player:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # All below runs in the feeder thread.
+
+    def _feed(self) -> None:
+        try:
+            while not self._closing.is_set():
+                self._output.wait_for_space(_WAIT_S)
+                self._obey_commands()  # after the wait, so that the block to come knows the latest of them
+                if self._output.wait_for_space(0):  # again: a command may have used it, or changed the output
+                    self._write_block()
+                elif self._output.lost():
+                    self._go_silent()
+                self._publish()
+        except Exception:
+            self._report(
+                AudioProblem(
+                    ProblemKind.OTHER,
+                    "Playback has stopped because of a fault in this program.",
+                    "Start the app again, and please report the details.",
+                    traceback.format_exc(),
+                )
+            )
+            self._status = replace(self._status, playing=False, problem=self._problem)
+        finally:
+            self._output.close()
+
+    def _obey_commands(self) -> None:
+        while True:
+            try:
+                command = self._commands.get_nowait()
+            except Empty:
+                return
+            command()
+
+    def _load(self, track: Track, keep_position: bool) -> None:
+        # If the device has changed meanwhile, the caller will see the new rate in status() and load again.
+        if track.rate_hz == self._mixer.rate_hz:
+            self._mixer.load(track, keep_position)
+
+    def _select(self, source: str) -> None:
+        # select() has checked the source; only a track that another thread loaded meanwhile may refuse it.
+        with contextlib.suppress(ValueError):
+            self._mixer.select(source)
+
+    def _write_block(self) -> None:
+        self._output.write(self._mixer.next_block(self._output.block_frames))
+        state = self._mixer.status()
+        self._timeline.note(self._output.frames_queued, state.position_frames, state.playing and not state.waiting)
+
+    def _change_output(self, wanted: AudioDevice | None, buffer_s: float) -> None:
+        present = self._output.device
+        was_playing = self._mixer.status().playing
+        self._fade_to_silence()  # opening takes a while, in which nobody feeds the present device
+        try:
+            # PortAudio may only look for new devices while none is open.
+            device = self._look_up(wanted, present is None)
+            if device != present or buffer_s != self._buffer_s:
+                if device == present:  # it might refuse to be opened twice
+                    self._adopt_output(SilentOutput(self._output.rate_hz))
+                self._adopt_output(self._open_output(device, buffer_s))
+                self._buffer_s = buffer_s
+            self._problem = None
+        except AudioUnavailable as error:
+            self._report(error.problem)
+        if was_playing:
+            self._mixer.play()
+
+    def _fade_to_silence(self) -> None:
+        self._mixer.stop()
+        fade_frames = round(DECLICK_S * self._output.rate_hz)
+        for _ in range(math.ceil(fade_frames / self._output.block_frames)):
+            if self._output.wait_for_space(_WAIT_S):
+                self._write_block()
+
+    def _go_silent(self) -> None:
+        """The device has vanished: the pictures move on without sound."""
+        device = self._output.device
+        self._adopt_output(SilentOutput(self._output.rate_hz, self._output.block_frames))
+        self._report(vanished("" if device is None else device.name).problem)
+
+    def _adopt_output(self, output: Output) -> None:
+        old, self._output = self._output, output
+        if output.rate_hz != self._mixer.rate_hz:
+            self._mixer = self._mixer.emptied(output.rate_hz)
+        self._timeline = Timeline(self._mixer.position_frames)
+        old.close()
+
+    def _report(self, problem: AudioProblem) -> None:
+        self._problem = str(problem)
+        if self._on_problem is not None:
+            self._on_problem(problem)
+
+    def _publish(self) -> None:
+        output, state = self._output, self._mixer.status()
+        heard_frame = output.frames_written - round(output.latency_s * output.rate_hz)
+        self._status = PlayerStatus(
+            position_s=self._timeline.position_at(heard_frame) / output.rate_hz,
+            playing=state.playing,
+            waiting=state.waiting,
+            source=state.source,
+            peak_db=state.peak_db,
+            gain_reduction_db=state.gain_reduction_db,
+            limiting=state.limiting,
+            non_finite=state.non_finite,
+            underruns=output.underruns,
+            device=output.device,
+            rate_hz=output.rate_hz,
+            latency_s=output.latency_s,
+            problem=self._problem,
+        )

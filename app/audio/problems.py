@@ -1,0 +1,136 @@
+"""What can go wrong between the player and a sound device, in words for the user."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class ProblemKind(StrEnum):
+    PORTAUDIO_MISSING = "portaudio_missing"
+    NO_DEVICE = "no_device"
+    BUSY = "busy"
+    RATE_REFUSED = "rate_refused"
+    VANISHED = "vanished"
+    OTHER = "other"
+
+
+@dataclass(frozen=True)
+class AudioProblem:
+    """One fault: what happened, what to do about it, and what the system said."""
+
+    kind: ProblemKind
+    message: str
+    remedy: str
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.remedy}"
+
+
+class AudioUnavailable(Exception):
+    """No sound can be had for now. Pictures and export do not need any."""
+
+    def __init__(self, problem: AudioProblem) -> None:
+        super().__init__(str(problem))
+        self.problem = problem
+
+    @property
+    def kind(self) -> ProblemKind:
+        return self.problem.kind
+
+    @property
+    def message(self) -> str:
+        return self.problem.message
+
+    @property
+    def remedy(self) -> str:
+        return self.problem.remedy
+
+    @property
+    def detail(self) -> str:
+        return self.problem.detail
+
+
+def portaudio_missing(detail: str) -> AudioUnavailable:
+    return AudioUnavailable(
+        AudioProblem(
+            ProblemKind.PORTAUDIO_MISSING,
+            "There is no sound, because the PortAudio library was not found.",
+            "Install it (Debian and Ubuntu: apt-get install libportaudio2) and start the app again.",
+            detail,
+        )
+    )
+
+
+def not_started(detail: str) -> AudioUnavailable:
+    return AudioUnavailable(
+        AudioProblem(
+            ProblemKind.OTHER,
+            "The computer's sound system could not be started.",
+            "Check the system's sound settings and start the app again.",
+            detail,
+        )
+    )
+
+
+def no_device(detail: str = "") -> AudioUnavailable:
+    return AudioUnavailable(
+        AudioProblem(
+            ProblemKind.NO_DEVICE,
+            "This computer shows no sound output.",
+            "Connect loudspeakers or headphones and choose them in the audio settings.",
+            detail,
+        )
+    )
+
+
+def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
+    return AudioUnavailable(
+        AudioProblem(
+            ProblemKind.VANISHED,
+            f"The sound output “{device_name}” is no longer there.",
+            "Connect it again, or choose another one in the audio settings.",
+            detail,
+        )
+    )
+
+
+def refused(error: Exception, device_name: str, rate_hz: int) -> AudioUnavailable:
+    """Explains from PortAudio's code and the system's text why a device did not open or start."""
+    detail = str(error)
+    text = detail.lower()
+    code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)
+    # PortAudio reports much of what a driver says as one "unanticipated host error", hence the look at the
+    # text.
+    if code == _PA_INVALID_SAMPLE_RATE or "sample rate" in text:
+        problem = AudioProblem(
+            ProblemKind.RATE_REFUSED,
+            f"The sound output “{device_name}” refuses {rate_hz} Hz.",
+            "Set another sample rate for it in the system's sound settings, or choose another output.",
+            detail,
+        )
+    elif code == _PA_INVALID_DEVICE or any(word in text for word in _VANISHED_WORDS):
+        return vanished(device_name, detail)
+    elif code == _PA_DEVICE_UNAVAILABLE or any(word in text for word in _BUSY_WORDS):
+        problem = AudioProblem(
+            ProblemKind.BUSY,
+            f"The sound output “{device_name}” is in use by another program.",
+            "Close that program and try again, or choose another output.",
+            detail,
+        )
+    else:
+        problem = AudioProblem(
+            ProblemKind.OTHER,
+            f"The sound output “{device_name}” could not be opened.",
+            "Try again, or choose another output in the audio settings.",
+            detail,
+        )
+    return AudioUnavailable(problem)
+
+
+_PA_INVALID_SAMPLE_RATE = -9997
+_PA_INVALID_DEVICE = -9996
+_PA_DEVICE_UNAVAILABLE = -9985
+_BUSY_WORDS = ("busy", "in use", "in_use", "exclusive")
+_VANISHED_WORDS = ("no such device", "invalidated", "disconnected", "not found")

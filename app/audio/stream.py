@@ -1,0 +1,155 @@
+"""An open sound device behind a bounded queue of ready blocks.
+
+Two threads meet here. The device's callback copies one ready block per call, or zeros if there is none, and
+does nothing else. The feeder renders the next block whenever one of the few buffers has come back.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.audio.devices import AudioDevice, Callback, RawStream, open_device
+from app.audio.problems import refused
+
+BLOCK_FRAMES = 256
+BUFFER_S = 0.025  # of ready sound: outlasts a busy moment of Python, and delays a command by as much
+LOST_AFTER_S = 0.8
+SETTLING_S = 0.1
+START_GRACE_S = 3.0  # some sound servers let a new stream stand still for a second or two
+
+OpenDevice = Callable[[AudioDevice, float, int, Callback], RawStream]
+
+
+class OutputStream:
+    """A device that plays, at its own rate, what is written block by block.
+
+    A few preallocated buffers travel in a circle: free → (write) → ready → (callback) → free. So the queue is
+    bounded by construction, and the callback neither allocates nor waits.
+
+    Args:
+        device: Where to play.
+        buffer_s: Sound kept ready in the queue, and at least as much in the device's own buffer.
+        block_frames: Frames per block, for the device as well as for `write`.
+        open_device: Makes the raw stream; tests put another one in.
+
+    Raises:
+        AudioUnavailable: If the device cannot be opened or started.
+    """
+
+    def __init__(
+        self,
+        device: AudioDevice,
+        buffer_s: float = BUFFER_S,
+        block_frames: int = BLOCK_FRAMES,
+        open_device: OpenDevice = open_device,
+    ) -> None:
+        self.device: AudioDevice | None = device
+        self.rate_hz = device.default_rate_hz
+        self.block_frames = block_frames
+        self.callback_count = 0
+        self.frames_written = 0  # by the callback to the device, without the zeros of underruns
+        self.underruns = 0  # blocks that came too late, and gaps that the device itself has noticed
+        self.frames_queued = 0  # by `write`
+        self._free: SimpleQueue[NDArray[np.float32]] = SimpleQueue()
+        self._ready: SimpleQueue[NDArray[np.float32]] = SimpleQueue()
+        self._next: NDArray[np.float32] | None = None  # the free buffer that wait_for_space has found
+        self._raw = open_device(device, buffer_s, block_frames, self._callback)
+        self.latency_s = float(self._raw.latency)
+        # A device that starts fills its own buffer, some twice, faster than the queue follows: inaudibly.
+        self._settled_count = math.ceil((self.latency_s + SETTLING_S) * self.rate_hz / block_frames)
+        # Devices with a long buffer ask for many blocks at a time; half of that buffer is a safe guess.
+        blocks = max(2, int(max(buffer_s, self.latency_s / 2) * self.rate_hz / block_frames))
+        for _ in range(blocks):  # the queue starts full, of silence
+            self._ready.put(np.zeros((block_frames, min(device.channels, 2)), np.float32))
+            self.frames_queued += block_frames
+        self._alive = _Heartbeat(grace_s=START_GRACE_S)
+        try:
+            self._raw.start()
+        except Exception as error:
+            self.close()
+            raise refused(error, device.name, self.rate_hz) from error
+
+    def wait_for_space(self, timeout_s: float) -> bool:
+        """Waits until a block can be written."""
+        if self._next is None:
+            with contextlib.suppress(Empty):
+                self._next = self._free.get(timeout=timeout_s)
+        return self._next is not None
+
+    def write(self, block: NDArray[np.float32]) -> None:
+        """Queues one block, shape (block_frames, 2), after `wait_for_space` has returned True."""
+        if self._next is None:
+            raise RuntimeError("The queue is full: wait_for_space comes first.")
+        np.copyto(self._next, block[:, : self._next.shape[1]])
+        self._ready.put(self._next)
+        self._next = None
+        self.frames_queued += self.block_frames
+
+    def lost(self) -> bool:
+        """Whether the device has gone: it calls back no more. To be asked again and again, by one thread."""
+        try:
+            active = self._raw.active
+        except Exception:  # PortAudio itself has already given up the stream
+            active = False
+        return not active or self._alive.silence_s(self.callback_count) > LOST_AFTER_S
+
+    def close(self) -> None:
+        """Stops at once and frees the device. Never from inside a callback, which could not end then."""
+        with contextlib.suppress(Exception):  # nothing can be done about a device that cannot even stop
+            self._raw.abort()
+        with contextlib.suppress(Exception):
+            self._raw.close()
+
+    def _callback(self, outdata: NDArray[np.float32], frames: int, _time: Any, status: Any) -> None:
+        self.callback_count += 1
+        if status and status.output_underflow:
+            self._count_underrun()
+        try:
+            block = self._ready.get_nowait()
+        except Empty:
+            outdata.fill(0)
+            self._count_underrun()
+            return
+        if len(block) == len(outdata):  # always, unless a driver ignores the block size that it was given
+            outdata[:] = block
+            self.frames_written += frames
+        else:
+            outdata.fill(0)
+            self._count_underrun()
+        self._free.put(block)
+
+    def _count_underrun(self) -> None:
+        if self.callback_count > self._settled_count:
+            self.underruns += 1
+
+
+class _Heartbeat:
+    """Measures for how long a counter has stood still.
+
+    A gap between two looks counts only a little, so that a computer which slept, or was too busy for either
+    thread, is not taken for an unplugged device.
+    """
+
+    _LONGEST_STEP_S = 0.1
+
+    def __init__(self, grace_s: float) -> None:
+        self._count = 0
+        self._looked_s = time.monotonic()
+        self._grace_until_s = self._looked_s + grace_s
+        self._silence_s = 0.0
+
+    def silence_s(self, count: int) -> float:
+        now_s = time.monotonic()
+        self._silence_s += min(now_s - self._looked_s, self._LONGEST_STEP_S)
+        self._looked_s = now_s
+        if count != self._count or now_s < self._grace_until_s:
+            self._count, self._silence_s = count, 0.0
+        return self._silence_s

@@ -1,0 +1,157 @@
+"""Outputs are known by name, and what goes wrong with them is said in plain words."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import app
+from app.audio import AudioUnavailable, ProblemKind, default_device, find, output_devices
+from app.audio.devices import AudioDevice, open_device
+
+
+class PortAudioError(Exception):
+    pass
+
+
+class FakeSoundDevice(SimpleNamespace):
+    """The part of the `sounddevice` module that is used."""
+
+    PortAudioError = PortAudioError
+
+    def __init__(self, entries: list[tuple[str, int, int]], default: int = -1) -> None:
+        super().__init__(default=SimpleNamespace(device={"output": default}), opened=[], restarts=0)
+        self.entries = entries
+        self.refusal: Exception | None = None
+
+    def query_hostapis(self) -> tuple[dict[str, Any], ...]:
+        return ({"name": "ALSA"}, {"name": "JACK"})
+
+    def query_devices(self, index: int | None = None) -> Any:
+        entries = [
+            {
+                "name": name,
+                "hostapi": api,
+                "max_output_channels": channels,
+                "default_samplerate": 48_000.0,
+                "default_high_output_latency": 0.035,
+            }
+            for name, api, channels in self.entries
+        ]
+        return entries if index is None else entries[index]
+
+    def OutputStream(self, **options: Any) -> SimpleNamespace:
+        self.opened.append(options)
+        if self.refusal is not None:
+            raise self.refusal
+        return SimpleNamespace()
+
+    def _terminate(self) -> None:
+        self.restarts += 1
+
+    def _initialize(self) -> None:
+        self.entries.append(("Headset", 0, 2))
+
+
+@pytest.fixture
+def sounddevice(monkeypatch: pytest.MonkeyPatch) -> FakeSoundDevice:
+    fake = FakeSoundDevice([("Microphone", 0, 0), ("HDMI", 0, 8), ("Speakers", 0, 2), ("Speakers", 1, 1)], 2)
+    monkeypatch.setitem(sys.modules, "sounddevice", fake)
+    return fake
+
+
+def test_outputs_are_listed_with_the_default_first(sounddevice: FakeSoundDevice) -> None:
+    assert output_devices() == [
+        AudioDevice("Speakers", "ALSA", 48_000, 2, is_default=True),
+        AudioDevice("HDMI", "ALSA", 48_000, 8),
+        AudioDevice("Speakers", "JACK", 48_000, 1),
+    ]
+    assert default_device().name == "Speakers"
+    sounddevice.default.device["output"] = -1
+    assert default_device().name == "HDMI"
+
+
+def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSoundDevice) -> None:
+    wanted = find("Speakers", "ALSA")
+    sounddevice.entries.insert(0, ("Webcam", 0, 2))
+    open_device(wanted, 0.05, 256, lambda *_: None)
+    (options,) = sounddevice.opened
+    assert options["device"] == 3
+    assert options["samplerate"] == 48_000
+    assert options["blocksize"] == 256
+    assert options["channels"] == 2
+    assert options["latency"] == 0.05
+    open_device(wanted, 0.02, 256, lambda *_: None)
+    assert sounddevice.opened[1]["latency"] == 0.035
+
+
+def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> None:
+    with pytest.raises(AudioUnavailable):
+        find("Headset", "ALSA")
+    assert find("Headset", "ALSA", rescan=True).channels == 2
+    assert sounddevice.restarts == 1
+
+
+def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice) -> None:
+    with pytest.raises(AudioUnavailable, match="“Headset” is no longer there") as caught:
+        open_device(AudioDevice("Headset", "ALSA", 48_000), 0.05, 256, lambda *_: None)
+    assert caught.value.kind is ProblemKind.VANISHED
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "message"),
+    [
+        (PortAudioError("Error opening", -9997), ProblemKind.RATE_REFUSED, "“Speakers” refuses 48000 Hz"),
+        (PortAudioError("Invalid sample rate"), ProblemKind.RATE_REFUSED, "refuses 48000 Hz"),
+        (PortAudioError("Device unavailable", -9985), ProblemKind.BUSY, "in use by another program"),
+        (PortAudioError("x", -9999, (0, -16, "Device or resource busy")), ProblemKind.BUSY, "in use"),
+        (PortAudioError("x", -9999, (0, 0, "AUDCLNT_E_DEVICE_IN_USE")), ProblemKind.BUSY, "in use"),
+        (PortAudioError("x", -9999, (0, -19, "No such device")), ProblemKind.VANISHED, "no longer there"),
+        (PortAudioError("Invalid device", -9996), ProblemKind.VANISHED, "no longer there"),
+        (PortAudioError("Internal PortAudio error", -9986), ProblemKind.OTHER, "could not be opened"),
+        (ValueError("strange"), ProblemKind.OTHER, "could not be opened"),
+    ],
+)
+def test_refusals_are_explained(
+    sounddevice: FakeSoundDevice, error: Exception, kind: ProblemKind, message: str
+) -> None:
+    sounddevice.refusal = error
+    with pytest.raises(AudioUnavailable, match=message) as caught:
+        open_device(find("Speakers", "ALSA"), 0.05, 256, lambda *_: None)
+    assert caught.value.kind is kind
+    assert caught.value.detail == str(error)
+    assert caught.value.remedy in str(caught.value)
+
+
+def test_no_output_at_all(sounddevice: FakeSoundDevice) -> None:
+    sounddevice.entries[:] = [("Microphone", 0, 0)]
+    assert output_devices() == []
+    with pytest.raises(AudioUnavailable, match="no sound output") as caught:
+        default_device()
+    assert caught.value.kind is ProblemKind.NO_DEVICE
+
+
+def test_neither_portaudio_nor_qt_is_needed_for_the_import() -> None:
+    code = "import sys, app.audio; print(*{'sounddevice', 'PySide6'} & {*sys.modules})"
+    environment = {**os.environ, "PYTHONPATH": str(Path(app.__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == ("", "")
+
+
+def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(name: str, *arguments: Any, **options: Any) -> Any:
+        if name == "sounddevice":
+            raise OSError("PortAudio library not found")
+        return original(name, *arguments, **options)
+
+    original = __import__
+    monkeypatch.delitem(sys.modules, "sounddevice", raising=False)
+    monkeypatch.setattr("builtins.__import__", refuse)
+    with pytest.raises(AudioUnavailable, match="apt-get install libportaudio2") as caught:
+        output_devices()
+    assert caught.value.kind is ProblemKind.PORTAUDIO_MISSING
+    assert caught.value.detail == "PortAudio library not found"

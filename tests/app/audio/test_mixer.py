@@ -1,0 +1,397 @@
+"""Laws of the mixer: the same samples for any block size, no clicks, no surprises at the edges of a track."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.audio import Mixer, Track
+from app.audio.limiter import CEILING
+from app.audio.mixer import ATTACK_S, CROSS_FADE_S, DECLICK_S, RESUME_RESERVE_S
+
+RATE_HZ = 48_000
+TONE_HZ = 220.0
+SECOND = RATE_HZ
+
+
+def tone(seconds: float, peak: float = 0.5, phase: float = 0.0) -> np.ndarray:
+    return peak * np.sin(2 * np.pi * TONE_HZ * np.arange(round(seconds * RATE_HZ)) / RATE_HZ + phase)
+
+
+def make_track(seconds: float = 1.0, peak: float = 0.5, phase: float = 0.0) -> Track:
+    """The truth is the model, a little louder and later, as it is in life."""
+    model, truth = tone(seconds, peak, phase), tone(seconds, 1.2 * peak, phase + 0.3)
+    track = Track(RATE_HZ, model.size, ("model", "truth"))
+    track.append({"model": model, "truth": truth})
+    return track
+
+
+def playing(track: Track) -> Mixer:
+    mixer = Mixer(RATE_HZ)
+    mixer.load(track)
+    mixer.play()
+    return mixer
+
+
+def mono(mixer: Mixer, frames: int) -> np.ndarray:
+    block = mixer.next_block(frames)
+    assert block.shape == (frames, 2)
+    assert block.dtype == np.float32
+    np.testing.assert_array_equal(block[:, 0], block[:, 1])
+    return block[:, 0]
+
+
+def frames(seconds: float) -> int:
+    return round(seconds * RATE_HZ)
+
+
+def level_db(samples: np.ndarray) -> float:
+    return float(10 * np.log10(np.mean(np.square(samples, dtype=np.float64)) + 1e-30))
+
+
+def click_db(samples: np.ndarray) -> float:
+    """Energy above 5 kHz relative to all energy: the tone has none there, a step has plenty."""
+    windowed = samples.astype(np.float64) * np.blackman(samples.size)
+    energy = np.abs(np.fft.rfft(windowed)) ** 2
+    above = np.fft.rfftfreq(samples.size, 1 / RATE_HZ) > 5000
+    return float(10 * np.log10(energy[above].sum() / energy.sum()))
+
+
+# What is played
+
+
+def test_the_track_comes_out_as_it_is() -> None:
+    track = make_track()
+    out = mono(playing(track), SECOND)
+    inner = slice(frames(ATTACK_S), SECOND - frames(DECLICK_S))
+    np.testing.assert_array_equal(out[inner], track.read("model", 0, SECOND)[inner])
+
+
+def test_nothing_sounds_before_play_or_without_a_track() -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.play()
+    assert not mixer.status().playing
+    mixer.load(make_track())
+    assert not mono(mixer, 1000).any()
+    assert mixer.status().position_frames == 0
+
+
+def test_switching_the_source_keeps_the_position() -> None:
+    track = make_track()
+    mixer = playing(track)
+    mono(mixer, 5000)
+    mixer.select("truth")
+    out = mono(mixer, 5000)
+    fade = frames(CROSS_FADE_S)
+    np.testing.assert_array_equal(out[fade:], track.read("truth", 5000 + fade, 10_000))
+    assert mixer.status().source == "truth"
+
+
+def test_a_switch_between_equal_sources_is_inaudible() -> None:
+    same = tone(1.0)
+    track = Track(RATE_HZ, SECOND, ("model", "truth"))
+    track.append({"model": same, "truth": same})
+    mixer = playing(track)
+    mono(mixer, 5000)
+    mixer.select("truth")
+    # The gains of a cross-fade add up to one.
+    np.testing.assert_allclose(mono(mixer, 5000), track.read("truth", 5000, 10_000), atol=1e-7)
+
+
+def test_moving_the_listening_point_keeps_the_position() -> None:
+    mixer = playing(make_track())
+    mono(mixer, 5000)
+    moved = make_track(phase=1.0)
+    mixer.load(moved, keep_position=True)
+    out = mono(mixer, 5000)
+    fade = frames(CROSS_FADE_S)
+    np.testing.assert_array_equal(out[fade:], moved.read("model", 5000 + fade, 10_000))
+
+
+def test_the_old_listening_point_sounds_until_the_new_one_is_rendered() -> None:
+    old = make_track()
+    mixer = playing(old)
+    mono(mixer, 5000)
+    new = Track(RATE_HZ, SECOND, ("model", "truth"))
+    mixer.load(new, keep_position=True)
+    np.testing.assert_array_equal(mono(mixer, 5000), old.read("model", 5000, 10_000))
+    samples = tone(1.0, phase=1.0)
+    new.append({"model": samples, "truth": samples})
+    np.testing.assert_array_equal(mono(mixer, 5000)[2000:], new.read("model", 12_000, 15_000))
+
+
+def test_a_new_pluck_starts_at_the_beginning_and_ends_the_old_sound_soon() -> None:
+    mixer = playing(make_track())
+    mono(mixer, 5000)
+    new = make_track(phase=1.0)
+    mixer.load(new)
+    out = mono(mixer, 5000)
+    old_sound = frames(0.015)
+    np.testing.assert_array_equal(out[old_sound:], new.read("model", old_sound, 5000))
+
+
+def test_a_stopped_mixer_stays_stopped_when_a_track_is_loaded() -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.load(make_track())
+    mixer.seek(0.5)
+    mixer.load(make_track(), keep_position=True)
+    assert not mono(mixer, 100).any()
+    assert mixer.status().position_frames == SECOND // 2
+    mixer.load(make_track())
+    assert mixer.status().position_frames == 0
+
+
+def test_seek_goes_there_and_stays_within_the_track() -> None:
+    track = make_track()
+    mixer = playing(track)
+    mono(mixer, 1000)
+    mixer.seek(0.5)
+    out = mono(mixer, 5000)
+    fade = frames(CROSS_FADE_S)
+    np.testing.assert_array_equal(out[fade:], track.read("model", 24_000 + fade, 29_000))
+    mixer.seek(-3)
+    assert mixer.status().position_frames == 0
+    mixer.seek(99)
+    assert mixer.status().position_frames == SECOND
+
+
+def test_stop_fades_quickly_and_play_goes_on_from_there() -> None:
+    track = make_track()
+    mixer = playing(track)
+    mono(mixer, 5000)
+    mixer.stop()
+    out = mono(mixer, 1000)
+    assert not out[frames(DECLICK_S) :].any()
+    assert mixer.status().position_frames == 5000
+    mixer.play()
+    out = mono(mixer, 1000)
+    np.testing.assert_array_equal(out[frames(DECLICK_S) :], track.read("model", 5384, 6000))
+
+
+def test_at_the_end_it_stops_by_itself_and_play_starts_over() -> None:
+    mixer = playing(make_track(0.1))
+    out = mono(mixer, SECOND)
+    assert not out[frames(0.1) :].any()
+    status = mixer.status()
+    assert not status.playing
+    assert status.position_frames == frames(0.1)
+    mixer.play()
+    np.testing.assert_array_equal(mono(mixer, SECOND), out)
+
+
+def test_a_loop_has_exactly_the_length_of_the_track() -> None:
+    mixer = playing(make_track(0.1))
+    mixer.set_loop(True)
+    out = mono(mixer, frames(0.5))
+    for start in range(frames(0.1), frames(0.5), frames(0.1)):
+        np.testing.assert_allclose(out[start : start + frames(0.1)], out[: frames(0.1)], atol=1e-7)
+    mixer.set_loop(False)
+    mono(mixer, frames(0.2))
+    assert not mixer.status().playing
+
+
+@pytest.mark.parametrize("length_frames", [0, 1, 100])
+def test_tracks_shorter_than_a_fade(length_frames: int) -> None:
+    track = Track(RATE_HZ, length_frames, ("model",))
+    if length_frames:
+        track.append({"model": np.full(length_frames, 0.5)})
+    mixer = playing(track)
+    mixer.set_loop(True)
+    assert np.abs(mono(mixer, 1000)).max() <= 0.5
+    mixer.set_loop(False)
+    mono(mixer, 1000)
+    assert not mixer.status().playing
+
+
+def test_unknown_sources_and_wrong_rates_are_refused() -> None:
+    mixer = playing(make_track())
+    with pytest.raises(ValueError, match=r"no source 'physics', only \('model', 'truth'\)"):
+        mixer.select("physics")
+    with pytest.raises(ValueError, match="44100 Hz"):
+        mixer.load(Track(44_100, 10, ("model",)))
+
+
+def test_a_track_without_the_chosen_source_plays_its_first() -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.select("truth")
+    lone = Track(RATE_HZ, 10, ("model",))
+    mixer.load(lone)
+    assert mixer.status().source == "model"
+    mixer.load(make_track())
+    assert mixer.status().source == "truth"
+
+
+# Any splitting into blocks
+
+
+def perform(mixer: Mixer, block_frames: int) -> np.ndarray:
+    """A session of commands at fixed frames, rendered in blocks of at most `block_frames`."""
+    other = make_track(0.6, peak=0.7, phase=1.0)
+    commands: list[tuple[int, Callable[[], None]]] = [
+        (500, lambda: mixer.select("truth")),
+        (700, lambda: mixer.select("model")),  # within the cross-fade
+        (1500, lambda: mixer.set_volume_db(6.0)),  # into the limiter
+        (2500, lambda: mixer.load(other, keep_position=True)),
+        (3600, lambda: mixer.seek(0.01)),
+        (4600, mixer.stop),
+        (4700, mixer.play),
+        (5200, lambda: mixer.load(make_track(0.02))),
+        (5201, lambda: mixer.set_loop(True)),
+        (7000, lambda: mixer.set_loop(False)),
+        (8000, lambda: None),
+    ]
+    out = []
+    position = 0
+    for at, command in commands:
+        while position < at:
+            count = min(block_frames, at - position)
+            out.append(mono(mixer, count))
+            position += count
+        command()
+    return np.concatenate(out)
+
+
+@pytest.mark.parametrize("block_frames", [1, 64, 65, 8193])
+def test_any_splitting_gives_the_same_samples(block_frames: int) -> None:
+    whole = perform(playing(make_track()), 100_000)
+    split = perform(playing(make_track()), block_frames)
+    assert level_db(whole) > -10
+    np.testing.assert_allclose(split, whole, atol=1e-6)
+
+
+# No clicks
+
+
+def starve(mixer: Mixer) -> None:
+    """Leaves the playing mixer with a track of which only a little more is rendered."""
+    samples = tone(1.0)[: mixer.position_frames + frames(0.1)]
+    track = Track(RATE_HZ, SECOND, ("model", "truth"))
+    track.append({"model": samples, "truth": samples})
+    mixer.load(track, keep_position=True)
+
+
+EVENTS: dict[str, Callable[[Mixer], None]] = {
+    "nothing": lambda mixer: None,
+    "source": lambda mixer: mixer.select("truth"),
+    "listening point": lambda mixer: mixer.load(make_track(phase=2.0), keep_position=True),
+    "new pluck": lambda mixer: mixer.load(make_track(phase=0.1)),
+    "seek": lambda mixer: mixer.seek(0.7123),
+    "loop": lambda mixer: mixer.load(make_track(0.3003)),
+    "stop": Mixer.stop,
+    "starved": starve,
+    "volume": lambda mixer: mixer.set_volume_db(-20),
+    "mute": lambda mixer: mixer.set_volume_db(-np.inf),
+}
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_nothing_clicks(event: str) -> None:
+    mixer = playing(make_track())
+    mixer.set_loop(True)
+    before = mono(mixer, frames(0.3) + 17)
+    EVENTS[event](mixer)
+    after = mono(mixer, frames(0.4))
+    assert click_db(np.concatenate([before, after])) < -90
+
+
+def test_the_measure_of_clicks_hears_a_hard_cut() -> None:
+    out = tone(0.7)
+    out[frames(0.35) + 17 :] = 0
+    assert click_db(out) > -50
+
+
+def test_the_end_of_a_track_that_is_not_silent_does_not_click() -> None:
+    assert click_db(mono(playing(make_track(0.5003)), frames(0.8))) < -90
+
+
+# When rendering is slower than the sound
+
+
+def test_the_playhead_waits_for_rendering_and_goes_on_where_it_stopped() -> None:
+    samples = tone(1.0)
+    track = Track(RATE_HZ, SECOND, ("model",))
+    mixer = playing(track)
+    assert not mono(mixer, 1000).any()
+    assert mixer.status().waiting
+    assert mixer.status().position_frames == 0
+
+    first = frames(0.3)
+    track.append({"model": samples[:first]})
+    out = mono(mixer, frames(0.4))
+    status = mixer.status()
+    assert status.waiting
+    assert status.playing
+    assert status.position_frames == first
+    np.testing.assert_array_equal(out[: first - 384][96:], track.read("model", 96, first - 384))
+    assert not out[first:].any()
+
+    track.append({"model": samples[first : first + frames(RESUME_RESERVE_S) - 1]})
+    assert not mono(mixer, 1000).any(), "it must not stutter on for a few samples"
+    track.append({"model": samples[first + frames(RESUME_RESERVE_S) - 1 :]})
+    out = mono(mixer, frames(0.3))
+    assert not mixer.status().waiting
+    np.testing.assert_array_equal(out[384:], track.read("model", first + 384, first + frames(0.3)))
+
+
+def test_a_render_that_ends_early_ends_the_track() -> None:
+    track = Track(RATE_HZ, SECOND, ("model",))
+    mixer = playing(track)
+    track.append({"model": tone(0.2)})
+    mono(mixer, frames(0.3))
+    assert mixer.status().waiting
+    track.finish()
+    mono(mixer, 1)
+    assert not mixer.status().playing
+
+
+# Level and safety
+
+
+def test_the_volume_arrives_at_its_level_without_steps() -> None:
+    mixer = playing(make_track(peak=0.1))
+    unchanged = mono(mixer, 5000)
+    mixer.set_volume_db(6.0)
+    mono(mixer, 10_000)
+    louder = mono(mixer, 24_000)
+    expected = make_track(peak=0.1).read("model", 15_000, 39_000)
+    np.testing.assert_allclose(louder, expected * 10**0.3, rtol=1e-5)
+    assert level_db(unchanged) < level_db(louder) - 5.5
+    for wrong in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="volume"):
+            mixer.set_volume_db(wrong)
+
+
+@pytest.mark.parametrize("peak", [0.99, 2.0, 1e4, 1e38])
+def test_the_ceiling_is_never_passed(peak: float) -> None:
+    mixer = playing(make_track(peak=peak / 1.2))
+    mixer.select("truth")
+    assert np.abs(mono(mixer, SECOND // 2)).max() <= np.float32(CEILING)
+    assert mixer.status().limiting
+    assert mixer.status().gain_reduction_db > 0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_never_leaves(value: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    track = make_track()
+    broken = tone(1.0).astype(np.float32)
+    broken[6000:6100] = value
+    monkeypatch.setattr(track, "read", lambda source, start, stop: broken[start:stop])
+    mixer = playing(track)
+    mono(mixer, 5000)
+    assert not mixer.status().non_finite
+    out = mono(mixer, 5000)
+    assert np.isfinite(out).all()
+    assert not out[1000:1100].any()
+    np.testing.assert_array_equal(out[1100:], broken[6100:10_000])
+    assert mixer.status().non_finite
+    mixer.load(make_track())
+    assert not mixer.status().non_finite
+
+
+def test_the_meter_shows_the_peak_and_falls() -> None:
+    mixer = playing(make_track(0.5, peak=0.5))
+    assert mixer.status().peak_db == -120
+    mono(mixer, SECOND // 2)
+    assert mixer.status().peak_db == pytest.approx(20 * np.log10(0.5), abs=0.1)
+    mono(mixer, SECOND)
+    assert mixer.status().peak_db == pytest.approx(20 * np.log10(0.5) - 20, abs=0.2)

@@ -1,0 +1,281 @@
+"""The player with a fake device that the tests drive, and without any."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Mixer, Player, ProblemKind, Track
+from app.audio import stream as stream_module
+from app.audio.problems import no_device
+from app.audio.stream import OutputStream
+
+RATE_HZ = 48_000
+BLOCK_FRAMES = 256
+
+
+def make_track(rate_hz: int = RATE_HZ, seconds: float = 1.0) -> Track:
+    frames = round(rate_hz * seconds)
+    samples = 0.5 * np.sin(2 * np.pi * 220 * np.arange(frames) / rate_hz)
+    track = Track(rate_hz, frames, ("model", "truth"))
+    track.append({"model": samples, "truth": -samples})
+    return track
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, "it never came true"
+        time.sleep(0.002)
+
+
+class Bench:
+    """A player, the fake devices that it may open, and what it has complained about."""
+
+    def __init__(self, open_fake: Any, raw_streams: list[Any]) -> None:
+        self.problems: list[AudioProblem] = []
+        self.devices: dict[str, AudioDevice] = {}
+        self.refusal: AudioUnavailable | None = None
+        self.raw_streams = raw_streams
+        self._open_fake = open_fake
+        self.player = Player(self.problems.append, look_up=self._look_up, open_output=self._open)
+
+    def add(self, name: str, rate_hz: int = RATE_HZ) -> AudioDevice:
+        self.devices[name] = AudioDevice(name, "Test API", rate_hz)
+        return self.devices[name]
+
+    def open(self, device: AudioDevice | None) -> Any:
+        """Opens a device and returns its raw stream."""
+        self.player.open(device)
+        wait_until(lambda: self.player.status().device is not None)
+        return self.raw_streams[-1]
+
+    def hear(self, raw: Any, blocks: int) -> np.ndarray:
+        """Lets the device play, never faster than the player feeds it; shape (frames,)."""
+        heard = []
+        output = raw.callback.__self__
+        for _ in range(blocks):
+            wait_until(lambda: output.frames_queued - output.frames_written >= 4 * BLOCK_FRAMES)
+            heard.append(raw.tick()[:, 0])
+        return np.concatenate(heard)
+
+    def _look_up(self, device: AudioDevice | None, rescan: bool) -> AudioDevice:
+        if not self.devices:
+            raise no_device()
+        return next(iter(self.devices.values())) if device is None else self.devices[device.name]
+
+    def _open(self, device: AudioDevice, buffer_s: float) -> OutputStream:
+        if self.refusal is not None:
+            raise self.refusal
+        return OutputStream(device, buffer_s, BLOCK_FRAMES, self._open_fake)
+
+
+@pytest.fixture
+def bench(open_fake: Any, raw_streams: list[Any]) -> Iterator[Bench]:
+    bench = Bench(open_fake, raw_streams)
+    yield bench
+    bench.player.close()
+
+
+def test_without_a_device_the_playhead_moves_all_the_same(bench: Bench) -> None:
+    player = bench.player
+    player.open()
+    wait_until(lambda: bench.problems != [])
+    assert [problem.kind for problem in bench.problems] == [ProblemKind.NO_DEVICE]
+    player.load(make_track())
+    player.play()
+    wait_until(lambda: player.status().position_s > 0)
+    began_s, position_s = time.monotonic(), player.status().position_s
+    time.sleep(0.3)
+    moved_s, elapsed_s = player.status().position_s - position_s, time.monotonic() - began_s
+    assert 0 < moved_s < elapsed_s + 0.15  # a busy computer may only be late
+    status = player.status()
+    assert status.playing
+    assert status.device is None
+    assert status.problem is not None
+    assert "no sound output" in status.problem
+    wait_until(lambda: not player.status().playing)
+    assert player.status().position_s == pytest.approx(1.0)
+
+
+def test_the_device_plays_what_the_mixer_renders(bench: Bench) -> None:
+    bench.add("Headphones")
+    raw = bench.open(None)
+    track = make_track()
+    bench.player.load(track)
+    bench.player.play()
+    heard = bench.hear(raw, 250)
+    mixer = Mixer(RATE_HZ)
+    mixer.load(track)
+    mixer.play()
+    expected = mixer.next_block(RATE_HZ)[:, 0]
+    start = int(np.argmax(heard != 0)) - int(np.argmax(expected != 0))
+    assert start % BLOCK_FRAMES == 0
+    np.testing.assert_allclose(heard[start : start + RATE_HZ], expected, atol=1e-6)
+    assert bench.player.status().underruns == 0
+    assert bench.problems == []
+
+
+def test_a_command_is_heard_within_30_ms_of_device_time(bench: Bench) -> None:
+    bench.add("Headphones")
+    raw = bench.open(None)
+    bench.player.load(make_track())
+    bench.hear(raw, 10)
+    bench.player.play()
+    heard = bench.hear(raw, 20)
+    assert np.argmax(heard != 0) <= 0.03 * RATE_HZ
+
+
+def test_the_position_is_that_of_what_is_heard(bench: Bench) -> None:
+    bench.add("Headphones")
+    raw = bench.open(None)
+    bench.player.load(make_track())
+    bench.player.play()
+    start = int(np.argmax(bench.hear(raw, 100) != 0)) // BLOCK_FRAMES * BLOCK_FRAMES
+    expected_s = (100 * BLOCK_FRAMES - start) / RATE_HZ - raw.latency
+    wait_until(lambda: bench.player.status().position_s == pytest.approx(expected_s, abs=1e-3))
+
+
+def test_commands_reach_the_mixer(bench: Bench) -> None:
+    player = bench.player
+    player.load(make_track())
+    player.seek(0.4)
+    player.select("truth")
+    player.set_loop(True)
+    player.set_volume_db(-6)
+    player.play()
+    wait_until(lambda: player.status().position_s > 0.45)
+    assert player.status().source == "truth"
+    wait_until(lambda: player.status().peak_db == pytest.approx(20 * np.log10(0.5) - 6, abs=0.2))
+    wait_until(lambda: player.status().position_s < 0.4)
+    player.stop()
+    wait_until(lambda: not player.status().playing)
+
+
+def test_wrong_calls_fail_in_the_callers_thread(bench: Bench) -> None:
+    player = bench.player
+    with pytest.raises(ValueError, match="44100 Hz, the player 48000 Hz"):
+        player.load(make_track(44_100))
+    player.load(make_track())
+    with pytest.raises(ValueError, match="no source 'physics'"):
+        player.select("physics")
+    with pytest.raises(ValueError, match="playhead"):
+        player.seek(float("nan"))
+    with pytest.raises(ValueError, match="volume"):
+        player.set_volume_db(float("nan"))
+
+
+def test_changing_the_device_keeps_the_sound_going(bench: Bench) -> None:
+    bench.add("Speakers")
+    headphones = bench.add("Headphones")
+    old = bench.open(None)
+    bench.player.load(make_track())
+    bench.player.play()
+    bench.hear(old, 50)
+    bench.player.open(headphones)
+    wait_until(lambda: bench.player.status().device == headphones)
+    new = bench.raw_streams[-1]
+    assert old.calls == ["start", "abort", "close"]
+    assert new.active
+    assert bench.hear(new, 20).any()
+    assert bench.player.status().playing
+    assert bench.problems == []
+
+
+def test_a_device_that_fails_to_open_leaves_the_present_one(bench: Bench) -> None:
+    speakers = bench.add("Speakers")
+    raw = bench.open(None)
+    bench.player.load(make_track())
+    bench.player.play()
+    bench.hear(raw, 20)
+    bench.refusal = AudioUnavailable(AudioProblem(ProblemKind.BUSY, "In use.", "Close the other program."))
+    bench.player.open(bench.add("Headphones"))
+    wait_until(lambda: bench.problems != [])
+    assert bench.hear(raw, 20)[-BLOCK_FRAMES:].any()
+    status = bench.player.status()
+    assert status.device == speakers
+    assert status.playing
+    assert status.problem == "In use. Close the other program."
+    bench.player.open(speakers)  # already open: it would be busy with ourselves
+    wait_until(lambda: bench.player.status().problem is None)
+    assert len(bench.raw_streams) == 1
+    assert len(bench.problems) == 1
+
+
+def test_another_buffer_opens_the_device_again(bench: Bench) -> None:
+    bench.add("Speakers")
+    old = bench.open(None)
+    bench.player.load(make_track())
+    bench.player.play()
+    bench.hear(old, 20)
+    bench.player.open(None, buffer_s=0.1)
+    wait_until(lambda: len(bench.raw_streams) == 2 and bench.raw_streams[1].active)
+    assert old.calls == ["start", "abort", "close"]
+    assert bench.hear(bench.raw_streams[1], 40).any()
+    assert bench.problems == []
+
+
+def test_a_device_of_another_rate_unloads_the_track(bench: Bench) -> None:
+    bench.add("Old card", rate_hz=44_100)
+    bench.player.load(make_track())
+    bench.player.select("truth")
+    bench.player.play()
+    raw = bench.open(None)
+    wait_until(lambda: bench.player.rate_hz == 44_100)
+    assert not bench.player.status().playing
+    bench.player.load(make_track(44_100))
+    bench.player.play()
+    assert bench.hear(raw, 20).any()
+    assert bench.player.status().source == "truth"
+
+
+@pytest.mark.parametrize("how", ["stands still", "inactive"])
+def test_a_device_that_vanishes_is_reported_once_and_the_clock_goes_on(
+    bench: Bench, how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream_module, "START_GRACE_S", 0.0)
+    bench.add("Headphones")
+    raw = bench.open(None)
+    bench.player.load(make_track(seconds=10.0))
+    bench.player.play()
+    bench.hear(raw, 20)
+    if how == "inactive":
+        raw.active = False
+    wait_until(lambda: bench.player.status().device is None)
+    assert [problem.kind for problem in bench.problems] == [ProblemKind.VANISHED]
+    assert "“Headphones”" in bench.problems[0].message
+    position_s = bench.player.status().position_s
+    wait_until(lambda: bench.player.status().position_s > position_s + 0.1)
+    assert len(bench.problems) == 1
+    assert raw.calls == ["start", "abort", "close"]
+
+
+def test_a_fault_in_the_feeder_is_reported(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(mixer: Mixer, frames: int) -> np.ndarray:
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(Mixer, "next_block", fail)
+    wait_until(lambda: bench.player.status().problem is not None)
+    (problem,) = bench.problems
+    assert problem.kind is ProblemKind.OTHER
+    assert "a bug" in problem.detail
+    bench.player.close()
+
+
+def test_closing_ends_the_thread_and_frees_the_device(bench: Bench) -> None:
+    bench.add("Headphones")
+    raw = bench.open(None)
+    bench.player.close()
+    bench.player.close()
+    assert "audio-feeder" not in [thread.name for thread in threading.enumerate()]
+    assert raw.calls == ["start", "abort", "close"]
+    bench.player.play()
+
+
+def test_it_is_a_context_manager() -> None:
+    with Player() as player:
+        player.load(make_track())
+    assert "audio-feeder" not in [thread.name for thread in threading.enumerate()]

@@ -1,0 +1,177 @@
+"""The callback, called directly: one ready block or zeros, and nothing that could go wrong."""
+
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.audio import AudioDevice, AudioUnavailable, ProblemKind
+from app.audio import stream as stream_module
+from app.audio.stream import BLOCK_FRAMES, OutputStream
+
+
+@pytest.fixture
+def stream(headphones: AudioDevice, open_fake: Any) -> OutputStream:
+    return OutputStream(headphones, open_device=open_fake)
+
+
+def settle(stream: OutputStream, raw: Any) -> None:
+    """Lets the device play silence until underruns count, and leaves the queue full."""
+    for _ in range(50):
+        raw.tick()
+        assert stream.wait_for_space(0)
+        stream.write(block(0))
+
+
+def block(value: float) -> np.ndarray:
+    return np.full((BLOCK_FRAMES, 2), value, np.float32)
+
+
+def test_it_starts_full_of_silence(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    assert raw.active
+    assert not stream.wait_for_space(0)
+    assert not raw.tick().any()
+    assert stream.wait_for_space(0)
+    assert stream.underruns == 0
+
+
+def test_blocks_come_out_in_order_and_whole(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    waiting = stream.frames_queued // BLOCK_FRAMES
+    heard = []
+    for value in range(1, 20):
+        heard.append(raw.tick()[[0, -1], [0, 1]].tolist())
+        assert stream.wait_for_space(0)
+        stream.write(block(value))
+    assert heard == [[0.0, 0.0]] * waiting + [[float(v)] * 2 for v in range(1, 20 - waiting)]
+    assert stream.callback_count == 19
+    assert stream.frames_written == 19 * BLOCK_FRAMES
+    assert stream.frames_queued == (19 + waiting) * BLOCK_FRAMES
+
+
+def test_the_queue_is_bounded(stream: OutputStream) -> None:
+    assert stream.frames_queued <= 0.03 * stream.rate_hz
+    with pytest.raises(RuntimeError, match="queue is full"):
+        stream.write(block(1))
+
+
+def test_an_empty_queue_gives_zeros_and_counts(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    for _ in range(50):
+        assert not raw.tick().any()
+    settling = 23  # callbacks that fill 0.1 s and the device's own 20 ms, before which nothing is audible
+    assert stream.underruns == 50 - settling
+    assert stream.frames_written == stream.frames_queued
+    assert stream.wait_for_space(0)
+    stream.write(block(0.5))
+    assert (raw.tick() == 0.5).all()
+
+
+def test_gaps_that_the_device_notices_count_too(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    settle(stream, raw)
+    raw.status = SimpleNamespace(output_underflow=True)
+    raw.tick()
+    raw.status = SimpleNamespace(output_underflow=False)
+    raw.tick()
+    assert stream.underruns == 1
+
+
+def test_a_longer_buffer_keeps_more_ready(headphones: AudioDevice, open_fake: Any) -> None:
+    stream = OutputStream(headphones, 0.2, open_device=open_fake)
+    assert 0.19 < stream.frames_queued / stream.rate_hz <= 0.2
+
+
+def test_a_device_with_a_long_buffer_gets_a_longer_queue(headphones: AudioDevice, open_fake: Any) -> None:
+    def open_slow(*arguments: Any) -> Any:
+        raw = open_fake(*arguments)
+        raw.latency = 0.2
+        return raw
+
+    stream = OutputStream(headphones, open_device=open_slow)
+    assert 0.09 < stream.frames_queued / stream.rate_hz <= 0.1
+
+
+def test_a_wrong_block_size_from_the_driver_gives_zeros(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    settle(stream, raw)
+    raw.shape = (100, 2)
+    assert not raw.tick().any()
+    assert stream.underruns == 1
+
+
+def test_a_device_with_one_channel_gets_one(open_fake: Any, raw_streams: list) -> None:
+    stream = OutputStream(AudioDevice("Speaker", "Test API", 48_000, channels=1), open_device=open_fake)
+    (raw,) = raw_streams
+    while stream.frames_written < stream.frames_queued:
+        raw.tick()
+    assert stream.wait_for_space(0)
+    stream.write(block(0.5))
+    assert raw.tick().shape == (BLOCK_FRAMES, 1)
+    assert stream.frames_written == stream.frames_queued
+
+
+@pytest.mark.parametrize("rate_hz", [8_000, 44_100, 192_000])
+def test_the_queue_is_short_at_any_rate(rate_hz: int, open_fake: Any) -> None:
+    stream = OutputStream(AudioDevice("Headphones", "Test API", rate_hz), open_device=open_fake)
+    blocks = stream.frames_queued // stream.block_frames
+    assert blocks == 2 or 0.015 < stream.frames_queued / rate_hz <= 0.025
+
+
+def test_a_device_that_cannot_start_is_closed(headphones: AudioDevice, open_fake: Any) -> None:
+    raws = []
+
+    def open_refusing(*arguments: Any) -> Any:
+        raws.append(open_fake(*arguments))
+        raws[0].refusal = OSError("Device or resource busy")
+        return raws[0]
+
+    with pytest.raises(AudioUnavailable) as caught:
+        OutputStream(headphones, open_device=open_refusing)
+    assert caught.value.kind is ProblemKind.BUSY
+    assert raws[0].calls == ["start", "abort", "close"]
+
+
+def test_a_callback_that_stands_still_is_a_lost_device(
+    headphones: AudioDevice, open_fake: Any, raw_streams: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now_s)
+    stream = OutputStream(headphones, open_device=open_fake)
+    (raw,) = raw_streams
+
+    def lost_after(seconds: float, ticking: bool) -> bool:
+        nonlocal now_s
+        lost = False
+        for _ in range(round(seconds / 0.05)):
+            now_s += 0.05
+            if ticking:
+                raw.tick()
+            lost = stream.lost()
+        return lost
+
+    assert not lost_after(stream_module.START_GRACE_S - 0.1, ticking=False), "slow to start"
+    assert not lost_after(5.0, ticking=True)
+    assert not lost_after(0.7, ticking=False)
+    assert not lost_after(0.1, ticking=True)
+    now_s += 3600.0  # the computer slept
+    assert not stream.lost()
+    assert lost_after(1.0, ticking=False)
+    assert not lost_after(0.1, ticking=True)
+    raw.active = False
+    assert stream.lost()
+
+
+def test_closing_forgives_a_device_that_cannot(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+
+    def fail() -> None:
+        raise OSError("gone")
+
+    raw.abort = fail
+    stream.close()
+    stream.close()
+    assert raw.calls == ["start", "close", "close"]
