@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
-from torch import Tensor
-
-from engine import excitation
+if TYPE_CHECKING:
+    from torch import Tensor
 
 Shape = Literal["gaussian", "triangular", "raised_cosine"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 POSITION_RANGE = (0.02, 0.98)
 WIDTH_RANGE = (0.02, 0.5)
 LARGEST_AMPLITUDE_MM = 20.0
+DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is still there
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,8 @@ class Pluck:
 
     def displacement(self, grid_points: int) -> Tensor:
         """The raw shape in m before any projection on modes, float64 (grid_points,)."""
+        from engine import excitation  # torch only when it is needed: the command line and the window start without
+
         peak_m = self.amplitude_mm / 1000
         if self.shape == "gaussian":
             return excitation.gaussian(self.position, self.width, peak_m, grid_points)

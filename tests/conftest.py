@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from engine.models import KoopmanVar, KoopmanVarConfiguration
-from engine.models.koopman_var import initialise
+from engine.models.base import Physics
 from engine.preset import PresetInfo, TrainedRange, save_preset
 from engine.schema import write
 from engine.string import StringParameters
@@ -20,7 +20,7 @@ def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     configuration = KoopmanVarConfiguration(state_size=16, multiplier_widths=(8,))
     model = KoopmanVar(configuration)
     string = StringParameters()
-    initialise(model, "physics", string=string, modes=10, rate_hz=4000, generator=torch.Generator().manual_seed(0))
+    model.initialise("physics", Physics(string, 10, 4000), torch.Generator().manual_seed(0))
     info = PresetInfo(
         title="A small string",
         model="koopman_var",

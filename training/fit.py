@@ -18,7 +18,7 @@ from torch import Tensor
 
 from engine.metrics import RelativeError
 from engine.models import MODELS, KoopmanVar
-from engine.models.koopman_var import initialise
+from engine.models.base import Physics
 from engine.schema import read, write
 from engine.sine_transform import synthesis_matrix
 from training.checkpoint import Checkpoint, optimiser_moments, restore_moments
@@ -165,13 +165,10 @@ def new_model(configuration: TrainingConfiguration) -> KoopmanVar:
     model = kind(read(configuration_kind, configuration.model_configuration, "model_configuration"))
     assert isinstance(model, KoopmanVar)
     data = configuration.data
-    initialise(
-        model,
-        configuration.recipe.initialisation,  # type: ignore[arg-type]  # checked there
-        string=data.string,
-        modes=data.modes,
-        rate_hz=data.rate_hz,
-        generator=torch.Generator().manual_seed(configuration.recipe.seed),
+    model.initialise(
+        configuration.recipe.initialisation,
+        Physics(data.string, data.modes, data.rate_hz),
+        torch.Generator().manual_seed(configuration.recipe.seed),
     )
     return model
 

@@ -12,17 +12,39 @@ final subclass of `StringModel`, and one line in `engine/models/__init__.py`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from typing import ClassVar, Generic, TypeVar
 
+import torch
 from torch import Tensor, nn
 
+from engine.string import StringParameters
+
 State = TypeVar("State")
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What an initialisation may know of the string that a model shall learn."""
+
+    string: StringParameters
+    modes: int
+    rate_hz: float
 
 
 class StringModel(nn.Module, ABC, Generic[State]):
     """A learned map from an initial displacement to the motion that follows."""
 
     grid_points: int
+    initialisations: ClassVar[tuple[str, ...]]  # the first is the source's own
+
+    @abstractmethod
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """Sets every weight in place; `how` is one of `initialisations` and is recorded in the preset.
+
+        Raises:
+            ValueError: an unknown `how`, or one that these sizes do not allow.
+        """
 
     @abstractmethod
     def encode(self, displacement: Tensor) -> State:
@@ -43,6 +65,12 @@ class StringModel(nn.Module, ABC, Generic[State]):
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
         """Frames 1 … steps after `displacement` (batch, grid_points): (batch, steps, points)."""
         return self.advance(self.encode(displacement), steps, readout)[0]
+
+
+def check_initialisation(model: StringModel[State], how: str) -> None:
+    """Raises ValueError, naming what there is, where a model does not know `how`."""
+    if how not in model.initialisations:
+        raise ValueError(f"initialisation {how!r} is not one of {', '.join(model.initialisations)}")
 
 
 def count_parameters(model: nn.Module) -> int:

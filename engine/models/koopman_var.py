@@ -10,17 +10,17 @@ any order, and the radii decay without oscillating.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 
-from engine.models.base import StringModel
+from engine.models import eigenvalues
+from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.eigenvalues import pack, unpack
 from engine.sine_transform import analysis_matrix, synthesis_matrix
-from engine.string import StringParameters
 
 FRAMES_AT_ONCE = 2048  # bounds the memory of a long advance; the result does not depend on it
 
@@ -61,6 +61,8 @@ class KoopmanState:
 class KoopmanVar(StringModel[KoopmanState]):
     """See the module."""
 
+    initialisations: ClassVar = ("paper", "physics")
+
     def __init__(self, configuration: KoopmanVarConfiguration) -> None:
         super().__init__()
         self.configuration = configuration
@@ -77,117 +79,74 @@ class KoopmanVar(StringModel[KoopmanState]):
         self.decoder = nn.Linear(2 * n, configuration.grid_points)
 
     def encode(self, displacement: Tensor) -> KoopmanState:
-        return KoopmanState(_pack(self.encoder(displacement)), 0)
+        return KoopmanState(pack(self.encoder(displacement)), 0)
 
     def advance(self, state: KoopmanState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, KoopmanState]:
         blocks = []
         for done in range(0, steps, FRAMES_AT_ONCE):
-            powers = self.successive_powers(state.step + 1 + done, min(FRAMES_AT_ONCE, steps - done))
+            count = min(FRAMES_AT_ONCE, steps - done)
+            powers = eigenvalues.successive_powers(self.nu_log, self.theta_log, state.step + 1 + done, count)
             blocks.append(self.decode(state.origin[:, None] * powers.to(state.origin.dtype), readout))
         return torch.cat(blocks, dim=1), KoopmanState(state.origin, state.step + steps)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z_k = λᵏ z₀ of any frames (int64, any order), complex (batch, frames, state_size)."""
-        return origin[:, None] * self.eigenvalue_powers(frames).to(origin.dtype)
+        powers = eigenvalues.powers(self.nu_log, self.theta_log, frames)
+        return origin[:, None] * powers.to(origin.dtype)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
         radii = latents.real.square() + latents.imag.square()
-        modulated = _unpack(latents * _pack(self.multiplier(radii)))
+        modulated = unpack(latents * pack(self.multiplier(radii)))
         if readout is None:
             return self.decoder(modulated)
         readout = readout.to(modulated)
         return modulated @ (self.decoder.weight.T @ readout) + self.decoder.bias @ readout
 
-    def eigenvalue_powers(self, frames: Tensor) -> Tensor:
-        """λᵏ, complex128 (frames, state_size): kθ reaches millions of radians, so it is reduced in float64."""
-        k = frames.to(torch.float64)[:, None]
-        magnitude = torch.exp(-k * self.nu_log.double().exp())
-        phase = torch.remainder(k * self.theta_log.double().exp(), 2 * math.pi)
-        return torch.polar(magnitude, phase)
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """See the contract.
 
-    def successive_powers(self, first: int, count: int) -> Tensor:
-        """λᵏ for k = first … first + count - 1, complex128 (count, state_size).
-
-        As products λᵃ λᵇ of a coarse and a fine table: two roundings in float64 instead of a sine each.
+        paper: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal encoder and decoder.
+        physics: the first `modes` latents are the linear string (its eigenvalues, sine transform and inverse);
+            the others repeat those frequencies with other decay rates and are not yet heard. A multiplier of 1
+            starts it as the linear string. Prior knowledge that the paper's model does not have: say so in a table.
         """
-        device = self.nu_log.device
-        fine = self.eigenvalue_powers(torch.arange(min(64, count), device=device))
-        coarse = self.eigenvalue_powers(torch.arange(first, first + count, 64, device=device))
-        return (coarse[:, None] * fine).flatten(0, 1)[:count]
-
-
-def _pack(pair: Tensor) -> Tensor:
-    """(..., 2n) with real parts first to complex (..., n)."""
-    return torch.complex(*pair.chunk(2, dim=-1))
-
-
-def _unpack(value: Tensor) -> Tensor:
-    return torch.cat([value.real, value.imag], dim=-1)
-
-
-Initialisation = Literal["paper", "physics"]
-
-
-def initialise(
-    model: KoopmanVar,
-    how: Initialisation,
-    *,
-    string: StringParameters,
-    modes: int,
-    rate_hz: float,
-    generator: torch.Generator,
-) -> None:
-    """Sets every weight in place.
-
-    paper: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal encoder and decoder.
-    physics: the first `modes` latents are the linear string (its eigenvalues, sine transform and inverse); the
-        others repeat those frequencies with other decay rates and are not yet heard. A multiplier of 1 starts
-        it as the linear string. Prior knowledge that the paper's model does not have: say so in a table.
-    """
-    with torch.no_grad():
-        for layer in model.multiplier:
-            if isinstance(layer, nn.Linear):
-                std = layer.in_features**-0.5
-                nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
+        check_initialisation(self, how)
+        with torch.no_grad():
+            for layer in self.multiplier:
+                if isinstance(layer, nn.Linear):
+                    std = layer.in_features**-0.5
+                    nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
+                    nn.init.zeros_(layer.bias)
+            for layer in (self.encoder, self.decoder):
+                nn.init.orthogonal_(layer.weight, generator=generator)
                 nn.init.zeros_(layer.bias)
-        for layer in (model.encoder, model.decoder):
-            nn.init.orthogonal_(layer.weight, generator=generator)
-            nn.init.zeros_(layer.bias)
-        if how == "paper":
-            _initialise_ring(model, generator)
-        elif how == "physics":
-            _initialise_linear_string(model, string, modes, rate_hz, generator)
-        else:
-            raise ValueError(f"initialisation {how!r} is not one of 'paper', 'physics'")
+            if how == "paper":
+                for stored, drawn in zip(
+                    (self.nu_log, self.theta_log),
+                    eigenvalues.draw_ring(self.configuration.state_size, generator),
+                    strict=True,
+                ):
+                    stored.copy_(drawn)
+            else:
+                self._initialise_linear_string(physics, generator)
 
-
-def _initialise_ring(model: KoopmanVar, generator: torch.Generator) -> None:
-    inner, outer = 0.99, 1.0
-    u = torch.rand(2, model.configuration.state_size, generator=generator, dtype=torch.float64)
-    radius_squared = inner**2 + u[0] * (outer**2 - inner**2)
-    model.nu_log.copy_(torch.log(-0.5 * torch.log(radius_squared)))
-    model.theta_log.copy_(torch.log(2 * math.pi * u[1]))
-
-
-def _initialise_linear_string(
-    model: KoopmanVar, string: StringParameters, modes: int, rate_hz: float, generator: torch.Generator
-) -> None:
-    n, points = model.configuration.state_size, model.grid_points
-    if n < modes:
-        raise ValueError(f"initialisation 'physics' needs a state_size of at least the {modes} modes, not {n}")
-    mode = torch.arange(n) % modes
-    eigenvalues = string.eigenvalues(modes)[mode] / rate_hz
-    stretch = 3.0 ** (2 * torch.rand(n, generator=generator, dtype=torch.float64) - 1)
-    stretch[:modes] = 1
-    model.nu_log.copy_(torch.log(-eigenvalues.real * stretch))
-    model.theta_log.copy_(eigenvalues.imag.log())
-    model.encoder.weight.zero_()
-    model.encoder.weight[:n] = analysis_matrix(points, modes).T[mode].float()
-    model.decoder.weight.mul_(0.01)
-    model.decoder.weight[:, :n] = 0
-    model.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T.float()
-    last = model.multiplier[-1]
-    assert isinstance(last, nn.Linear)
-    last.weight.mul_(0.01)
-    last.bias[:n] = 1
+    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+        n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
+        if n < modes:
+            raise ValueError(f"initialisation 'physics' needs a state_size of at least the {modes} modes, not {n}")
+        mode = torch.arange(n) % modes
+        linear = physics.string.eigenvalues(modes)[mode] / physics.rate_hz
+        stretch = 3.0 ** (2 * torch.rand(n, generator=generator, dtype=torch.float64) - 1)
+        stretch[:modes] = 1
+        self.nu_log.copy_(torch.log(-linear.real * stretch))
+        self.theta_log.copy_(linear.imag.log())
+        self.encoder.weight.zero_()
+        self.encoder.weight[:n] = analysis_matrix(points, modes).T[mode].float()
+        self.decoder.weight.mul_(0.01)
+        self.decoder.weight[:, :n] = 0
+        self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T.float()
+        last = self.multiplier[-1]
+        assert isinstance(last, nn.Linear)
+        last.weight.mul_(0.01)
+        last.bias[:n] = 1

@@ -109,7 +109,7 @@ def test_wrong_tensors_are_named(preset_file: Path, fault: str) -> None:
 @pytest.mark.parametrize("size", [0, 7, 200, 2000])
 def test_a_truncated_file_is_told(preset_file: Path, size: int) -> None:
     preset_file.write_bytes(preset_file.read_bytes()[:size])
-    with pytest.raises(PresetError, match="not a whole safetensors file .* get the preset again"):
+    with pytest.raises(PresetError, match=r"not a whole safetensors file .* get the preset again"):
         load_preset(preset_file)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters
-from engine.models.koopman_var import initialise
+from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters, eigenvalues
+from engine.models.base import Physics
 from engine.reference import ModalState, solve_linear
 from engine.sine_transform import listening_weights, to_grid
 from engine.string import StringParameters
@@ -36,14 +36,7 @@ def reference_model() -> tuple[KoopmanVar, torch.Tensor, torch.Tensor]:
 
 def small_model(seed: int = 0, how: str = "paper") -> KoopmanVar:
     model = KoopmanVar(KoopmanVarConfiguration(101, 32, (16, 16)))
-    initialise(
-        model,
-        how,  # type: ignore[arg-type]
-        string=StringParameters(),
-        modes=10,
-        rate_hz=4_000,
-        generator=torch.Generator().manual_seed(seed),
-    )
+    model.initialise(how, Physics(StringParameters(), 10, 4_000), torch.Generator().manual_seed(seed))
     return model.eval()
 
 
@@ -82,7 +75,7 @@ def test_any_splitting_into_blocks_is_the_same_motion() -> None:
 @torch.no_grad()
 def test_phases_stay_exact_after_a_million_steps() -> None:
     model = small_model()
-    powers = model.successive_powers(1_000_000, 100)
+    powers = eigenvalues.successive_powers(model.nu_log, model.theta_log, 1_000_000, 100)
     theta = model.theta_log.double().exp().detach()
     k = torch.arange(1_000_000, 1_000_100, dtype=torch.float64)[:, None]
     expected = torch.remainder(k * theta, 2 * torch.pi)
@@ -90,7 +83,9 @@ def test_phases_stay_exact_after_a_million_steps() -> None:
     loud = powers.abs() > 1e-250  # an angle of zero has no meaning
     assert loud.any()
     assert float(difference[loud].abs().max()) < 1e-8
-    torch.testing.assert_close(powers, model.eigenvalue_powers(torch.arange(1_000_000, 1_000_100)))
+    torch.testing.assert_close(
+        powers, eigenvalues.powers(model.nu_log, model.theta_log, torch.arange(1_000_000, 1_000_100))
+    )
 
 
 @torch.no_grad()
@@ -155,11 +150,6 @@ def test_impossible_sizes_are_named(sizes: dict) -> None:
 def test_physics_initialisation_needs_a_state_for_each_mode() -> None:
     model = KoopmanVar(KoopmanVarConfiguration(101, 5, (4,)))
     with pytest.raises(ValueError, match="at least the 10 modes, not 5"):
-        initialise(
-            model,
-            "physics",
-            string=StringParameters(),
-            modes=10,
-            rate_hz=4_000,
-            generator=torch.Generator(),
-        )
+        model.initialise("physics", Physics(StringParameters(), 10, 4_000), torch.Generator())
+    with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
+        model.initialise("guess", Physics(StringParameters(), 10, 4_000), torch.Generator())

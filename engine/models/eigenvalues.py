@@ -1,0 +1,51 @@
+"""Diagonal linear dynamics: eigenvalues λ = exp(-exp(ν_log) + i exp(θ_log)) and their powers.
+
+Source: the paper, §3.1 (after Orvieto et al. 2023). Every real parameter gives |λ| < 1. Powers are taken as
+exp(k log λ) for any k, in any order, without recursion; kθ reaches millions of radians and is reduced modulo 2π
+in float64.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+
+def powers(nu_log: Tensor, theta_log: Tensor, steps: Tensor) -> Tensor:
+    """λᵏ, complex128 (steps, n), for k in `steps` (steps,), which may be any real times in samples."""
+    k = steps.to(torch.float64)[:, None]
+    magnitude = torch.exp(-k * nu_log.double().exp())
+    phase = torch.remainder(k * theta_log.double().exp(), 2 * math.pi)
+    return torch.polar(magnitude, phase)
+
+
+def successive_powers(nu_log: Tensor, theta_log: Tensor, first: int, count: int) -> Tensor:
+    """λᵏ for k = first … first + count - 1, complex128 (count, n).
+
+    As products λᵃ λᵇ of a coarse and a fine table: two roundings in float64 instead of a sine each.
+    """
+    device = nu_log.device
+    fine = powers(nu_log, theta_log, torch.arange(min(64, count), device=device))
+    coarse = powers(nu_log, theta_log, torch.arange(first, first + count, 64, device=device))
+    return (coarse[:, None] * fine).flatten(0, 1)[:count]
+
+
+def draw_ring(
+    size: int, generator: torch.Generator, inner: float = 0.99, outer: float = 1.0
+) -> tuple[Tensor, Tensor]:
+    """ν_log and θ_log, float64 (size,), of eigenvalues uniform in the ring inner ≤ |λ| ≤ outer (the paper, §4.2)."""
+    u = torch.rand(2, size, generator=generator, dtype=torch.float64)
+    radius_squared = inner**2 + u[0] * (outer**2 - inner**2)
+    return torch.log(-0.5 * torch.log(radius_squared)), torch.log(2 * math.pi * u[1])
+
+
+def pack(pair: Tensor) -> Tensor:
+    """(..., 2n) with the real parts first to complex (..., n)."""
+    return torch.complex(*pair.chunk(2, dim=-1))
+
+
+def unpack(value: Tensor) -> Tensor:
+    """Complex (..., n) to (..., 2n) with the real parts first."""
+    return torch.cat([value.real, value.imag], dim=-1)

@@ -1,0 +1,331 @@
+"""run.py, on a copy of it beside a small .venv; no pip, no apt-get and no network."""
+
+import ast
+import collections
+import csv
+import importlib.util
+import shutil
+import subprocess
+import sys
+import threading
+import time
+import venv
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[1] / "run.py"
+
+
+def load(path):
+    """Import a copy of run.py from its path, as a module of its own."""
+    spec = importlib.util.spec_from_file_location("run_under_test", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def record(package, files):
+    """Write a package's RECORD as pip does: a path and a size in each row."""
+    package.mkdir(parents=True)
+    with (package / "RECORD").open("w", newline="") as rows:
+        csv.writer(rows).writerows([*((name, "", size) for name, size in files), ("RECORD", "", "")])
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Return run.py in a project whose set-up is done, where any process that it starts fails the test."""
+    (tmp_path / "pyproject.toml").write_text("[project]\n")
+    (tmp_path / "constraints.txt").write_text("numpy==1\n")
+    shutil.copy(SOURCE, tmp_path)
+    run = load(tmp_path / "run.py")
+    venv.create(run.VENV, with_pip=False, symlinks=not run.WINDOWS)
+    run.APP.touch()
+    (run.site_packages() / "numpy").mkdir()
+    (run.site_packages() / "numpy" / "__init__.py").write_text("12345")
+    record(run.site_packages() / "numpy-1.dist-info", [("numpy/__init__.py", 5), ("numpy/x.pyc", 9)])
+    monkeypatch.setattr(run, "pip", lambda *arguments: None)
+    monkeypatch.setattr(run, "sound", lambda: True)
+    monkeypatch.setattr(run, "missing", lambda table: [])
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **_: pytest.fail(f"started {command}"))
+    run.environment([])
+    return run
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        ([], ("start", [])),
+        (["--"], ("start", [])),
+        (["--", "render", "--", "a b"], ("start", ["render", "--", "a b"])),
+        (["test", "-k", "x"], ("test", ["-k", "x"])),
+        (["setup"], ("setup", [])),
+    ],
+)
+def test_words_are_understood(run, words, meant):
+    assert run.parse(words) == meant
+
+
+@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["--frob"]])
+def test_other_words_are_answered_with_the_usage(run, words, capsys):
+    with pytest.raises(SystemExit) as exit:
+        run.main(words)
+    out, err = capsys.readouterr()
+    assert (exit.value.code, out) == (2, "")
+    assert "python3 run.py setup" in err and f"not understood: {' '.join(words)}" in err
+
+
+def test_help_goes_to_standard_output(run, capsys):
+    with pytest.raises(SystemExit) as exit:
+        run.main(["--help"])
+    assert exit.value.code == 0
+    assert "python3 run.py -- render" in capsys.readouterr().out
+
+
+def test_an_old_python_can_read_the_file_and_is_told(monkeypatch):
+    ast.parse(SOURCE.read_text("utf-8"), feature_version=(3, 6))
+    monkeypatch.setattr(sys, "version_info", (3, 6, 15))
+    with pytest.raises(SystemExit, match=r"needs Python 3\.11 or newer"):
+        load(SOURCE)
+
+
+def test_a_start_with_nothing_to_do_is_silent_and_starts_no_process(run, monkeypatch, capsys):
+    started = []
+    monkeypatch.setattr(run, "start", started.append)
+    run.main(["--", "render", "a b"])
+    assert started == [["render", "a b"]]
+    assert capsys.readouterr() == ("", "")
+
+
+def dangle(run):
+    run.PYTHON.unlink()
+    run.PYTHON.symlink_to("/nonexistent/python")
+
+
+SPOILED = {
+    "no stamp": lambda run: run.STAMP.unlink(),
+    "half a stamp": lambda run: run.STAMP.write_text(run.STAMP.read_text()[:40]),
+    "a stamp of another kind": lambda run: run.STAMP.write_text("[]"),
+    "other versions": lambda run: (run.ROOT / "constraints.txt").write_text("numpy==2\n"),
+    "another project": lambda run: (run.ROOT / "pyproject.toml").write_text("[tool]\n"),
+    "no configuration": lambda run: (run.VENV / "pyvenv.cfg").unlink(),
+    "no Python": dangle,
+    "no app": lambda run: run.APP.unlink(),
+    "a package gone": lambda run: shutil.rmtree(run.site_packages() / "numpy"),
+    "every package gone": lambda run: shutil.rmtree(run.site_packages()),
+    ".venv gone": lambda run: shutil.rmtree(run.VENV),
+}
+
+
+@pytest.mark.parametrize("spoil", SPOILED.values(), ids=SPOILED)
+def test_a_spoiled_environment_is_seen(run, spoil):
+    assert run.read_stamp()
+    spoil(run)
+    assert run.read_stamp() is None
+
+
+def test_a_moved_folder_is_seen(run, tmp_path):
+    before = run.fingerprint()
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    for name in ("run.py", "pyproject.toml", "constraints.txt", ".venv"):
+        (tmp_path / name).rename(moved / name)
+    run = load(moved / "run.py")
+    assert run.fingerprint() != before
+    assert run.read_stamp() is None
+    assert not run.sound()
+
+
+def test_a_sound_environment_is_installed_into_and_another_is_made_anew(run, monkeypatch):
+    steps = []
+    monkeypatch.setattr(run, "pip", lambda *arguments: steps.append(arguments[-1]))
+    monkeypatch.setattr(run, "make_venv", lambda: steps.append("venv"))
+    run.environment([])
+    assert steps == ["setuptools", ".[dev]"]
+    monkeypatch.setattr(run, "sound", lambda: False)
+    run.environment([])
+    assert steps == ["setuptools", ".[dev]", "venv", "setuptools", ".[dev]"]
+    assert run.read_stamp()
+
+
+def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):
+    monkeypatch.setattr(run, "run_step", lambda command, trouble: None)
+    with run.locked():
+        run.make_venv()
+    assert list(run.VENV.iterdir()) == [run.LOCK]
+
+
+@pytest.mark.parametrize("cut", ["file", "size", "record"])
+def test_a_package_cut_short_is_made_to_look_absent(run, cut):
+    """Or pip would take it for installed and leave it as it is."""
+    package = run.site_packages() / "numpy-1.dist-info"
+    remnant = run.site_packages() / "~umpy"
+    remnant.mkdir()
+    run.mend()
+    assert package.exists() and not remnant.exists()
+    source = run.site_packages() / "numpy" / "__init__.py"
+    {
+        "file": source.unlink,
+        "size": lambda: source.write_text("12"),
+        "record": (package / "RECORD").unlink,
+    }[cut]()
+    run.mend()
+    assert not package.exists()
+
+
+def fake_process(status, lines):
+    """Return a stand-in for Popen whose process says these lines and ends with this status."""
+
+    class Process:
+        returncode = status
+        stdout = lines
+
+        def __init__(self, command, **_):
+            self.command = command
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+    return Process
+
+
+def test_a_failed_step_shows_its_last_lines_and_leaves_no_stamp(run, monkeypatch, capsys):
+    def failing(*_):
+        run.run_step(["pip"], "pip failed; remedy: again")
+
+    monkeypatch.setattr(run, "pip", failing)
+    monkeypatch.setattr(
+        subprocess, "Popen", fake_process(1, [*(f"line {i}\n" for i in range(40)), "ERROR: disk full\n"])
+    )
+    (run.ROOT / "constraints.txt").write_text("numpy==2\n")
+    assert run.main(["setup"]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and "line 5\n" not in err
+    assert "ERROR: disk full\n" in err
+    assert err.endswith(f"run.py: cannot prepare {run.VENV}: pip failed; remedy: again\n")
+    assert not run.STAMP.exists()
+
+
+def test_a_second_set_up_waits_for_the_first_and_does_nothing_more(run, monkeypatch, capsys):
+    begun, made = threading.Event(), []
+
+    def slow(absent):
+        begun.set()
+        time.sleep(0.2)
+        made.append(absent)
+        environment(absent)
+
+    environment = run.environment
+    monkeypatch.setattr(run, "environment", slow)
+    run.STAMP.unlink()
+    first = threading.Thread(target=run.prepare, args=("start", False))
+    first.start()
+    assert begun.wait(10)
+    run.prepare("start", False)
+    first.join()
+    assert made == [[]]
+    assert run.WINDOWS or "waiting for another set-up" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pip brings everything elsewhere")
+class TestSystemPackages:
+    @pytest.fixture
+    def machine(self, run, monkeypatch):
+        """Return run.py on a machine that lacks PortAudio and Xvfb, with a record of the commands it runs."""
+        lacking = {"libportaudio.so.2", "Xvfb"}
+        monkeypatch.undo()
+        monkeypatch.setattr(run, "present", lambda sign: sign not in lacking)
+        monkeypatch.setattr(run, "pip", lambda *arguments: None)
+        monkeypatch.setattr(run, "sound", lambda: True)
+        monkeypatch.setattr(run.shutil, "which", {"apt-get": "/usr/bin/apt-get"}.get)
+        commands = []
+        monkeypatch.setattr(run, "run_step", lambda command, trouble, **_: commands.append(command))
+        return collections.namedtuple("Machine", "run lacking commands")(run, lacking, commands)
+
+    def test_signs_are_found_where_they_are(self, run):
+        assert run.present("import ensurepip") and not run.present("import nothing_of_the_kind")
+        assert run.present("libc.so.6") and not run.present("libnothing.so.6")
+        assert run.present("/proc/*/stat") and not run.present("/proc/nothing")
+        assert run.present("sh") and not run.present("nothing-of-the-kind")
+
+    def test_a_user_is_told_the_line_once_and_again_only_for_the_window(self, machine, monkeypatch, capsys):
+        run = machine.run
+        monkeypatch.setattr(run, "APT", False)
+        monkeypatch.setattr(run, "start", lambda arguments: 0)
+        line = "  sudo apt-get install --no-install-recommends libportaudio2\n"
+        run.STAMP.unlink()
+        assert run.main(["--", "render"]) == 0
+        assert line in capsys.readouterr().err
+        assert run.main(["--", "render"]) == 0
+        assert capsys.readouterr().err == ""
+        assert run.main([]) == 0
+        assert line in capsys.readouterr().err
+        machine.lacking.clear()
+        assert run.main([]) == 0
+        assert capsys.readouterr().err == ""
+        assert machine.commands == []
+
+    def test_root_installs_and_those_of_the_tests_only_for_them(self, machine, monkeypatch):
+        monkeypatch.setattr(machine.run, "APT", True)
+        machine.run.system_packages("start")
+        assert [command[1] for command in machine.commands] == ["update", "install"]
+        assert machine.commands[-1][-1] == "libportaudio2"
+        assert "--no-install-recommends" in machine.commands[-1]
+        machine.run.system_packages("test")
+        assert machine.commands[-1][-1] == "xvfb"
+
+    def test_a_failing_apt_get_is_a_warning(self, machine, monkeypatch, capsys):
+        def failing(command, trouble, **_):
+            raise machine.run.SetupError(trouble)
+
+        monkeypatch.setattr(machine.run, "APT", True)
+        monkeypatch.setattr(machine.run, "run_step", failing)
+        machine.run.STAMP.unlink()
+        assert machine.run.main(["setup"]) == 0
+        err = capsys.readouterr().err
+        assert "warning: apt-get install failed; going on without" in err
+        assert "  apt-get install --no-install-recommends libportaudio2\n" in err
+
+    @pytest.mark.parametrize(
+        ("tool", "line"), [("dnf", "sudo dnf install "), ("pacman", "sudo pacman "), ("", "Debian calls libx")]
+    )
+    def test_other_systems_are_given_a_hint(self, run, tool, line, monkeypatch, capsys):
+        monkeypatch.setattr(run.shutil, "which", {tool: tool}.get)
+        run.say_absent(["libx"])
+        assert line in capsys.readouterr().err
+
+
+@pytest.fixture
+def checks(run, monkeypatch):
+    """Return run.py, the lints that are to fail, and a record of pytest's command and environment."""
+    failing, pytests = set(), []
+
+    def lint(command, **_):
+        return subprocess.CompletedProcess(command, int(command[2] in failing if len(command) > 2 else 0), b"")
+
+    monkeypatch.setattr(run.subprocess, "run", lint)
+    monkeypatch.setattr(run.subprocess, "call", lambda command, cwd, env: pytests.append((command, env)) or 5)
+    return collections.namedtuple("Checks", "run failing pytests")(run, failing, pytests)
+
+
+def test_the_whole_check_runs_the_tests_in_parallel(checks, monkeypatch, capsys):
+    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    assert checks.run.main(["test"]) == 5
+    ((command, env),) = checks.pytests
+    assert command[3] == "-n" and command[-2:] == ["--dist", "loadfile"]
+    assert (env["QT_QPA_PLATFORM"], env["OMP_NUM_THREADS"]) == ("offscreen", "1")
+    out, err = capsys.readouterr()
+    assert out.count("passed") == len(checks.run.LINTS) and err == ""
+
+
+def test_a_failed_lint_fails_the_check_and_is_named_after_the_tests(checks, monkeypatch, capsys):
+    monkeypatch.setattr(checks.run.subprocess, "call", lambda command, cwd, env: checks.pytests.append(command) or 0)
+    checks.failing.add("mypy")
+    assert checks.run.main(["test", "tests/test_run.py"]) == 1
+    assert checks.pytests[0][3:] == ["tests/test_run.py"]
+    out, err = capsys.readouterr()
+    assert "mypy: FAILED" in out and err == "run.py: failed before the tests: mypy\n"
