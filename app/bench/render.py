@@ -12,7 +12,7 @@ from torch import Tensor
 
 from app.bench.machine import Machine, median_s, one_thread, times_s
 from engine.models import MODELS, StringModel
-from engine.pluck import Pluck
+from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.sine_transform import listening_weights
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.fit import new_model
@@ -62,7 +62,7 @@ def measure(report: Callable[[float, str], None]) -> RenderBenchmark:
 def _measure(name: str, rate_hz: int, modes: int) -> RenderTiming:
     model = _untrained(name, rate_hz, modes)
     pluck = (Pluck().displacement(model.grid_points) / SCALE_M).float()[None]
-    point = listening_weights(torch.tensor([0.37]), model.grid_points).float()
+    point = listening_weights(torch.tensor([DEFAULT_LISTEN]), model.grid_points).float()
     samples = round(AUDIO_S * rate_hz)
 
     def factor(readout: Tensor | None) -> float:

@@ -9,11 +9,11 @@ import typer
 
 from app.commands import arguments
 from app.commands.console import progress, say
+from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
     from app.export import SoundRequest, WavReport
 
-DEFAULT_LISTEN = 0.37  # a point where no low mode is still
 SILENT_DB = -120.0
 
 Bits = Literal["16", "24", "32f"]  # app.wav.Bits, known without soundfile

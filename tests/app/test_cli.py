@@ -11,7 +11,6 @@ import typer
 from app import cli
 from app.commands import arguments, render
 from app.export import BITS, SOURCES
-from engine.pluck import SHAPES, Pluck
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = [
@@ -129,11 +128,7 @@ def test_a_failure_names_what_and_the_remedy(error: Exception, expected: str) ->
     assert cli.describe(error).startswith(expected)
 
 
-def test_what_is_known_without_torch_and_soundfile_is_what_they_say() -> None:
-    pluck = Pluck()
-    assert pluck.shape == arguments.DEFAULT_SHAPE
-    assert pluck.width == arguments.DEFAULT_WIDTH
-    assert arguments.ShapeName.__args__ == SHAPES
+def test_what_is_known_without_soundfile_is_what_they_say() -> None:
     assert render.Bits.__args__ == BITS
     assert render.Source.__args__ == SOURCES
 

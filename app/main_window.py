@@ -1,0 +1,141 @@
+"""The window: its parts, where they stand, and its keys. What they do is connected in `controller`."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QByteArray, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QMainWindow,
+    QMenu,
+    QMessageBox,
+    QSplitter,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.views.notice_bar import NoticeBar
+from app.views.parts import tool_button
+from app.views.preset_bar import PresetBar
+from app.views.spectrum_view import SpectrumView
+from app.views.string_view import StringView
+from app.views.transport_bar import TransportBar
+from app.views.waveform_view import WaveformView
+
+KEYS = (  # (key, name of the signal, what it does)
+    ("Space", "play_asked", "play from the pluck, or stop"),
+    ("Return", "pluck_asked", "pluck"),
+    ("X", "switch_asked", "switch between model and truth at the playhead"),
+    ("L", "loop_asked", "loop"),
+    ("PgUp", "previous_asked", "previous preset"),
+    ("PgDown", "next_asked", "next preset"),
+    ("Ctrl+E", "export_asked", "export WAV"),
+    ("F1", "help_asked", "these keys"),
+    ("Ctrl+Q", "quit_asked", "quit"),
+)
+
+
+class MainWindow(QMainWindow):
+    """See the module."""
+
+    play_asked = Signal()
+    pluck_asked = Signal()
+    switch_asked = Signal()
+    loop_asked = Signal()
+    previous_asked = Signal()
+    next_asked = Signal()
+    export_asked = Signal()
+    help_asked = Signal()
+    quit_asked = Signal()
+    closing = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setWindowTitle("Learned Strings")
+        self.setMinimumSize(1180, 560)
+        self.resize(1280, 800)
+        self.presets = PresetBar()
+        self.string = StringView()
+        self.spectrum = SpectrumView()
+        self.waveform = WaveformView()
+        self.transport = TransportBar()
+        self.notices = NoticeBar()
+        self.error_label = QLabel()
+        self.error_label.setToolTip(
+            "Model against truth for this pluck: relative mean absolute error, all of the string"
+        )
+        self.rate_label = QLabel()
+        self.rate_label.setObjectName("badge")
+        self.audio_menu = QMenu(self)
+        self._audio_button = tool_button("Audio ▾", "Audio device", "Choose where the sound goes")
+        self._audio_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self._audio_button.setMenu(self.audio_menu)
+        self._lay_out()
+        for key, signal, _ in KEYS:
+            shortcut = QShortcut(QKeySequence(key), self)
+            shortcut.setAutoRepeat(False)
+            shortcut.activated.connect(getattr(self, signal))
+        self.help_asked.connect(self.show_help)
+        self.quit_asked.connect(self.close)
+
+    def _lay_out(self) -> None:
+        brand = QLabel("LEARNED STRINGS")
+        brand.setObjectName("brand")
+        head = QHBoxLayout()
+        head.setSpacing(10)
+        head.addWidget(brand)
+        head.addSpacing(12)
+        head.addWidget(self.presets)
+        head.addStretch(1)
+        head.addWidget(self.rate_label)
+        head.addWidget(self._audio_button)
+        facts = QHBoxLayout()
+        facts.addWidget(self.presets.card)
+        facts.addStretch(1)
+        facts.addWidget(self.error_label)
+        plots = QSplitter(Qt.Orientation.Horizontal)
+        plots.addWidget(self.spectrum)
+        plots.addWidget(self.waveform)
+        plots.setSizes([560, 720])
+        views = QSplitter(Qt.Orientation.Vertical)
+        views.addWidget(self.string)
+        views.addWidget(plots)
+        views.setSizes([380, 250])
+        for splitter in (plots, views):
+            splitter.setChildrenCollapsible(False)
+            splitter.setHandleWidth(8)
+        column = QVBoxLayout()
+        column.setContentsMargins(14, 12, 14, 12)
+        column.setSpacing(10)
+        column.addLayout(head)
+        column.addLayout(facts)
+        column.addWidget(self.notices)
+        column.addWidget(views, 1)
+        column.addWidget(self.transport)
+        middle = QWidget()
+        middle.setLayout(column)
+        self.setCentralWidget(middle)
+        self.string.setFocus()
+
+    def geometry_text(self) -> str:
+        """Size and place, for `restore_geometry`."""
+        return bytes(self.saveGeometry().toBase64().data()).decode("ascii")
+
+    def restore_geometry(self, text: str) -> None:
+        if text:
+            self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
+
+    def show_help(self) -> None:
+        rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, _, what in KEYS)
+        QMessageBox.information(
+            self,
+            "Keys",
+            f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
+            "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
+        )
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.closing.emit()
+        super().closeEvent(event)

@@ -1,0 +1,94 @@
+"""The session: what the user has chosen, without any widget.
+
+All choices are one immutable, validated value; the session replaces it and tells which fields really changed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from psygnal import Signal
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
+
+Heard = Literal["model", "truth"]
+
+SECONDS_RANGE = (0.5, 12.0)
+VOLUME_RANGE_DB = (-60.0, 12.0)
+SPEED_RANGE = (0.001, 1.0)  # 1 is real time; a thousandth shows one period of a low string in seconds
+
+
+class Choices(BaseModel):
+    """Everything that is restored at the next start. Positions are in lengths of the string."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    preset: str = ""
+    position: float = Field(0.35, ge=POSITION_RANGE[0], le=POSITION_RANGE[1])
+    amplitude_mm: float = Field(4.0, ge=0, le=LARGEST_AMPLITUDE_MM)
+    shape: Shape = "gaussian"
+    width: float = Field(0.06, ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])
+    listen: float = Field(DEFAULT_LISTEN, ge=0, le=1)
+    seconds: float = Field(4.0, ge=SECONDS_RANGE[0], le=SECONDS_RANGE[1])
+    heard: Heard = "model"
+    loop: bool = False
+    volume_db: float = Field(0.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
+    speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
+
+    @property
+    def pluck(self) -> Pluck:
+        return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
+
+
+class Session:
+    """The present choices. `changed` carries the set of field names that have new values."""
+
+    changed = Signal(frozenset)
+
+    def __init__(self, choices: Choices | None = None) -> None:
+        self._choices = choices or Choices()
+
+    @property
+    def choices(self) -> Choices:
+        return self._choices
+
+    def update(self, **changes: Any) -> None:
+        """Takes new values, all or none.
+
+        Raises:
+            ValueError: a value is out of its range or a field is unknown; nothing has changed then.
+        """
+        try:
+            new = Choices.model_validate({**self._choices.model_dump(), **changes})
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        before, self._choices = self._choices, new
+        names = frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
+        if names:
+            self.changed.emit(names)
+
+    def move_pluck(self, position: float, amplitude_mm: float) -> None:
+        """Takes the nearest allowed pluck: for gestures, which know no limits."""
+        self.update(
+            position=_clamp(position, POSITION_RANGE),
+            amplitude_mm=_clamp(amplitude_mm, (0, LARGEST_AMPLITUDE_MM)),
+        )
+
+    def move_listening_point(self, listen: float) -> None:
+        self.update(listen=_clamp(listen, (0, 1)))
+
+    def switch_source(self) -> None:
+        """From model to truth and back."""
+        self.update(heard="truth" if self._choices.heard == "model" else "model")
+
+    def step_preset(self, names: list[str], step: int) -> None:
+        """The next or previous of `names`, going round."""
+        if names:
+            here = names.index(self._choices.preset) if self._choices.preset in names else 0
+            self.update(preset=names[(here + step) % len(names)])
+
+
+def _clamp(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])

@@ -1,0 +1,192 @@
+"""A rotary knob: drag, wheel, keys or typing; double-click goes back to its default."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
+
+from app.views import theme
+
+SWEEP_DEGREES = 270
+DRAG_PIXELS = 180  # for the whole range
+FINE = 0.1  # with Shift
+
+
+@dataclass(frozen=True)
+class KnobRange:
+    """What a knob can hold. Logarithmic ranges move by ratio; `text` formats a value, with its unit."""
+
+    low: float
+    high: float
+    default: float
+    step: float  # of a key or a wheel notch; a ratio above 1 where logarithmic
+    text: str = "{:.2f}"
+    logarithmic: bool = False
+
+    def share(self, value: float) -> float:
+        """0 … 1 along the sweep."""
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def value(self, share: float) -> float:
+        share = min(max(share, 0.0), 1.0)
+        if self.logarithmic:
+            return self.low * (self.high / self.low) ** share
+        return self.low + share * (self.high - self.low)
+
+    def stepped(self, value: float, steps: float) -> float:
+        moved = value * self.step**steps if self.logarithmic else value + self.step * steps
+        return min(max(moved, self.low), self.high)
+
+
+class _Editor(QLineEdit):
+    """Takes a typed number. Enter and Escape are its own, whatever the window's shortcuts say."""
+
+    given_up = Signal()
+
+    def event(self, event: QEvent) -> bool:
+        if isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
+            if event.type() == QEvent.Type.ShortcutOverride:
+                event.accept()
+                return True
+            if event.type() == QEvent.Type.KeyPress and event.key() == Qt.Key.Key_Escape:
+                self.given_up.emit()
+                return True
+        return super().event(event)
+
+
+class Knob(QWidget):
+    """Shows a value and asks for new ones: `value_asked` is a wish, `set_value` is what became of it."""
+
+    value_asked = Signal(float)
+
+    def __init__(self, name: str, limits: KnobRange, tip: str = "", parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.limits = limits
+        self._name = name
+        self._value = limits.default
+        self._pressed_at: QPointF | None = None
+        self._pressed_share = 0.0
+        self._editor: QLineEdit | None = None
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(name)
+        self.setToolTip(
+            f"{tip or name}\nDrag, wheel or arrow keys; Shift is finer; type a number; double-click resets"
+        )
+
+    @property
+    def value(self) -> float:
+        return self._value
+
+    def set_value(self, value: float) -> None:
+        if value != self._value:
+            self._value = value
+            self.setAccessibleDescription(self.limits.text.format(value))
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(70, 82)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._pressed_at = event.position()
+            self._pressed_share = self.limits.share(self._value)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._pressed_at is not None:
+            fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
+            moved = (self._pressed_at.y() - event.position().y()) / DRAG_PIXELS * fine
+            self.value_asked.emit(self.limits.value(self._pressed_share + moved))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._pressed_at = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.value_asked.emit(self.limits.default)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
+        notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
+        self.value_asked.emit(self.limits.stepped(self._value, notches * fine))
+        event.accept()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
+        steps = {
+            Qt.Key.Key_Up: 1,
+            Qt.Key.Key_Right: 1,
+            Qt.Key.Key_Down: -1,
+            Qt.Key.Key_Left: -1,
+        }.get(Qt.Key(event.key()))
+        if steps is not None:
+            self.value_asked.emit(self.limits.stepped(self._value, steps * fine))
+        elif event.key() == Qt.Key.Key_Delete:
+            self.value_asked.emit(self.limits.default)
+        elif event.text() and event.text() in "0123456789.-":
+            self._type(event.text())
+        else:
+            super().keyPressEvent(event)
+
+    def _type(self, start: str) -> None:
+        editor = _Editor(start, self)
+        editor.setGeometry(2, self.height() - 26, self.width() - 4, 24)
+        editor.setAccessibleName(f"{self._name}, typed")
+        editor.show()
+        editor.setFocus()
+        editor.editingFinished.connect(self._take_typed)
+        editor.given_up.connect(self._close_editor)
+        self._editor = editor
+
+    def _take_typed(self) -> None:
+        if self._editor is None:
+            return
+        text = self._editor.text().replace(",", ".")
+        self._close_editor()
+        try:
+            value = float(text)
+        except ValueError:
+            return
+        if math.isfinite(value):
+            self.value_asked.emit(min(max(value, self.limits.low), self.limits.high))
+
+    def _close_editor(self) -> None:
+        if self._editor is not None:
+            editor, self._editor = self._editor, None
+            editor.deleteLater()
+            self.setFocus()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle, radius = QPointF(self.width() / 2, 37), 18.0
+        ring = QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
+        start = 90 + SWEEP_DEGREES / 2
+        share = self.limits.share(self._value)
+        painter.setPen(QPen(QColor(theme.LINE), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawArc(ring, round(start * 16), -SWEEP_DEGREES * 16)
+        painter.setPen(QPen(QColor(theme.TEXT), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawArc(ring, round(start * 16), -round(SWEEP_DEGREES * share * 16))
+        angle = math.radians(start - SWEEP_DEGREES * share)
+        direction = QPointF(math.cos(angle), -math.sin(angle))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.LINE if self.hasFocus() else theme.RAISED))
+        painter.drawEllipse(middle, radius - 5, radius - 5)
+        painter.setPen(QPen(QColor(theme.TEXT), 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
+        width = self.width()
+        painter.setFont(theme.small_font(10))
+        painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
+        painter.drawText(QRectF(0, 0, width, 14), Qt.AlignmentFlag.AlignCenter, self._name.upper())
+        painter.setPen(QColor(theme.TEXT))
+        painter.setFont(theme.small_font(12))
+        painter.drawText(
+            QRectF(0, self.height() - 22, width, 18),
+            Qt.AlignmentFlag.AlignCenter,
+            self.limits.text.format(self._value),
+        )

@@ -1,0 +1,66 @@
+"""The level meter, with a light that shows when playback is being limited."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.views import theme
+
+LOWEST_DB = -60.0
+LIMIT_HOLD_TICKS = 30  # the light stays on long enough to be seen
+
+
+class Meter(QWidget):
+    """A bar from -60 to 0 dBFS and the LIMIT light."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Level")
+        self.setToolTip(
+            "Playback level in dBFS. LIMIT lights when the safety limiter acts (playback only, never a file)"
+        )
+        self._peak_db = LOWEST_DB
+        self._hold = 0
+
+    def sizeHint(self) -> QSize:
+        return QSize(170, 40)
+
+    def show_level(self, peak_db: float, limiting: bool) -> None:
+        hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)
+        peak_db = max(peak_db, LOWEST_DB)
+        if abs(peak_db - self._peak_db) > 0.1 or bool(hold) != bool(self._hold):
+            self.update()
+        self._peak_db, self._hold = peak_db, hold
+
+    @property
+    def limit_light(self) -> bool:
+        return self._hold > 0
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        bar = QRectF(12, 8, self.width() - 68, 9)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.RAISED))
+        painter.drawRoundedRect(bar, 3, 3)
+        gradient = QLinearGradient(bar.left(), 0, bar.right(), 0)
+        gradient.setColorAt(0, QColor(theme.GOOD))
+        gradient.setColorAt(0.8, QColor(theme.MODEL))
+        gradient.setColorAt(1, QColor(theme.WARNING))
+        painter.setBrush(gradient)
+        share = 1 - self._peak_db / LOWEST_DB
+        painter.drawRoundedRect(QRectF(bar.left(), bar.top(), bar.width() * share, bar.height()), 3, 3)
+        painter.setFont(theme.small_font(9))
+        painter.setPen(QColor(theme.FAINT))
+        for db in (-60, -40, -20, 0):
+            x = bar.left() + bar.width() * (1 - db / LOWEST_DB)
+            painter.drawText(QRectF(x - 14, 20, 28, 12), Qt.AlignmentFlag.AlignCenter, f"{db}")
+        light = QRectF(self.width() - 44, 5, 44, 16)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.WARNING if self._hold else theme.RAISED))
+        painter.drawRoundedRect(light, 3, 3)
+        painter.setPen(QColor(theme.BACKGROUND if self._hold else theme.FAINT))
+        painter.drawText(light, Qt.AlignmentFlag.AlignCenter, "LIMIT")

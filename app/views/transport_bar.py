@@ -1,0 +1,148 @@
+"""The controls beneath: play, source switch, loop, the pluck's knobs, slow motion, volume and export."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.session import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
+from app.views.knob import Knob, KnobRange
+from app.views.meter import Meter
+from app.views.parts import combo_box, tool_button, vertical_rule
+from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
+
+_SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
+
+KNOBS = {  # field of `Choices` -> (label, range, tip)
+    "position": (
+        "position",
+        KnobRange(*POSITION_RANGE, 0.35, 0.01),
+        "Where the string is pulled: 0 and 1 are its ends",
+    ),
+    "amplitude_mm": (
+        "amplitude",
+        KnobRange(0, LARGEST_AMPLITUDE_MM, 4.0, 0.25, "{:.2f} mm"),
+        "How far it is pulled",
+    ),
+    "width": (
+        "width",
+        KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", logarithmic=True),
+        "How wide the pluck is",
+    ),
+    "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Where the string is heard"),
+    "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "How long a pluck is rendered"),
+    "speed": (
+        "motion",
+        KnobRange(*SPEED_RANGE, 0.004, 1.25, "× {:.3f}", logarithmic=True),
+        "Slow motion of the picture, as by a stroboscope at the playhead: the sound is not slowed",
+    ),
+    "volume_db": (
+        "volume",
+        KnobRange(*VOLUME_RANGE_DB, 0.0, 1.0, "{:+.0f} dB"),
+        "Playback volume; files are not changed",
+    ),
+}
+
+
+class TransportBar(QFrame):
+    """Asks with signals, shows with `show_choices`."""
+
+    play_asked = Signal()
+    export_asked = Signal()
+    change_asked = Signal(str, object)  # a field of `Choices` and its new value
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("panel")
+        self.knobs = {field: Knob(label, limits, tip) for field, (label, limits, tip) in KNOBS.items()}
+        for field, knob in self.knobs.items():
+            knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
+        self.meter = Meter()
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 8, 12, 8)
+        row.setSpacing(10)
+        row.addLayout(self._build_transport())
+        row.addWidget(vertical_rule())
+        row.addLayout(self._build_sources())
+        row.addWidget(vertical_rule())
+        row.addLayout(self._build_shape())
+        for field in ("position", "amplitude_mm", "width"):
+            row.addWidget(self.knobs[field])
+        row.addWidget(vertical_rule())
+        for field in ("listen", "seconds", "speed"):
+            row.addWidget(self.knobs[field])
+        row.addStretch(1)
+        row.addWidget(vertical_rule())
+        row.addWidget(self.knobs["volume_db"])
+        row.addLayout(self._build_output())
+
+    def show_choices(self, choices: Choices) -> None:
+        for field, knob in self.knobs.items():
+            knob.set_value(getattr(choices, field))
+        self.knobs["width"].setEnabled(choices.shape != "triangular")
+        with QSignalBlocker(self._shape):
+            self._shape.setCurrentIndex(SHAPES.index(choices.shape))
+        self._loop.setChecked(choices.loop)
+        self._sources[choices.heard].setChecked(True)
+
+    def show_playing(self, playing: bool) -> None:
+        self._play.setChecked(playing)
+        self._play.setText("■  Stop" if playing else "▶  Play")
+
+    def _build_transport(self) -> QVBoxLayout:
+        self._play = QPushButton("▶  Play")
+        self._play.setObjectName("play")
+        self._play.setCheckable(True)
+        self._play.setToolTip("Play from the pluck, or stop (Space)")
+        self._play.clicked.connect(self.play_asked)
+        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (L)")
+        self._loop.setCheckable(True)
+        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
+        column = QVBoxLayout()
+        column.addWidget(self._play)
+        column.addWidget(self._loop)
+        return column
+
+    def _build_sources(self) -> QVBoxLayout:
+        self._sources = {}
+        group = QButtonGroup(self)
+        column = QVBoxLayout()
+        for name, tip in (("model", "Hear the learned model"), ("truth", "Hear the physics")):
+            button = QPushButton(name.upper())
+            button.setObjectName(name)
+            button.setCheckable(True)
+            button.setToolTip(f"{tip} (X switches at the playhead)")
+            button.setAccessibleName(tip)
+            button.clicked.connect(lambda _=False, name=name: self.change_asked.emit("heard", name))
+            group.addButton(button)
+            self._sources[name] = button
+            column.addWidget(button)
+        return column
+
+    def _build_shape(self) -> QVBoxLayout:
+        self._shape = combo_box("Pluck shape", [(_SHAPE_NAMES[shape], shape) for shape in SHAPES])
+        self._shape.setToolTip("The shape of the pluck")
+        self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
+        label = QLabel("PLUCK")
+        label.setObjectName("faint")
+        column = QVBoxLayout()
+        column.addWidget(label)
+        column.addWidget(self._shape)
+        return column
+
+    def _build_output(self) -> QVBoxLayout:
+        export = QPushButton("Export WAV …")
+        export.setToolTip("Save this pluck as a file (Ctrl+E)")
+        export.clicked.connect(self.export_asked)
+        column = QVBoxLayout()
+        column.addWidget(self.meter)
+        column.addWidget(export)
+        return column

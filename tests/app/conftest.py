@@ -1,0 +1,51 @@
+"""A window with its controller, a silent player and one small preset."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, ProblemKind
+
+
+def no_device(*_: object) -> AudioDevice:
+    raise AudioUnavailable(AudioProblem(ProblemKind.NO_DEVICE, "No sound output here.", "Connect one."))
+
+
+def make_player(on_problem: Callable[[AudioProblem], None]) -> Player:
+    return Player(on_problem, look_up=no_device)
+
+
+@pytest.fixture
+def preset_folder(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The shipped presets, replaced by two small ones: `first` and `second`."""
+    folder = tmp_path / "presets"
+    folder.mkdir()
+    for name in ("first", "second"):
+        shutil.copy(small_preset, folder / f"{name}.safetensors")
+    monkeypatch.setattr("app.library.SHIPPED", folder)
+    return folder
+
+
+@pytest.fixture
+def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[object]:
+    from app.controller import Controller
+    from app.main_window import MainWindow
+    from app.session import Choices
+    from app.settings import Settings
+
+    window = MainWindow()
+    qtbot.addWidget(window)
+    settings = Settings(choices=Choices(seconds=0.5))
+    made = Controller(window, settings, tmp_path / "settings.json", make_player)
+    window.show()
+    qtbot.waitExposed(window)
+    yield made
+    window.close()
+    left = [t.name for t in threading.enumerate() if t.name in ("render-worker", "audio-feeder")]
+    assert left == []

@@ -1,0 +1,178 @@
+"""The window as a whole, both directions: gestures change the session, the session changes what is seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from pytestqt.qtbot import QtBot
+
+from app.controller import Controller
+from app.main_window import MainWindow
+from app.session import Choices
+from app.settings import Settings, load_settings
+from app.views.string_view import MARGIN_X
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def wait_for_take(qtbot: QtBot, controller: Controller) -> None:
+    qtbot.waitUntil(
+        lambda: "error of this pluck" in controller.window.error_label.text(),
+        timeout=20_000,
+    )
+
+
+def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller) -> None:
+    string = controller.window.string
+    wait_for_take(qtbot, controller)
+    x = round(MARGIN_X + 0.6 * (string.width() - 2 * MARGIN_X))
+    qtbot.mousePress(string, LEFT, pos=QPoint(x, string.height() // 2))
+    qtbot.mouseMove(string, QPoint(x, string.height() // 4))
+    assert string.is_dragging_pluck
+    assert not controller.player.status().playing
+    qtbot.mouseRelease(string, LEFT, pos=QPoint(x, string.height() // 4))
+    assert controller.session.choices.position == pytest.approx(0.6, abs=0.01)
+    assert 1 < controller.session.choices.amplitude_mm < 5
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.player.status().position_s > 0.05, timeout=20_000)
+
+
+def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: Controller) -> None:
+    string = controller.window.string
+    width = string.width() - 2 * MARGIN_X
+    start = QPoint(round(MARGIN_X + controller.session.choices.listen * width), string.height() - 30)
+    qtbot.mousePress(string, LEFT, pos=start)
+    qtbot.mouseMove(string, QPoint(round(MARGIN_X + 0.8 * width), string.height() - 30))
+    qtbot.mouseRelease(string, LEFT, pos=QPoint(round(MARGIN_X + 0.8 * width), string.height() - 30))
+    assert controller.session.choices.listen == pytest.approx(0.8, abs=0.01)
+    assert controller.window.transport.knobs["listen"].value == controller.session.choices.listen
+
+
+def test_keys(qtbot: QtBot, controller: Controller) -> None:
+    window, session = controller.window, controller.session
+    wait_for_take(qtbot, controller)
+    qtbot.keyClick(window, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
+    qtbot.keyClick(window, Qt.Key.Key_X)
+    assert session.choices.heard == "truth"
+    qtbot.waitUntil(lambda: controller.player.status().source == "truth", timeout=5_000)
+    qtbot.keyClick(window, Qt.Key.Key_L)
+    assert session.choices.loop
+    qtbot.keyClick(window, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: not controller.player.status().playing, timeout=5_000)
+    qtbot.keyClick(window.string, Qt.Key.Key_Right)
+    assert session.choices.position == pytest.approx(0.36)
+    qtbot.keyClick(window.string, Qt.Key.Key_Up)
+    assert session.choices.amplitude_mm == 4.5
+    qtbot.keyClick(window.string, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
+    assert session.choices.listen == pytest.approx(0.36)
+
+
+def test_presets_are_stepped_and_chosen(qtbot: QtBot, controller: Controller) -> None:
+    assert controller.session.choices.preset == "first"
+    qtbot.keyClick(controller.window, Qt.Key.Key_PageDown)
+    assert controller.session.choices.preset == "second"
+    assert controller.entry is not None
+    assert controller.entry.name == "second"
+    controller.window.presets.preset_chosen.emit("first")
+    assert controller.session.choices.preset == "first"
+
+
+def test_a_knob_asks_and_shows(qtbot: QtBot, controller: Controller) -> None:
+    knob = controller.window.transport.knobs["amplitude_mm"]
+    knob.setFocus()
+    qtbot.keyClick(knob, Qt.Key.Key_Up)
+    assert controller.session.choices.amplitude_mm == 4.25
+    qtbot.keyClicks(knob, "7")
+    editor = knob.findChild(type(knob._editor)) if knob._editor else None
+    assert editor is not None
+    qtbot.keyClicks(editor, ".5")
+    qtbot.keyClick(editor, Qt.Key.Key_Return)
+    assert controller.session.choices.amplitude_mm == 7.5
+    controller.session.update(amplitude_mm=2.0)
+    assert knob.value == 2.0
+    qtbot.mouseDClick(knob, LEFT)
+    assert controller.session.choices.amplitude_mm == 4.0
+
+
+def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
+    wait_for_take(qtbot, controller)
+    controller.player.seek(0.1)
+    qtbot.waitUntil(lambda: controller.window.string._frame is not None, timeout=5_000)
+    frame = controller.window.string._frame
+    assert frame is not None
+    assert set(frame.shapes) == {"model", "truth"}
+    for view in (controller.window.spectrum, controller.window.waveform):
+        for curve in view._curves.values():
+            qtbot.waitUntil(lambda curve=curve: curve.getData()[0] is not None, timeout=5_000)
+            assert np.isfinite(curve.getData()[1]).all()
+            assert np.ptp(curve.getData()[1]) > 0
+
+
+def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller) -> None:
+    controller.session.update(position=0.1)
+    assert "outside the trained" in controller.window.string._warning
+    controller.session.update(position=0.5, amplitude_mm=0)
+    assert "silent" in controller.window.string._warning
+    controller.session.update(amplitude_mm=5, listen=1.0)
+    assert "fixed end" in controller.window.string._warning
+    controller.session.update(listen=0.3)
+    assert controller.window.string._warning == ""
+
+
+def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: Controller) -> None:
+    qtbot.waitUntil(lambda: "without sound" in controller.window.notices.text, timeout=5_000)
+    assert len(controller.window.notices.kept) == 1
+    wait_for_take(qtbot, controller)
+    controller.pluck()
+    qtbot.waitUntil(lambda: controller.player.status().position_s > 0.1, timeout=5_000)
+
+
+def test_a_broken_preset_is_told_and_the_app_goes_on(
+    qtbot: QtBot, controller: Controller, preset_folder: Path
+) -> None:
+    wait_for_take(qtbot, controller)
+    (preset_folder / "second.safetensors").write_bytes(b"damaged")
+    controller.session.update(preset="second")
+    qtbot.waitUntil(lambda: "second.safetensors" in controller.window.notices.text, timeout=5_000)
+    controller.session.update(preset="first", position=0.45)
+    wait_for_take(qtbot, controller)
+
+
+def test_choices_are_restored(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
+    controller.session.update(position=0.61, heard="truth", volume_db=-12)
+    controller.window.resize(1190, 610)
+    geometry = controller.window.geometry_text()
+    controller.window.close()
+    settings, notice = load_settings(tmp_path / "settings.json")
+    assert notice == ""
+    assert settings.choices == controller.session.choices
+    assert settings.window_geometry == geometry
+    window = MainWindow()
+    qtbot.addWidget(window)
+    window.restore_geometry(geometry)
+    assert window.height() == 610  # the width of the screen without a screen is too small
+
+
+def test_settings_that_cannot_be_saved_do_not_hinder_closing(
+    qtbot: QtBot, preset_folder: Path, tmp_path: Path
+) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    window = MainWindow()
+    qtbot.addWidget(window)
+    made = Controller(window, Settings(choices=Choices(seconds=0.5)), blocked / "settings.json")
+    window.close()
+    assert "cannot be written" in made.window.notices.kept[-1][0]
+
+
+def test_every_control_has_a_name(controller: Controller) -> None:
+    from PySide6.QtWidgets import QAbstractButton, QComboBox
+
+    window = controller.window
+    for control in [*window.findChildren(QAbstractButton), *window.findChildren(QComboBox)]:
+        if control.focusPolicy() != Qt.FocusPolicy.NoFocus and control.isVisible():
+            assert control.accessibleName() or control.text(), control

@@ -1,0 +1,77 @@
+"""The stroboscope, and the picture of a moment."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.motion import Strobe, frame_at
+from app.rendering import Take
+from engine.pluck import Pluck
+from engine.preset import PresetInfo, TrainedRange
+from engine.string import StringParameters
+
+INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,
+                  TrainedRange(None, None, (1e-3, 1e-2)), "paper", 0)  # fmt: skip
+
+
+def sine_take(seconds: float = 1.0) -> Take:
+    """Both sources swing as one sine in time of the fundamental; the model at half the amplitude."""
+    take = Take("t", INFO, Pluck(), seconds)
+    time_s = np.arange(take.frames) / INFO.rate_hz
+    shape = np.sin(np.pi * np.linspace(0, 1, 101))
+    truth = (1e-3 * np.cos(2 * np.pi * take.fundamental_hz * time_s)[:, None] * shape).astype(np.float32)
+    take.append(truth / 2, truth)
+    return take
+
+
+def test_slow_motion_stays_within_a_period_of_the_playhead_and_moves_slowly() -> None:
+    strobe, hz = Strobe(), 247.0
+    shown = []
+    for tick in range(240):
+        strobe.advance(1 / 60, 0.004, hz)
+        position_s = 0.5 + tick / 60
+        time_s = strobe.time_s(position_s, hz)
+        assert abs(time_s - position_s) <= 1 / hz
+        shown.append((time_s * hz) % 1.0)
+    turns = np.diff(np.unwrap(2 * np.pi * np.array(shown))) / (2 * np.pi)
+    assert turns == pytest.approx(np.full(239, 0.004 * hz / 60), abs=1e-6)
+
+
+def test_real_time_shows_the_playhead_itself() -> None:
+    strobe = Strobe()
+    strobe.advance(1 / 60, 1.0, 247.0)
+    assert strobe.time_s(0.1234, 247.0) == 0.1234
+
+
+def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
+    take = sine_take()
+    frame = frame_at(take, 0.5, 0.5, 1.0)
+    expected = 1.0 * np.cos(2 * np.pi * take.fundamental_hz * 0.5)
+    assert frame.shapes["truth"][50] == pytest.approx(expected, abs=0.02)
+    assert frame.highest["truth"][50] == pytest.approx(1.0, abs=0.02)
+    assert frame.lowest["model"][50] == pytest.approx(-0.5, abs=0.02)
+    assert frame.past_horizon
+    assert not frame_at(take, 0.05, 0.05, 1.0).past_horizon
+
+
+def test_a_moment_between_frames_is_between_their_shapes() -> None:
+    take = sine_take()
+    half = take.shape_m("truth", 10.5 / INFO.rate_hz)
+    assert half == pytest.approx((take.motion_m("truth")[10] + take.motion_m("truth")[11]) / 2)
+
+
+def test_listening_at_a_grid_point_hears_that_point() -> None:
+    take = sine_take(0.01)
+    assert take.signal_m("model", 0.37) == pytest.approx(take.motion_m("model")[:, 37], abs=1e-9)
+
+
+def test_errors_of_a_take() -> None:
+    total = sine_take().error_sums().total()
+    assert total.rel_mse == pytest.approx(0.25, rel=1e-3)
+    assert total.rel_mae == pytest.approx(0.5, rel=1e-3)
+
+
+def test_an_empty_take_has_a_picture() -> None:
+    take = Take("t", INFO, Pluck(), 1.0)
+    take.append(np.zeros((1, 101), np.float32), np.zeros((1, 101), np.float32))
+    assert torch.tensor(frame_at(take, 0.0, 0.0, 1.0).shapes["model"]).eq(0).all()

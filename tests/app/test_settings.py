@@ -1,0 +1,52 @@
+"""Settings survive a round trip; a broken file is set aside."""
+
+from pathlib import Path
+
+import pytest
+
+from app.session import Choices
+from app.settings import DeviceChoice, ExportChoices, Settings, load_settings, save_settings, settings_file
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "settings.json"
+    settings = Settings(
+        choices=Choices(position=0.7, heard="truth", loop=True),
+        export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
+        device=DeviceChoice(name="Loud", host_api="ALSA"),
+        window_geometry="AdnQyw==",
+    )
+    save_settings(path, settings)
+    assert load_settings(path) == (settings, "")
+    assert [p.name for p in path.parent.iterdir()] == ["settings.json"]
+
+
+def test_a_first_start_has_defaults_and_no_notice(tmp_path: Path) -> None:
+    assert load_settings(tmp_path / "nothing.json") == (Settings(), "")
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("", "the file"),
+        ("{", "the file"),
+        ("[1]", "the file"),
+        ('{"choices": {"position": 9}}', "choices.position"),
+        ('{"colour": 1}', "colour"),
+        ('{"version": 2}', "version"),
+    ],
+)
+def test_a_broken_file_is_set_aside_and_told(tmp_path: Path, text: str, names: str) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text(text)
+    settings, notice = load_settings(path)
+    assert settings == Settings()
+    assert names in notice
+    assert "settings.broken.json" in notice
+    assert (tmp_path / "settings.broken.json").read_text() == text
+    assert load_settings(path) == (Settings(), "")
+
+
+def test_the_place_can_be_given(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(tmp_path / "x.json"))
+    assert settings_file() == tmp_path / "x.json"

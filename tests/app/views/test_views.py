@@ -1,0 +1,109 @@
+"""What the views compute, and that animated plots survive (a pair of Qt and pyqtgraph once did not)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.views.knob import KnobRange
+from app.views.spectrum_view import COLUMNS, Analyser, SpectrumView
+from app.views.string_view import StringFrame, StringView
+from app.views.waveform_view import WaveformView, extremes
+
+
+@pytest.mark.parametrize("rate_hz", [4_000, 16_000, 48_000])
+@pytest.mark.parametrize("level_db", [0.0, -40.0])
+def test_a_sine_shows_its_level_at_its_frequency(rate_hz: int, level_db: float) -> None:
+    analyser = Analyser(rate_hz)
+    time_s = np.arange(analyser.window_frames) / rate_hz
+    signal = 10 ** (level_db / 20) * np.sin(2 * np.pi * 997 * time_s)
+    found = analyser.level_db(signal.astype(np.float32))
+    assert found.max() == pytest.approx(level_db, abs=0.2)
+    assert analyser.column_hz[found.argmax()] == pytest.approx(997, rel=0.02)
+
+
+def test_silence_lies_on_the_floor() -> None:
+    assert (Analyser(16_000).level_db(np.zeros(10, np.float32)) == -130).all()
+
+
+def test_extremes_keep_every_peak() -> None:
+    signal = np.zeros(100_000, np.float32)
+    signal[12_345], signal[67_890] = 1, -1
+    places, values = extremes(signal, 1000)
+    assert len(places) == len(values) == 2000
+    assert (values.max(), values.min()) == (1, -1)
+    assert abs(places[values.argmax()] - 12_345) < 100
+
+
+def test_short_signals_are_drawn_as_they_are() -> None:
+    signal = np.arange(10, dtype=np.float32)
+    places, values = extremes(signal, 1000)
+    assert (places == values).all()
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [KnobRange(0, 20, 4, 0.25), KnobRange(0.001, 1, 0.004, 1.25, logarithmic=True), KnobRange(-60, 12, 0, 1.0)],
+)
+def test_a_knob_goes_from_end_to_end(limits: KnobRange) -> None:
+    for share in (0, 0.3, 1):
+        assert limits.share(limits.value(share)) == pytest.approx(share)
+    assert limits.value(-1) == pytest.approx(limits.low)
+    assert limits.value(2) == pytest.approx(limits.high)
+    assert limits.stepped(limits.high, 5) == limits.high
+    assert limits.stepped(limits.stepped(limits.default, 1), -1) == pytest.approx(limits.default)
+
+
+def test_the_string_view_zooms_with_the_decay(qtbot: QtBot) -> None:
+    view = StringView()
+    qtbot.addWidget(view)
+    view.resize(900, 300)
+    view.set_pluck(0.3, 4.0, np.zeros(101))
+    view.grab()
+    spans = [view._span_mm]
+    for peak_mm in (4.0, 1.5, 0.4, 0.05):
+        shape = peak_mm * np.sin(np.pi * np.linspace(0, 1, 101)).astype(np.float32)
+        both = {"model": shape, "truth": shape}
+        view.show_frame(StringFrame(both, {k: -v for k, v in both.items()}, both, "0.1 s", True))
+        view.grab()
+        spans.append(view._span_mm)
+        assert view._span_mm >= 1.15 * peak_mm
+    assert spans == sorted(spans, reverse=True)
+    assert spans[-1] < spans[0]
+
+
+def test_animated_plots_survive(qtbot: QtBot) -> None:
+    """Some pairs of PySide6 and pyqtgraph abort within seconds of this ("deallocating None")."""
+    spectrum, waveform, string = SpectrumView(), WaveformView(), StringView()
+    for view in (spectrum, waveform, string):
+        qtbot.addWidget(view)
+        view.resize(600, 240)
+        view.show()
+    spectrum.set_rate(16_000)
+    waveform.set_take(1.0, 0.25, 5.0)
+    random = np.random.default_rng(0)
+    for frame in range(300):
+        noise = {name: random.standard_normal(16_000).astype(np.float32) for name in ("model", "truth")}
+        if frame % 4 == 0:
+            spectrum.show_signals(noise)
+            waveform.show_signals(noise, 16_000)
+        waveform.show_playhead(frame / 300)
+        shapes = {name: signal[:101] for name, signal in noise.items()}
+        string.show_frame(StringFrame(shapes, shapes, shapes))
+        qtbot.wait(1)
+    assert spectrum._curves["model"].getData()[0].shape == (COLUMNS,)
+
+
+def test_a_click_on_the_waveform_asks_to_seek(qtbot: QtBot) -> None:
+    from PySide6.QtCore import Qt
+
+    view = WaveformView()
+    qtbot.addWidget(view)
+    view.resize(600, 240)
+    view.show()
+    view.set_take(2.0, 0.25, 5.0)
+    qtbot.waitExposed(view)
+    with qtbot.waitSignal(view.seek_asked) as asked:
+        qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=view.viewport().rect().center())
+    assert 0.7 < asked.args[0] < 1.3
