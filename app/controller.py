@@ -30,6 +30,7 @@ from engine.metrics import ErrorSums
 from engine.preset import outside_training
 from engine.sources import FULL_SCALE_M
 
+BUFFER_S = 0.05  # of sound ahead: room for a busy interpreter, and still a prompt pluck
 FRAME_MS = 16
 SPECTRUM_EVERY = 3  # frames of the picture: 20 spectra a second
 MM = 1000.0
@@ -93,6 +94,7 @@ class Controller(QObject):
         self._last_tick_s = time.monotonic()
         self._spectrum_place: tuple[object, int, float] | None = None
         self._asked_rate_hz = 0
+        self._audio_notice = ""
         self.entries, problems = list_presets()
         self._connect()
         self._choose_first_preset()
@@ -268,7 +270,7 @@ class Controller(QObject):
         if new_preset:
             self.window.spectrum.set_rate(info.rate_hz)
         peak_mm = max(1e-3, float(np.abs(take.signal_m("truth", self.session.choices.listen)).max()) * MM)
-        self.window.waveform.set_take(take.seconds, info.horizon_s, max(peak_mm, take.pluck.amplitude_mm))
+        self.window.waveform.set_take(take.seconds, info.horizon_s, 1.25 * peak_mm)
         self.window.error_label.setText("rendering …")
         if self._load(track, keep_position=False) and self._stage.play_when_ready:
             self._begin()
@@ -325,6 +327,9 @@ class Controller(QObject):
         window = self.window
         window.transport.show_playing(status.playing)
         window.transport.meter.show_level(status.peak_db, status.limiting)
+        if status.device is not None and self._audio_notice:
+            window.notices.withdraw(self._audio_notice)  # the sound is back
+            self._audio_notice = ""
         if status.rate_hz != self._asked_rate_hz:
             self._render()
         take = self._stage.take
@@ -375,10 +380,11 @@ class Controller(QObject):
 
     def _open_device(self) -> None:
         chosen = self._settings.device
-        self.player.open(AudioDevice(chosen.name, chosen.host_api) if chosen else None)
+        self.player.open(AudioDevice(chosen.name, chosen.host_api) if chosen else None, BUFFER_S)
 
     def _tell_audio_problem(self, problem: AudioProblem) -> None:
-        self.window.notices.tell(f"{problem} The app goes on without sound.", problem.detail)
+        self._audio_notice = f"{problem} The app goes on without sound."
+        self.window.notices.tell(self._audio_notice, problem.detail)
 
     def _fill_audio_menu(self) -> None:
         menu = self.window.audio_menu

@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import math
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -31,6 +32,7 @@ from app.audio.stream import BUFFER_S, OutputStream
 from app.audio.timeline import Timeline
 from app.audio.track import Track
 
+TRY_AGAIN_S = 2.0  # between two looks for a device that vanished
 DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
 
 _WAIT_S = 0.05  # the longest time that the feeder looks at neither its commands nor the device's pulse
@@ -111,6 +113,8 @@ class Player:
         self._timeline = Timeline(0)
         self._problem: str | None = None
         self._track: Track | None = None  # the caller's latest, to refuse a wrong `select` on the spot
+        self._lost: AudioDevice | None = None  # vanished while it was ours: tried again now and then
+        self._try_again_s = 0.0
         self._commands: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._closing = threading.Event()
         self._status = PlayerStatus(rate_hz=rate_hz)
@@ -194,6 +198,7 @@ class Player:
                     self._write_block()
                 elif self._output.lost():
                     self._go_silent()
+                self._look_for_the_lost()
                 self._publish()
         except Exception:
             self._report(
@@ -234,6 +239,7 @@ class Player:
     def _change_output(self, wanted: AudioDevice | None, buffer_s: float) -> None:
         present = self._output.device
         was_playing = self._mixer.status().playing
+        self._lost = None
         self._fade_to_silence()  # opening takes a while, in which nobody feeds the present device
         try:
             # PortAudio may only look for new devices while none is open.
@@ -260,7 +266,20 @@ class Player:
         """The device has vanished: the pictures move on without sound."""
         device = self._output.device
         self._adopt_output(SilentOutput(self._output.rate_hz, self._output.block_frames))
+        self._lost, self._try_again_s = device, time.monotonic() + TRY_AGAIN_S
         self._report(vanished("" if device is None else device.name).problem)
+
+    def _look_for_the_lost(self) -> None:
+        """A device that vanished is taken again when it is back; until then nothing more is said of it."""
+        if self._lost is None or time.monotonic() < self._try_again_s:
+            return
+        try:
+            output = self._open_output(self._look_up(self._lost, True), self._buffer_s)
+        except AudioUnavailable:
+            self._try_again_s = time.monotonic() + TRY_AGAIN_S
+            return
+        self._adopt_output(output)
+        self._lost, self._problem = None, None
 
     def _adopt_output(self, output: Output) -> None:
         old, self._output = self._output, output

@@ -21,7 +21,7 @@ from app.audio.problems import refused
 
 BLOCK_FRAMES = 256
 BUFFER_S = 0.025  # of ready sound: outlasts a busy moment of Python, and delays a command by as much
-LOST_AFTER_S = 0.8
+LOST_AFTER_S = 1.5
 SETTLING_S = 0.1
 START_GRACE_S = 3.0  # some sound servers let a new stream stand still for a second or two
 

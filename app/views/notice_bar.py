@@ -49,6 +49,11 @@ class NoticeBar(QFrame):
         self._label.setText(message)
         self.show()
 
+    def withdraw(self, message: str) -> None:
+        """Takes a notice down that is no longer true; it can still be recalled."""
+        if self.text == message:
+            self.hide()
+
     def show_all(self) -> None:
         """The notices of this run in a dialog, with what the system said, to copy."""
         text = "\n\n".join(message + (f"\n{details}" if details else "") for message, details in reversed(self._kept))

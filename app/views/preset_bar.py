@@ -80,6 +80,11 @@ class PresetBar(QWidget):
             f"Rate {info.rate_hz} Hz, trained on {info.horizon_steps} samples ({info.horizon_s:g} s), "
             f"{info.initial} initial displacements",
         ]
+        audible = info.string.modes_below(info.rate_hz / 2)
+        if audible < info.modes:
+            lines.append(
+                f"Modes {audible + 1} … {info.modes} lie above half the rate: they sound folded back, in model and truth"
+            )
         if info.rel_mse is not None and info.rel_mae is not None:
             lines.append(f"Validation error: relative MSE {info.rel_mse:.4f}, relative MAE {info.rel_mae:.4f}")
         lines.append(f"Licence {info.licence}; file {entry.path.name}")

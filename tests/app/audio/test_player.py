@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Mixer, Player, ProblemKind, Track
+from app.audio import player as player_module
 from app.audio import stream as stream_module
 from app.audio.problems import no_device
 from app.audio.stream import OutputStream
@@ -251,6 +252,18 @@ def test_a_device_that_vanishes_is_reported_once_and_the_clock_goes_on(
     wait_until(lambda: bench.player.status().position_s > position_s + 0.1)
     assert len(bench.problems) == 1
     assert raw.calls == ["start", "abort", "close"]
+
+
+def test_a_device_that_comes_back_is_taken_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(player_module, "TRY_AGAIN_S", 0.05)
+    bench.add("Headphones")
+    raw = bench.open(None)
+    raw.active = False
+    wait_until(lambda: bench.player.status().device is None)
+    assert bench.player.status().problem is not None
+    wait_until(lambda: bench.player.status().device is not None)
+    assert bench.player.status().problem is None
+    assert len(bench.problems) == 1
 
 
 def test_a_fault_in_the_feeder_is_reported(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
