@@ -83,7 +83,7 @@ class PresetBar(QWidget):
         audible = info.string.modes_below(info.rate_hz / 2)
         if audible < info.modes:
             lines.append(
-                f"Modes {audible + 1} … {info.modes} lie above half the rate and sound folded back, in model and truth"
+                f"Modes {audible + 1} … {info.modes} lie above half the rate: folded back in model and truth"
             )
         if info.rel_mse is not None and info.rel_mae is not None:
             lines.append(f"Validation error: relative MSE {info.rel_mse:.4f}, relative MAE {info.rel_mae:.4f}")
