@@ -59,11 +59,11 @@ def simulate(
             f"a grid of {points} points holds 1 … {points - 2} modes, not {modes}", param_hint="--modes"
         )
     arrays.check_result_size(len(initial), steps + 1, points)
-    if (peak_m := float(initial.abs().max())) > arrays.IMPLAUSIBLE_PEAK_M:
-        say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
     solve = _fast if solver == "fast" else _dop853
     with progress("simulate") as report:
         arrays.write_motion(out, initial, steps, solve(string == "nonlinear", rate, modes, steps, substeps), report)
+    if (peak_m := float(initial.abs().max())) > arrays.IMPLAUSIBLE_PEAK_M:
+        say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
 
 
 def predict(preset: arguments.PresetName, u0: InputFile, out: OutputFile, steps: Steps) -> None:

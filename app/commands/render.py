@@ -51,10 +51,10 @@ def render(
             f"must hold a sample of {loaded.info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
         )
     request = SoundRequest(loaded, pluck, listen, seconds, source)
-    for note in _notes(request):
-        say(note)
     with progress("render") as report:
         written = export_sound(request, out, WavSettings(bits, rate, normalise), progress=report)
+    for note in _notes(request):  # after the work: a failure is told in one line, alone
+        say(note)
     if written.peak_db < SILENT_DB:
         say("note: the file is silent; amplitude 0, or the string does not move at the listening point")
     print(_summary(written, bits))
