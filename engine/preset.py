@@ -19,7 +19,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from engine.models import MODELS, StringModel, count_parameters
+from engine.models import MODELS, StringModel, build_model, count_parameters
 from engine.pluck import Pluck
 from engine.schema import SchemaError, read, write
 from engine.string import StringParameters
@@ -280,11 +280,9 @@ def _info_of(path: Path, file: Any) -> PresetInfo:
 
 def _empty_model(path: Path, info: PresetInfo) -> StringModel[Any]:
     """The model without memory behind it, so that absurd sizes in the metadata cost nothing."""
-    kind, configuration_kind = MODELS[info.model]
-    configuration: Any = read(configuration_kind, info.model_configuration, "metadata.model_configuration")
     try:
         with torch.device("meta"):
-            model = kind(configuration)
+            model = build_model(info.model, info.model_configuration)
     except (RuntimeError, OverflowError, MemoryError) as error:
         raise PresetError(f"{path}: metadata.model_configuration asks for an impossible model ({error})") from error
     if model.grid_points != info.grid_points:

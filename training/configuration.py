@@ -42,7 +42,7 @@ class Recipe:
 
     epochs: int  # passes over the training set
     seed: int = 0
-    initialisation: str = "paper"  # the model's own list
+    initialisation: str = ""  # one of the model's `initialisations`; empty: the first, its source's own
     batch_size: int = 50
     peak_learning_rate: float = 3e-3
     warm_up: float = 0.1  # share of the run until the peak; then a cosine down to zero

@@ -17,15 +17,15 @@ import torch
 from torch import Tensor
 
 from engine.metrics import RelativeError
-from engine.models import MODELS, KoopmanVar
+from engine.models import StringModel, build_model
 from engine.models.base import Physics
-from engine.schema import read, write
+from engine.schema import write
 from engine.sine_transform import synthesis_matrix
 from training.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.configuration import Recipe, TrainingConfiguration
 from training.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.losses import koopman_terms
+from training.losses import loss_terms
 
 CHECKPOINT_EVERY_S = 45.0
 
@@ -52,7 +52,7 @@ class Progress:
 class FitResult:
     """The model of the best validation MAE, and what it took."""
 
-    model: KoopmanVar
+    model: StringModel[Any]
     validation: RelativeError
     best_epoch: int
     seconds: float
@@ -74,7 +74,7 @@ def fit(
     """
     recipe = configuration.recipe
     data = _TrainingData(dataset, torch.device(device))
-    model = new_model(configuration).to(device)
+    model = new_model(configuration, dataset.scale_m).to(device)
     optimiser = torch.optim.AdamW(
         [
             {"params": [p for n, p in model.named_parameters() if not _is_eigenvalue(n)], "share": 1.0},
@@ -108,13 +108,14 @@ def fit(
     first_epoch = epoch
     while epoch < recipe.epochs:
         total = 0.0
+        model.train()
         for batch, rows in enumerate(_batches(recipe, data.count, epoch)):
             iteration = epoch * batches + batch
             horizon = horizon_at(recipe, iteration / (recipe.epochs * batches), dataset.configuration.steps)
             for group in optimiser.param_groups:
                 group["lr"] = learning_rate_at(recipe, iteration / (recipe.epochs * batches)) * group["share"]
             initial, frames, target = data.draw(recipe, rows, horizon, iteration)
-            terms = koopman_terms(model, initial, frames, target)
+            terms = loss_terms(model, initial, frames, target)
             weights = (recipe.prediction_weight, recipe.encoding_weight, recipe.consistency_weight)
             loss = torch.stack([w * term for w, term in zip(weights, terms, strict=True)]).sum()
             optimiser.zero_grad(set_to_none=True)
@@ -159,15 +160,13 @@ def fit(
     return FitResult(model.eval(), best, best_epoch, earlier_s + time.monotonic() - started)
 
 
-def new_model(configuration: TrainingConfiguration) -> KoopmanVar:
-    """The untrained model of a run, initialised from its seed."""
-    kind, configuration_kind = MODELS[configuration.model]
-    model = kind(read(configuration_kind, configuration.model_configuration, "model_configuration"))
-    assert isinstance(model, KoopmanVar)
+def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringModel[Any]:
+    """The untrained model of a run, initialised from its seed; `scale_m` is its data set's."""
     data = configuration.data
+    model = build_model(configuration.model, configuration.model_configuration)
     model.initialise(
-        configuration.recipe.initialisation,
-        Physics(data.string, data.modes, data.rate_hz),
+        configuration.recipe.initialisation or model.initialisations[0],
+        Physics(data.string, data.modes, data.rate_hz, scale_m, data.tension_modulated),
         torch.Generator().manual_seed(configuration.recipe.seed),
     )
     return model

@@ -100,7 +100,7 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         horizon_steps=data.steps,
         scale_m=dataset.scale_m,
         trained_range=trained_range(data.initial),
-        initialisation=recipe.initialisation,
+        initialisation=recipe.initialisation or result.model.initialisations[0],
         seed=recipe.seed,
         rel_mse=validation.rel_mse,
         rel_mae=validation.rel_mae,

@@ -2,14 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from engine.models.base import StringModel, count_parameters
+from engine.models.dmd import DMD, DMDConfiguration
+from engine.models.fno import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
+from engine.models.integrated_phase import IntegratedPhaseConfiguration, KoopmanIntegrated
+from engine.models.koopman import Koopman, KoopmanConfiguration
 from engine.models.koopman_var import KoopmanVar, KoopmanVarConfiguration
+from engine.models.lru import LRU, LRUConfiguration
+from engine.models.s5 import S5, S5Configuration
+from engine.schema import read
 
 # name in presets and on the command line -> (class, configuration, whose defaults are the paper's sizes)
 MODELS: dict[str, tuple[type[StringModel[Any]], type]] = {
+    "dmd": (DMD, DMDConfiguration),
+    "koopman": (Koopman, KoopmanConfiguration),
     "koopman_var": (KoopmanVar, KoopmanVarConfiguration),
+    "koopman_integrated": (KoopmanIntegrated, IntegratedPhaseConfiguration),
+    "fgru": (FGRU, FGRUConfiguration),
+    "frnn": (FRNN, FRNNConfiguration),
+    "lru": (LRU, LRUConfiguration),
+    "s5": (S5, S5Configuration),
 }
 
-__all__ = ["MODELS", "KoopmanVar", "KoopmanVarConfiguration", "StringModel", "count_parameters"]
+
+def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> StringModel[Any]:
+    """The model of a name with its weights not yet set; `configuration` as plain data, None or {} the paper's sizes.
+
+    Raises:
+        SchemaError: a field is unknown, of another type, or refused by the configuration.
+        KeyError: no such model.
+    """
+    kind, sizes = MODELS[name]
+    return kind(read(sizes, configuration or {}, "model_configuration"))
+
+
+__all__ = [
+    "DMD",
+    "FGRU",
+    "FRNN",
+    "LRU",
+    "MODELS",
+    "S5",
+    "DMDConfiguration",
+    "FGRUConfiguration",
+    "FRNNConfiguration",
+    "IntegratedPhaseConfiguration",
+    "Koopman",
+    "KoopmanConfiguration",
+    "KoopmanIntegrated",
+    "KoopmanVar",
+    "KoopmanVarConfiguration",
+    "LRUConfiguration",
+    "S5Configuration",
+    "StringModel",
+    "build_model",
+    "count_parameters",
+]

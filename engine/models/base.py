@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -25,17 +25,25 @@ State = TypeVar("State")
 
 @dataclass(frozen=True)
 class Physics:
-    """What an initialisation may know of the string that a model shall learn."""
+    """What an initialisation may know of the string that a model shall learn.
+
+    Attributes:
+        scale_m: the model's unit of displacement.
+        tension_modulated: whether the string is the non-linear one.
+    """
 
     string: StringParameters
     modes: int
     rate_hz: float
+    scale_m: float = 1.0
+    tension_modulated: bool = True
 
 
 class StringModel(nn.Module, ABC, Generic[State]):
     """A learned map from an initial displacement to the motion that follows."""
 
     grid_points: int
+    configuration: Any  # the frozen dataclass that it was built from
     initialisations: ClassVar[tuple[str, ...]]  # the first is the source's own
 
     @abstractmethod
@@ -47,8 +55,8 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
 
     @abstractmethod
-    def encode(self, displacement: Tensor) -> State:
-        """The state at frame 0 for displacements (batch, grid_points)."""
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> State:
+        """The state at frame 0 for displacements (batch, grid_points); `second` as in `engine.models.inputs`."""
 
     @abstractmethod
     def advance(self, state: State, steps: int, readout: Tensor | None = None) -> tuple[Tensor, State]:

@@ -4,25 +4,43 @@ Source: the paper, §3.1 and Fig. 1. With z₀ = encoder(u₀) ∈ ℂⁿ and λ
 
     z_k = λᵏ z₀,    û_k = decoder(m(|z_k|²) ⊙ z_k),
 
-where the multiplier m: ℝⁿ → ℂⁿ is an MLP on the squared radii. z_k needs no recursion: any frame can be had in
-any order, and the radii decay without oscillating.
+where the multiplier m: ℝⁿ → ℂⁿ is an MLP on the squared radii.
+
+The radii decay without oscillating, so m changes slowly in time, and a long render computes it at few frames and
+interpolates. Not on an even grid: SELU bends at 0, and each unit that crosses 0 leaves a bend in m at a time that
+cannot be known before. Intervals are therefore halved until a line through their ends passes the middle closely.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
-from engine.models.base import Physics, StringModel, check_initialisation
-from engine.models.eigenvalues import pack, unpack
+from engine.models._diagonal import (
+    SEGMENT,
+    DiagonalModel,
+    KoopmanState,
+    check_sizes,
+    dense,
+    dense_layers,
+    energy,
+    initialise_orthogonal,
+    linear_string_eigenvalues,
+    perceptron,
+    read_layer,
+    store_eigenvalues,
+    store_ring,
+)
+from engine.models.base import Physics, check_initialisation
+from engine.models.eigenvalues import pack
+from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import analysis_matrix, synthesis_matrix
 
-FRAMES_AT_ONCE = 2048  # bounds the memory of a long advance; the result does not depend on it
+SHORT = 512  # frames of a block of which every multiplier is computed: to look for fewer takes as long
 
 
 @dataclass(frozen=True)
@@ -32,34 +50,26 @@ class KoopmanVarConfiguration:
     Attributes:
         state_size: number n of complex eigenvalues.
         multiplier_widths: hidden widths of the multiplier's MLP.
+        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
     state_size: int = 128
     multiplier_widths: tuple[int, ...] = (128, 128, 128)
+    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
-        for name in ("grid_points", "state_size"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        if any(width < 1 for width in self.multiplier_widths):
-            raise ValueError(f"multiplier_widths must be at least 1, not {self.multiplier_widths}")
+        check_sizes(self, "grid_points", "state_size", "multiplier_widths")
 
 
-@dataclass(frozen=True)
-class KoopmanState:
-    """The encoded initial displacement and the frame reached.
+class KoopmanVar(DiagonalModel):
+    """See the module.
 
-    Keeping z₀ with an integer step, instead of z_k, is what keeps phases exact after millions of samples and
-    every splitting into blocks identical.
+    Attributes:
+        multiplier_tolerance: a setting of rendering, no part of a preset: how far an interpolated multiplier may
+            lie from the computed one, at the middle of its interval, as a share of the latents' norm there. 0
+            computes every frame, as training does. The default leaves the displacement within 1e-5 of its peak.
     """
-
-    origin: Tensor  # complex (batch, state_size)
-    step: int
-
-
-class KoopmanVar(StringModel[KoopmanState]):
-    """See the module."""
 
     initialisations: ClassVar = ("paper", "physics")
 
@@ -67,41 +77,78 @@ class KoopmanVar(StringModel[KoopmanState]):
         super().__init__()
         self.configuration = configuration
         self.grid_points = configuration.grid_points
+        self.multiplier_tolerance = 1e-5
         n = configuration.state_size
-        self.encoder = nn.Linear(configuration.grid_points, 2 * n)
+        self.encoder = nn.Linear(input_size(configuration.input, configuration.grid_points), 2 * n)
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
-        widths = (n, *configuration.multiplier_widths, 2 * n)
-        layers: list[nn.Module] = []
-        for wide_in, wide_out in pairwise(widths):
-            layers += [nn.Linear(wide_in, wide_out), nn.SELU()]
-        self.multiplier = nn.Sequential(*layers[:-1])
+        self.multiplier = perceptron(n, *configuration.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, configuration.grid_points)
 
-    def encode(self, displacement: Tensor) -> KoopmanState:
-        return KoopmanState(pack(self.encoder(displacement)), 0)
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanState:
+        return KoopmanState(pack(self.encoder(join_input(self.configuration.input, displacement, second))), 0)
 
-    def advance(self, state: KoopmanState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, KoopmanState]:
-        blocks = []
-        for done in range(0, steps, FRAMES_AT_ONCE):
-            count = min(FRAMES_AT_ONCE, steps - done)
-            powers = eigenvalues.successive_powers(self.nu_log, self.theta_log, state.step + 1 + done, count)
-            blocks.append(self.decode(state.origin[:, None] * powers.to(state.origin.dtype), readout))
-        return torch.cat(blocks, dim=1), KoopmanState(state.origin, state.step + steps)
-
-    def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
-        """z_k = λᵏ z₀ of any frames (int64, any order), complex (batch, frames, state_size)."""
-        powers = eigenvalues.powers(self.nu_log, self.theta_log, frames)
-        return origin[:, None] * powers.to(origin.dtype)
+    def powers(self, frames: Tensor) -> Tensor:
+        return eigenvalues.powers(self.nu_log, self.theta_log, frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
-        """Displacement (..., points) of latents (..., state_size)."""
-        radii = latents.real.square() + latents.imag.square()
-        modulated = unpack(latents * pack(self.multiplier(radii)))
-        if readout is None:
-            return self.decoder(modulated)
-        readout = readout.to(modulated)
-        return modulated @ (self.decoder.weight.T @ readout) + self.decoder.bias @ readout
+        return dense(latents * self._multipliers(latents), *read_layer(self.decoder, readout))
+
+    def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
+        if self.training or self.multiplier_tolerance == 0 or count <= SHORT:
+            return self.decode(self.successive_latents(origin, first, count), readout)
+        start, stop = first // SEGMENT * SEGMENT, -(-(first + count) // SEGMENT) * SEGMENT
+        frames = self._render_interpolated(origin, start, stop, readout)
+        return frames[:, first - start : first - start + count]
+
+    def _multipliers(self, latents: Tensor) -> Tensor:
+        """m(|z|²), complex (..., state_size)."""
+        return pack(self.multiplier(latents.real.square() + latents.imag.square()))
+
+    def _render_interpolated(self, origin: Tensor, start: int, stop: int, readout: Tensor | None) -> Tensor:
+        """Frames start … stop - 1, both multiples of SEGMENT, with the multiplier linear between nodes.
+
+        Nodes are halvings of [start, stop] in absolute frame numbers, so that it hardly matters to a frame (within
+        the tolerance) in which block it is rendered. Within an interval the decoder is turned by λʲ instead of the
+        latents: for all intervals of one width that is a single matrix product.
+        """
+        weight, bias = read_layer(self.decoder, readout)
+        out = weight.new_empty(len(origin), stop - start, len(bias))
+        turn = self.powers(torch.arange(SEGMENT, device=origin.device)).to(origin.dtype)
+        # Re(w̄ λʲ z) = Re(conj(w λ̄ʲ) z): (SEGMENT, points, state_size)
+        turned = torch.view_as_real(pack(weight) * turn.conj()[:, None]).flatten(-2)
+
+        def fill(left: Tensor, width: int, z: Tensor, m_left: Tensor, m_right: Tensor) -> None:
+            ends = torch.view_as_real(torch.stack([z * m_left, z * m_right])).flatten(-2)
+            at_ends = (ends @ turned[:width].flatten(0, 1).T).unflatten(-1, (width, len(bias)))
+            offset = torch.arange(width, device=left.device)
+            share = (offset / width).to(weight.dtype)[:, None]
+            out[:, (left[:, None] - start + offset).flatten()] = (
+                torch.lerp(at_ends[0], at_ends[1], share).flatten(1, 2) + bias
+            )
+
+        width = SEGMENT
+        left = torch.arange(start, stop + 1, width, device=origin.device)
+        z = self.coarse_latents(origin, left)
+        m = self._multipliers(z)
+        left, z, m_left, m_right = left[:-1], z[:, :-1], m[:, :-1], m[:, 1:]
+        while width > 1 and len(left):
+            width //= 2
+            middle, z_middle = left + width, z * turn[width]
+            m_middle = self._multipliers(z_middle)
+            bend = z_middle * (m_middle - 0.5 * (m_left + m_right))
+            bent = (energy(bend) > self.multiplier_tolerance**2 * energy(z_middle * m_middle)).any(0)
+            done, todo = (~bent).nonzero()[:, 0], bent.nonzero()[:, 0]
+            fill(left[done], width, z[:, done], m_left[:, done], m_middle[:, done])
+            fill(middle[done], width, z_middle[:, done], m_middle[:, done], m_right[:, done])
+            left = torch.cat([left[todo], middle[todo]])
+            z = torch.cat([z[:, todo], z_middle[:, todo]], dim=1)
+            m_left, m_right = (
+                torch.cat([m_left[:, todo], m_middle[:, todo]], dim=1),
+                torch.cat([m_middle[:, todo], m_right[:, todo]], dim=1),
+            )
+        fill(left, width, z, m_left, m_right)
+        return out
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
@@ -113,40 +160,42 @@ class KoopmanVar(StringModel[KoopmanState]):
         """
         check_initialisation(self, how)
         with torch.no_grad():
-            for layer in self.multiplier:
-                if isinstance(layer, nn.Linear):
-                    std = layer.in_features**-0.5
-                    nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
-                    nn.init.zeros_(layer.bias)
-            for layer in (self.encoder, self.decoder):
-                nn.init.orthogonal_(layer.weight, generator=generator)
+            for layer in dense_layers(self.multiplier):
+                std = layer.in_features**-0.5
+                nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
                 nn.init.zeros_(layer.bias)
+            for layer in (self.encoder, self.decoder):
+                initialise_orthogonal(layer, generator)
             if how == "paper":
-                for stored, drawn in zip(
-                    (self.nu_log, self.theta_log),
-                    eigenvalues.draw_ring(self.configuration.state_size, generator),
-                    strict=True,
-                ):
-                    stored.copy_(drawn)
+                store_ring(self.nu_log, self.theta_log, generator)
             else:
                 self._initialise_linear_string(physics, generator)
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
-        if n < modes:
-            raise ValueError(f"initialisation 'physics' needs a state_size of at least the {modes} modes, not {n}")
-        mode = torch.arange(n) % modes
-        linear = physics.string.eigenvalues(modes)[mode] / physics.rate_hz
-        stretch = 3.0 ** (2 * torch.rand(n, generator=generator, dtype=torch.float64) - 1)
-        stretch[:modes] = 1
-        self.nu_log.copy_(torch.log(-linear.real * stretch))
-        self.theta_log.copy_(linear.imag.log())
-        self.encoder.weight.zero_()
-        self.encoder.weight[:n] = analysis_matrix(points, modes).T[mode].float()
+        log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
+        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        analysis = analysis_matrix(points, modes).T[torch.arange(n) % modes]
+        self.encoder.weight.copy_(torch.cat(_release(self.configuration.input, analysis, log_eigenvalues)))
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
-        self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T.float()
-        last = self.multiplier[-1]
-        assert isinstance(last, nn.Linear)
+        self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T
+        last = dense_layers(self.multiplier)[-1]
         last.weight.mul_(0.01)
         last.bias[:n] = 1
+
+
+def _release(kind: InputKind, analysis: Tensor, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor]:
+    """Real and imaginary rows, (n, inputs) each, of an encoder whose latents move as Re(λᵏ z₀) = the mode's q_k.
+
+    z₀ = q₀ + ib, where b follows from q̇₀ = Re(log λ · z₀), or from q₋₁ = Re(z₀ / λ). From the displacement alone
+    b = 0: with the damping of a string that is a string at rest, to about σ/ω.
+    """
+    none = torch.zeros_like(analysis)
+    if kind == "displacement":
+        return analysis, none
+    nu, theta = -log_eigenvalues.real[:, None], log_eigenvalues.imag[:, None]
+    real = torch.cat([analysis, none], dim=1)
+    if kind == "displacement_velocity":
+        return real, torch.cat([-nu / theta * analysis, -analysis / theta], dim=1)
+    return real, torch.cat([-analysis / theta.tan(), torch.exp(-nu) / theta.sin() * analysis], dim=1)

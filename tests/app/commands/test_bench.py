@@ -37,5 +37,5 @@ def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("app.bench.train.BATCH", 2)
     monkeypatch.setattr("app.bench.train.FRAMES", 5)
     (case, *_) = json.loads(run("bench", "train", "--json").out)["models"]
-    assert (case["model"], case["batch"], case["frames"]) == ("koopman_var", 2, 5)
+    assert (case["model"], case["batch"], case["frames"]) == ("koopman", 2, 5)
     assert case["step_s"] > 0

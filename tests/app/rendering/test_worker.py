@@ -17,6 +17,7 @@ from app.export import SoundRequest, render_sound
 from app.rendering import RenderRequest, RenderWorker, Take
 from engine.metrics import ErrorSums
 from engine.models import KoopmanVar
+from engine.models.koopman_var import KoopmanState
 from engine.pluck import Pluck
 from engine.preset import load_preset
 
@@ -136,13 +137,15 @@ def test_a_broken_preset_is_told_and_the_worker_lives_on(
 def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
     small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    decode = KoopmanVar.decode
+    advance = KoopmanVar.advance
 
-    def faulty(self: KoopmanVar, latents: torch.Tensor, readout: torch.Tensor | None = None) -> torch.Tensor:
-        frames = decode(self, latents, readout)
-        return frames * float("nan") if frames.shape[1] > 300 else frames
+    def faulty(
+        self: KoopmanVar, state: KoopmanState, steps: int, readout: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, KoopmanState]:
+        frames, after = advance(self, state, steps, readout)
+        return (frames * float("nan") if state.step >= 256 else frames), after
 
-    monkeypatch.setattr(KoopmanVar, "decode", faulty)
+    monkeypatch.setattr(KoopmanVar, "advance", faulty)
     worker.submit(request_of(small_preset))
     wait_until(lambda: bool(heard.finished))
     take, track = heard.started[0]

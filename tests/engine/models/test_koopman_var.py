@@ -8,7 +8,8 @@ import torch
 
 from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters, eigenvalues
 from engine.models.base import Physics
-from engine.reference import ModalState, solve_linear
+from engine.models.inputs import InputKind
+from engine.reference import ModalState, SplittingSolver, solve_linear
 from engine.sine_transform import listening_weights, to_grid
 from engine.string import StringParameters
 
@@ -70,6 +71,41 @@ def test_any_splitting_into_blocks_is_the_same_motion() -> None:
         part, state = model.advance(state, steps)
         parts.append(part)
     torch.testing.assert_close(torch.cat(parts, 1), whole, rtol=0, atol=1e-5 * float(whole.abs().max()))
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("readout", [None, listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)])
+@pytest.mark.parametrize("how", ["paper", "physics"])
+def test_interpolated_multipliers_are_close_to_those_of_every_frame(how: str, readout: torch.Tensor | None) -> None:
+    model = small_model(how=how)
+    initial = 3 * torch.randn(2, 101, generator=torch.Generator().manual_seed(1))
+    interpolated = model(initial, 5000, readout)
+    model.multiplier_tolerance = 0.0
+    exact = model(initial, 5000, readout)
+    assert not torch.equal(interpolated, exact)
+    torch.testing.assert_close(interpolated, exact, rtol=0, atol=1e-5 * float(exact.abs().max()))
+    model.multiplier_tolerance = 1e-5
+    model.train()  # training has no tolerance
+    torch.testing.assert_close(model(initial, 5000, readout), exact, rtol=0, atol=0)
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("kind", ["displacement_velocity", "two_frames"])
+def test_physics_initialisation_knows_how_the_string_moves(kind: InputKind) -> None:
+    """A start in the middle of the linear motion; the multiplier is held at 1."""
+    string, modes, rate_hz = StringParameters(), 10, 8_000
+    model = KoopmanVar(KoopmanVarConfiguration(101, 12, (4,), kind))
+    model.initialise("physics", Physics(string, modes, rate_hz), torch.Generator().manual_seed(0))
+    model.multiplier[-1].weight.zero_()
+    model.decoder.weight[:, modes:] = 0
+    amplitudes = torch.randn(1, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
+    solver = SplittingSolver(string, modes, rate_hz, tension_modulated=False)
+    frames, state = solver.advance(ModalState.at_rest(amplitudes), 30)
+    second = state.velocity / rate_hz if kind == "displacement_velocity" else frames[:, -2]
+    start = model.encode(to_grid(frames[:, -1], 101).float(), to_grid(second, 101).float())
+    truth = to_grid(solver.advance(state, 400)[0], 101).float()
+    found, _ = model.eval().advance(start, 400)
+    assert float((found - truth).norm() / truth.norm()) < 1e-5
 
 
 @torch.no_grad()

@@ -1,0 +1,149 @@
+"""What the models with diagonal linear dynamics share: z_k = λᵏ z₀, frames decoded from z_k alone.
+
+Any frame can be had in any order. A state keeps z₀ with an integer step instead of z_k: that is what keeps phases
+exact after millions of samples and every splitting into blocks the same motion.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+from engine.models import eigenvalues
+from engine.models.base import Physics, StringModel
+
+FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
+SEGMENT = 64  # frames of the fine table of powers
+
+
+@dataclass(frozen=True)
+class KoopmanState:
+    """The encoded initial displacement and the frame reached."""
+
+    origin: Tensor  # complex (batch, state_size)
+    step: int
+
+
+class DiagonalModel(StringModel[KoopmanState]):
+    """Advances by powers of the eigenvalues; a subclass encodes, decodes and says what its eigenvalues are."""
+
+    @abstractmethod
+    def powers(self, frames: Tensor) -> Tensor:
+        """λᵏ for k in `frames` (frames,): complex128 (frames, state_size)."""
+
+    @abstractmethod
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+        """Displacement (..., points) of latents (..., state_size)."""
+
+    @abstractmethod
+    def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
+        """Displacement (batch, count, points) of frames first … first + count - 1."""
+
+    def advance(self, state: KoopmanState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, KoopmanState]:
+        blocks = [
+            self.render(state.origin, state.step + 1 + done, min(FRAMES_AT_ONCE, steps - done), readout)
+            for done in range(0, steps, FRAMES_AT_ONCE)
+        ]
+        return torch.cat(blocks, dim=1), KoopmanState(state.origin, state.step + steps)
+
+    def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
+        """z_k = λᵏ z₀ of any frames (int64, any order), complex (batch, frames, state_size)."""
+        return origin[:, None] * self.powers(frames).to(origin.dtype)
+
+    def successive_latents(self, origin: Tensor, first: int, count: int) -> Tensor:
+        """z_k of k = first … first + count - 1, complex (batch, count, state_size).
+
+        As products of a coarse table, exact in float64 before it is rounded, and a fine one: one product a frame
+        instead of a sine and a cosine.
+        """
+        coarse = self.coarse_latents(origin, torch.arange(first, first + count, SEGMENT, device=origin.device))
+        fine = self.powers(torch.arange(min(SEGMENT, count), device=origin.device)).to(origin.dtype)
+        return (coarse[:, :, None] * fine).flatten(1, 2)[:, :count]
+
+    def coarse_latents(self, origin: Tensor, frames: Tensor) -> Tensor:
+        """As `latents`, with the product in float64."""
+        return (origin[:, None] * self.powers(frames)).to(origin.dtype)
+
+
+def energy(latents: Tensor) -> Tensor:
+    """Σ|z|² of latents (..., n): real (...)."""
+    return torch.view_as_real(latents).flatten(-2).square().sum(-1)
+
+
+def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
+    """A dense layer on complex latents (..., n), whose `weight` (out, 2n) has the real parts first.
+
+    The weight's columns are interleaved to match the memory of complex numbers, which costs less than to split
+    every latent.
+    """
+    real, imaginary = weight.chunk(2, dim=-1)
+    interleaved = torch.stack([real, imaginary], dim=-1).flatten(-2)
+    return nn.functional.linear(torch.view_as_real(latents).flatten(-2), interleaved, bias)
+
+
+def read_layer(layer: nn.Linear, readout: Tensor | None) -> tuple[Tensor, Tensor]:
+    """Weight and bias of a last layer followed by `readout` (grid_points, points), as one layer."""
+    if readout is None:
+        return layer.weight, layer.bias
+    readout = readout.to(layer.weight)
+    return readout.T @ layer.weight, layer.bias @ readout
+
+
+def linear_string_eigenvalues(size: int, physics: Physics, generator: torch.Generator) -> Tensor:
+    """log λ, complex128 (size,), of the linear string's modes, repeated in order until `size` are there.
+
+    The repetitions have decay rates up to three times lower or higher, so that no two latents are the same.
+
+    Raises:
+        ValueError: fewer than one for each mode.
+    """
+    modes = physics.modes
+    if size < modes:
+        raise ValueError(f"initialisation 'physics' needs a state_size of at least the {modes} modes, not {size}")
+    linear = physics.string.eigenvalues(modes)[torch.arange(size) % modes] / physics.rate_hz
+    stretch = 3.0 ** (2 * torch.rand(size, generator=generator, dtype=torch.float64) - 1)
+    stretch[:modes] = 1
+    return torch.complex(linear.real * stretch, linear.imag)
+
+
+def store_eigenvalues(nu_log: Tensor, theta_log: Tensor, log_eigenvalues: Tensor) -> None:
+    """Writes log λ = -exp(ν_log) + i exp(θ_log) into the two parameters."""
+    nu_log.copy_(torch.log(-log_eigenvalues.real))
+    theta_log.copy_(log_eigenvalues.imag.log())
+
+
+def store_ring(nu_log: Tensor, theta_log: Tensor, generator: torch.Generator) -> None:
+    """Eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1 (the paper, §4.2)."""
+    nu, theta = eigenvalues.draw_ring(len(nu_log), generator)
+    nu_log.copy_(nu)
+    theta_log.copy_(theta)
+
+
+def perceptron(*widths: int) -> nn.Sequential:
+    """Dense layers of these widths with SELU between."""
+    layers: list[nn.Module] = []
+    for wide_in, wide_out in pairwise(widths):
+        layers += [nn.Linear(wide_in, wide_out), nn.SELU()]
+    return nn.Sequential(*layers[:-1])
+
+
+def dense_layers(model: nn.Module) -> list[nn.Linear]:
+    """The dense layers of a model, in order."""
+    return [layer for layer in model.modules() if isinstance(layer, nn.Linear)]
+
+
+def initialise_orthogonal(layer: nn.Linear, generator: torch.Generator) -> None:
+    nn.init.orthogonal_(layer.weight, generator=generator)
+    nn.init.zeros_(layer.bias)
+
+
+def check_sizes(configuration: object, *names: str) -> None:
+    """Raises ValueError, naming the field, where a size or one of a tuple of sizes is below 1."""
+    for name in names:
+        value = getattr(configuration, name)
+        if any(size < 1 for size in (value if isinstance(value, tuple) else (value,))):
+            raise ValueError(f"{name} must be at least 1, not {value}")

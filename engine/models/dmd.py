@@ -1,0 +1,202 @@
+"""DMD: the linear map that carries every frame, with its predecessors, closest to the next; fitted, not trained.
+
+Source: the paper, §3.1 (after Tu et al. 2014) and §4.3: exact DMD of a Hankel matrix of two lags, rank 50. With the
+embedding h_k = [u_k, u_{k-1}, …] of `lags` frames, h_{k+1} ≈ A h_k in least squares over all frames of all
+trajectories; with the eigenvalues λ of A's projection on the leading singular vectors, and its modes Φ,
+
+    b = encoder(u₀),    û_k = Re(Φ λᵏ b).
+
+A standing wave has frames of zero displacement with a velocity: with one lag no linear map can follow it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+from torch import Tensor, nn
+
+from engine.models._diagonal import DiagonalModel, KoopmanState, check_sizes, dense
+from engine.models.base import Physics, check_initialisation
+from engine.models.inputs import InputKind, input_size, join_input
+from engine.sine_transform import synthesis_matrix
+
+_ROWS_AT_ONCE = 16_384  # of the Hankel matrix: bounds the memory of a fit
+_VANISHED = -700.0  # log |λ| of a mode that is not there: finite in a file, and λ¹ is as good as 0
+
+
+@dataclass(frozen=True)
+class DMDConfiguration:
+    """Sizes; the defaults are the paper's (10,200 parameters: 50 complex eigenvalues, and modes on 101 points).
+
+    Attributes:
+        lags: frames in the embedding.
+        rank: singular vectors kept, which is the number of modes. Two for each mode of the string are enough.
+        input: what a rendering sets out from. The embedding's other frames are not asked for: a fit knows how they
+            belong to the velocity or to the one frame before.
+    """
+
+    grid_points: int = 101
+    lags: int = 2
+    rank: int = 50
+    input: InputKind = "displacement"
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "lags", "rank")
+        if self.rank > self.lags * self.grid_points:
+            raise ValueError(
+                f"rank must be at most lags times grid_points, {self.lags * self.grid_points}, not {self.rank}"
+            )
+        if self.lags == 1 and self.input != "displacement":
+            raise ValueError(f"lags must be at least 2 for the input {self.input!r}, not 1")
+
+
+class DMD(DiagonalModel):
+    """See the module. What was fitted are the parameters; the encoder follows from them and is a buffer.
+
+    Eigenvalues are float64: phases are exact at any frame. One may lie outside the unit circle: see `unstable`.
+    """
+
+    initialisations: ClassVar = ("physics",)
+
+    def __init__(self, configuration: DMDConfiguration) -> None:
+        super().__init__()
+        self.configuration = configuration
+        self.grid_points = configuration.grid_points
+        r = configuration.rank
+        self.magnitude_log = nn.Parameter(torch.full((r,), _VANISHED, dtype=torch.float64))
+        self.angle = nn.Parameter(torch.zeros(r, dtype=torch.float64))
+        self.modes = nn.Parameter(torch.zeros(self.grid_points, 2 * r))  # Φ of one frame, real parts first
+        inputs = input_size(configuration.input, self.grid_points)
+        self.encoder: Tensor
+        self.register_buffer("encoder", torch.zeros(inputs, 2 * r))  # real parts first
+
+    @classmethod
+    def fit(cls, trajectories: Tensor, configuration: DMDConfiguration) -> DMD:
+        """The DMD of one trajectory or of many.
+
+        Args:
+            trajectories: successive frames in the model's units, (batch, frames, grid_points).
+
+        Raises:
+            ValueError: another grid, too few frames, or values that are not finite.
+        """
+        c = configuration
+        if trajectories.ndim != 3 or trajectories.shape[-1] != c.grid_points:
+            raise ValueError(
+                f"trajectories must be of shape (batch, frames, {c.grid_points}), not {tuple(trajectories.shape)}"
+            )
+        if trajectories.shape[1] <= c.lags:
+            raise ValueError(f"a fit with lags of {c.lags} needs more frames than {trajectories.shape[1]}")
+        if not bool(torch.isfinite(trajectories).all()):
+            raise ValueError("trajectories hold values that are not finite")
+        model = cls(configuration)
+        model._store(*_exact_dmd(trajectories, c))
+        return model
+
+    @property
+    def unstable(self) -> bool:
+        """Whether a mode grows, |λ| > 1: a fit to noisy or non-linear motion may find one."""
+        return bool((self.magnitude_log > 0).any())
+
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanState:
+        """The amplitudes b that agree best, in least squares, with what is given.
+
+        With the input "displacement" those of a string at rest: Φ b = u₀ and Φ (b log λ) = 0, its velocity. (With one
+        lag the modes hold no velocity, and only the first is asked.) With "displacement_velocity" the velocity is
+        given instead, and with "two_frames" u₋₁; both are exact where the fit is. But frames alone do not tell a mode
+        above half the sample rate from its alias, whose velocity is another one: there, two frames are the better.
+        """
+        b = join_input(self.configuration.input, displacement, second) @ self.encoder
+        return KoopmanState(torch.complex(*b.chunk(2, dim=-1)), 0)
+
+    def powers(self, frames: Tensor) -> Tensor:
+        k = frames.to(torch.float64)[:, None]
+        angle = torch.remainder(k * self.angle.double(), 2 * math.pi)
+        return torch.polar(torch.exp(k * self.magnitude_log.double()), angle)
+
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+        modes = self.modes if readout is None else readout.to(self.modes).T @ self.modes
+        real, imaginary = modes.chunk(2, dim=-1)
+        return dense(latents, torch.cat([real, -imaginary], dim=-1))
+
+    def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
+        return self.decode(self.successive_latents(origin, first, count), readout)
+
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """physics: the linear string itself, which is what a fit finds in linear motion. The source has no other."""
+        check_initialisation(self, how)
+        c, modes = self.configuration, physics.modes
+        if c.rank < 2 * modes:
+            raise ValueError(
+                f"initialisation 'physics' needs a rank of at least {2 * modes}, two a mode, not {c.rank}"
+            )
+        half = torch.exp(physics.string.eigenvalues(modes) / physics.rate_hz)
+        eigenvalues = torch.cat([half, half.conj()])
+        frame = synthesis_matrix(self.grid_points, modes).T.repeat(1, 2)  # (grid_points, 2 modes)
+        self._store(eigenvalues, torch.cat([frame * eigenvalues**-lag for lag in range(c.lags)]))
+
+    def _store(self, eigenvalues: Tensor, modes: Tensor) -> None:
+        """Takes eigenvalues (n,) and modes of the embedding (lags · grid_points, n) with n ≤ rank; others vanish."""
+        points, r, n = self.grid_points, self.configuration.rank, len(eigenvalues)
+        magnitude_log = eigenvalues.abs().log().clamp(min=_VANISHED)
+        encoder = _encoder(self.configuration, magnitude_log, eigenvalues.angle(), modes)
+        with torch.no_grad():
+            self.magnitude_log.fill_(_VANISHED)[:n] = magnitude_log
+            self.angle.zero_()[:n] = eigenvalues.angle()
+            for stored, found in ((self.modes, modes[:points]), (self.encoder, encoder.T)):
+                stored.zero_()
+                stored[:, :n], stored[:, r : r + n] = found.real, found.imag
+
+
+def _exact_dmd(trajectories: Tensor, c: DMDConfiguration) -> tuple[Tensor, Tensor]:
+    """Eigenvalues and modes of the embedding, in float64, the slowest decay first.
+
+    With the Hankel matrix H = QR of `lags + 1` frames a row, both snapshot matrices are columns of H, and the SVD of
+    R's columns is theirs: Q is never needed, R can be gathered block by block, and nothing is squared.
+    """
+    r = torch.empty(0, (c.lags + 1) * c.grid_points, dtype=torch.float64)
+    for rows in _hankel_rows(trajectories, c.lags + 1):
+        r = torch.linalg.qr(torch.cat([r, rows]), mode="r").R
+    after, before = r[:, : -c.grid_points].T, r[:, c.grid_points :].T
+    u, s, v = torch.linalg.svd(before, full_matrices=False)
+    # beyond the rank of the data there is only rounding, from which no mode can be told
+    noise = s[0] * torch.finfo(trajectories.dtype).eps * len(before)
+    kept = min(c.rank, int((s > noise).sum()))
+    if kept == 0:
+        return torch.empty(0, dtype=torch.complex128), torch.empty(len(before), 0, dtype=torch.complex128)
+    u, s, v = u[:, :kept], s[:kept], v[:kept].T
+    carried = after @ v / s
+    eigenvalues, w = torch.linalg.eig(u.T @ carried)
+    order = eigenvalues.abs().argsort(descending=True)
+    eigenvalues, w = eigenvalues[order], w[:, order]
+    present = eigenvalues.abs() > math.exp(_VANISHED)
+    eigenvalues, w = eigenvalues[present], w[:, present]
+    return eigenvalues, carried.to(w) @ w / eigenvalues
+
+
+def _hankel_rows(trajectories: Tensor, frames: int) -> Iterator[Tensor]:
+    """Blocks of rows [u_k, u_{k-1}, …] of `frames` frames each, float64 (rows, frames · grid_points)."""
+    for trajectory in trajectories:
+        windows = trajectory.detach().cpu().double().unfold(0, frames, 1).flip(-1).transpose(1, 2)
+        yield from windows.flatten(1).split(_ROWS_AT_ONCE)
+
+
+def _encoder(c: DMDConfiguration, magnitude_log: Tensor, angle: Tensor, modes: Tensor) -> Tensor:
+    """b of the encoder's input: complex128 (n, inputs). See `DMD.encode`."""
+    frame = modes[: c.grid_points]
+    if c.lags == 1:
+        return torch.linalg.pinv(frame)
+    if c.input == "two_frames":
+        return torch.linalg.pinv(modes[: 2 * c.grid_points])
+    # a real λ < 0 alternates from frame to frame: at rest it is a cosine
+    turning = torch.where(angle.abs() < math.pi, angle, 0.0)
+    rate = torch.complex(magnitude_log, turning)
+    # velocity and displacement weigh alike
+    unit = rate.abs().square().mean().sqrt()
+    both = torch.linalg.pinv(torch.cat([frame, frame * (rate / unit)]))
+    at_rest, moving = both[:, : c.grid_points], both[:, c.grid_points :] / unit
+    return at_rest if c.input == "displacement" else torch.cat([at_rest, moving], dim=1)

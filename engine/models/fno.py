@@ -1,0 +1,247 @@
+"""FGRU and FRNN: Fourier neural operators in recurrent cells, over the points of the string.
+
+Source: Parker et al., "Physical Modeling using Recurrent Neural Networks with Fast Convolutional Layers", DAFx 2022;
+the paper, §4.2. The hidden state is a field h of `width` channels on the grid. 𝓕 is a Fourier
+convolution (`FourierConvolution`), and every step is
+
+    FGRU: z = σ(𝓕_z h),  r = σ(𝓕_r h),  h ← (1 - z) ⊙ h + z ⊙ tanh(𝓕_h(r ⊙ h)),
+    FRNN: h ← ReLU(𝓕_l h) + W_l h + b_l  for layers l = 1 … depth,
+
+with the same map of each point from the initial displacement to h and from h to the displacement.
+
+The modules are the definition, which can be trained. On the CPU in single precision, where no gradient is wanted,
+a compiled kernel computes the same (`_fno_kernel`). A listening point costs what the grid costs: the recurrence needs
+the whole field.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import torch
+from torch import Tensor, nn
+
+from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.inputs import InputKind, input_size, join_input
+
+if TYPE_CHECKING:
+    from engine.models import _fno_kernel as kernel
+
+
+@dataclass(frozen=True)
+class FGRUConfiguration:
+    """Sizes; the defaults are the paper's (640,033 parameters).
+
+    Attributes:
+        width: channels of the hidden field.
+        input: what the encoder is told; see `engine.models.inputs`.
+    """
+
+    grid_points: int = 101
+    width: int = 32
+    input: InputKind = "displacement"
+
+    def __post_init__(self) -> None:
+        _check_sizes(self, "grid_points", "width")
+
+
+@dataclass(frozen=True)
+class FRNNConfiguration:
+    """Sizes; the defaults are the paper's (643,201 parameters).
+
+    Attributes:
+        width: channels of the hidden field.
+        depth: Fourier layers in a step.
+        input: what the encoder is told; see `engine.models.inputs`.
+    """
+
+    grid_points: int = 101
+    width: int = 32
+    depth: int = 3
+    input: InputKind = "displacement"
+
+    def __post_init__(self) -> None:
+        _check_sizes(self, "grid_points", "width", "depth")
+
+
+def _check_sizes(configuration: object, *names: str) -> None:
+    for name in names:
+        if getattr(configuration, name) < 1:
+            raise ValueError(f"{name} must be at least 1, not {getattr(configuration, name)}")
+
+
+@dataclass(frozen=True)
+class FieldState:
+    """The hidden field reached."""
+
+    hidden: Tensor  # (batch, grid_points, width)
+
+
+class FourierConvolution(nn.Module):
+    """A linear map of a field: a complex matrix on its channels at each frequency, and a bias in frequency.
+
+    The field is followed by as many zeros, so that one end does not reach round to the other. Of the grid_points + 1
+    frequencies of the real transform all but the highest are kept.
+    """
+
+    def __init__(self, grid_points: int, width: int) -> None:
+        super().__init__()
+        # real and imaginary parts on the last axis but one: rows of outputs are contiguous, as the kernel reads them
+        self.weight = nn.Parameter(torch.zeros(grid_points, width, 2, width))  # frequency, in, real/imaginary, out
+        self.bias = nn.Parameter(torch.zeros(grid_points, 2, width))
+
+    def forward(self, field: Tensor) -> Tensor:
+        """(batch, grid_points, width) to the same shape."""
+        points = field.shape[1]
+        spectrum = torch.fft.rfft(field, n=2 * points, dim=1)[:, :points]
+        spectrum = torch.einsum("bki,kio->bko", spectrum, torch.complex(self.weight[:, :, 0], self.weight[:, :, 1]))
+        return torch.fft.irfft(spectrum, n=2 * points, dim=1)[:, :points] + self.bias_field()
+
+    def bias_field(self) -> Tensor:
+        """The bias in space (grid_points, width)."""
+        points = len(self.bias)
+        return torch.fft.irfft(torch.complex(self.bias[:, 0], self.bias[:, 1]), n=2 * points, dim=0)[:points]
+
+    def initialise(self, generator: torch.Generator) -> None:
+        """Uniform from 0 to 1/width² (weight) and 1/width (bias), real and imaginary parts alike."""
+        width = self.bias.shape[-1]
+        nn.init.uniform_(self.weight, 0, width**-2, generator=generator)
+        nn.init.uniform_(self.bias, 0, 1 / width, generator=generator)
+
+
+class _FourierRecurrent(StringModel[FieldState]):
+    """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
+
+    initialisations: ClassVar = ("paper",)
+
+    def __init__(self, grid_points: int, width: int, kind: InputKind) -> None:
+        super().__init__()
+        self.grid_points = grid_points
+        self.input = kind
+        self.in_mapping = nn.Linear(input_size(kind, 1), width)
+        self.out_mapping = nn.Linear(width, 1)
+
+    @abstractmethod
+    def step(self, hidden: Tensor) -> Tensor:
+        """One sample of the definition: (batch, grid_points, width) to the same shape."""
+
+    @abstractmethod
+    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+        """The kernel: advances hidden (batch, grid_points, width), fills frames (batch, steps, grid_points)."""
+
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> FieldState:
+        second = None if second is None else second[..., None]
+        return FieldState(self.in_mapping(join_input(self.input, displacement[..., None], second)))
+
+    def advance(self, state: FieldState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, FieldState]:
+        advance = self._advance_compiled if self._can_compile(state.hidden) else self._advance_by_definition
+        frames, hidden = advance(state.hidden, steps)
+        if readout is not None:
+            frames = frames @ readout.to(frames)
+        return frames, FieldState(hidden)
+
+    def _can_compile(self, hidden: Tensor) -> bool:
+        learns = torch.is_grad_enabled() and any(t.requires_grad for t in (hidden, *self.parameters()))
+        paired = hidden.shape[-1] % 2 == 0  # the kernel takes channels two at a time
+        return paired and not learns and hidden.device.type == "cpu" and hidden.dtype == torch.float32
+
+    def _advance_by_definition(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        frames = []
+        for _ in range(steps):
+            hidden = self.step(hidden)
+            frames.append(self.out_mapping(hidden)[..., 0])
+        return torch.stack(frames, dim=1), hidden
+
+    def _advance_compiled(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        fields = hidden.detach().clone(memory_format=torch.contiguous_format)
+        frames = fields.new_empty(len(fields), steps, self.grid_points)
+        self._render(fields.numpy(), frames.numpy())
+        return frames, fields
+
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """See the contract.
+
+        paper: Fourier weights and biases uniform and positive (`FourierConvolution.initialise`); the other maps
+            uniform within ±1/√inputs.
+        """
+        check_initialisation(self, how)
+        with torch.no_grad():
+            for module in self.modules():
+                if isinstance(module, FourierConvolution):
+                    module.initialise(generator)
+                elif isinstance(module, nn.Linear):
+                    bound = module.in_features**-0.5
+                    nn.init.uniform_(module.weight, -bound, bound, generator=generator)
+                    nn.init.uniform_(module.bias, -bound, bound, generator=generator)
+
+
+class FGRU(_FourierRecurrent):
+    """See the module."""
+
+    def __init__(self, configuration: FGRUConfiguration) -> None:
+        super().__init__(configuration.grid_points, configuration.width, configuration.input)
+        self.configuration = configuration
+        sizes = configuration.grid_points, configuration.width
+        self.z_layer = FourierConvolution(*sizes)
+        self.r_layer = FourierConvolution(*sizes)
+        self.h_layer = FourierConvolution(*sizes)
+
+    def step(self, hidden: Tensor) -> Tensor:
+        z = torch.sigmoid(self.z_layer(hidden))
+        r = torch.sigmoid(self.r_layer(hidden))
+        return (1 - z) * hidden + z * torch.tanh(self.h_layer(r * hidden))
+
+    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+        from engine.models import _fno_kernel as kernel  # Numba only when it is needed
+
+        transforms = kernel.transform_matrices(self.grid_points)
+        convolutions = _convolution_arrays(self.z_layer, self.r_layer, self.h_layer)
+        out = _dense_arrays(self.out_mapping)
+        for field, trajectory in zip(hidden, frames, strict=True):
+            kernel.advance_fgru(field, trajectory, transforms, convolutions, out)
+
+
+class FRNN(_FourierRecurrent):
+    """See the module. Nothing bounds it: it may blow up, more so before it is trained."""
+
+    def __init__(self, configuration: FRNNConfiguration) -> None:
+        super().__init__(configuration.grid_points, configuration.width, configuration.input)
+        self.configuration = configuration
+        sizes = configuration.grid_points, configuration.width
+        self.fourier_layers = nn.ModuleList(FourierConvolution(*sizes) for _ in range(configuration.depth))
+        self.pointwise_layers = nn.ModuleList(
+            nn.Linear(configuration.width, configuration.width) for _ in range(configuration.depth)
+        )
+
+    def step(self, hidden: Tensor) -> Tensor:
+        for convolve, pointwise in zip(self.fourier_layers, self.pointwise_layers, strict=True):
+            hidden = torch.relu(convolve(hidden)) + pointwise(hidden)
+        return hidden
+
+    def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
+        from engine.models import _fno_kernel as kernel  # Numba only when it is needed
+
+        transforms = kernel.transform_matrices(self.grid_points)
+        convolutions = _convolution_arrays(*self.fourier_layers)
+        pointwise = _dense_arrays(*self.pointwise_layers)
+        out = _dense_arrays(self.out_mapping)
+        for field, trajectory in zip(hidden, frames, strict=True):
+            kernel.advance_frnn(field, trajectory, transforms, convolutions, pointwise, out)
+
+
+@torch.no_grad()
+def _convolution_arrays(*layers: nn.Module) -> kernel.Pair:
+    """Weights (layers, frequency, in, real/imaginary, out), and biases in space (layers, grid_points, width)."""
+    convolutions = [layer for layer in layers if isinstance(layer, FourierConvolution)]
+    weights = torch.stack([layer.weight.detach() for layer in convolutions])
+    return weights.numpy(), torch.stack([layer.bias_field() for layer in convolutions]).numpy()
+
+
+@torch.no_grad()
+def _dense_arrays(*layers: nn.Module) -> kernel.Pair:
+    """Weights (layers, in, out) and biases (layers, out)."""
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    weights = torch.stack([layer.weight.T.contiguous() for layer in linear])
+    return weights.numpy(), torch.stack([layer.bias.detach() for layer in linear]).numpy()

@@ -1,0 +1,439 @@
+"""Koopman with integrated phase: eigenvalues that follow the decaying energies, integrated over time.
+
+A string's partials fall in pitch while it decays, because its tension falls: each frequency depends on the energies
+of all modes, and a phase is the integral of a frequency. Koopman_var's multiplier sees the present energies only and
+cannot hold that integral. Here, with z(0) = encoder(u₀) ∈ ℂⁿ, E_m(t) = |z_m(0)|² e^{-2σ_m t} and t in samples,
+
+    z_n(t) = z_n(0) exp[(-σ_n + iω_n) t + b tanh(Re I_n(t) / b) + i Im I_n(t)],     û(t) = decoder(z(t)),
+    I_n(t) = ∫₀ᵗ f_n(E(s)) ds,      f(E) = K E + g(E) - g(0),       K ∈ ℂⁿˣⁿ, g: ℝⁿ → ℂⁿ an MLP.
+
+The linear term is integrated in closed form, ∫ = Σ_m K_nm E_m(0) (1 - e^{-2σ_m t}) / 2σ_m; the network by Simpson's
+rule on nodes at fixed times, and between them by the cubic whose slope is the parabola through its samples. No
+recursion: any time can be had in any order, whole samples or not, so a model renders at any sample rate.
+
+Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
+parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
+decay either way: the eigenvalue at time t is -σ_n + iω_n + Re f_n sech²(Re I_n / b) + i Im f_n, which is -σ + iω + f
+while the change is small against b. And f(0) = 0: a quiet string is the linear one, so σ and ω are its own.
+
+Sources: Lusch, Kutz, Brunton 2018 for eigenvalues given by an auxiliary network; Lindstedt's averaging for the
+closed-form K of the tension-modulated string (`initialise`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import ClassVar, NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from engine.models._diagonal import (
+    check_sizes,
+    dense_layers,
+    initialise_orthogonal,
+    linear_string_eigenvalues,
+    read_layer,
+    store_eigenvalues,
+    store_ring,
+)
+from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.eigenvalues import pack
+from engine.models.inputs import InputKind, input_size, join_input
+from engine.sine_transform import analysis_matrix, synthesis_matrix
+
+SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
+SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
+NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
+
+
+@dataclass(frozen=True)
+class IntegratedPhaseConfiguration:
+    """Sizes. An empty tuple of widths leaves that network out.
+
+    Attributes:
+        state_size: number n of complex eigenvalues: one for each mode, or more to spare.
+        input: what the encoder is given; see `engine.models.inputs`.
+        encoder_widths: hidden widths of the MLP that is added to the linear encoder.
+        eigenvalue_widths: hidden widths of g.
+        multiplier_widths: hidden widths of Koopman_var's multiplier, 1 + MLP(|z|²). Evaluated at every frame.
+        decoder_widths: hidden widths of an MLP that is added to the linear decoder. Evaluated at every frame.
+        node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
+        rate_unit: unit of K E and of g in radians and nepers a sample. A weight of 1 turns a phase by one radian in
+            1/rate_unit samples, the order of a training horizon, so that an optimiser's usual steps suit.
+        gain_limit_db: b, the largest change of level that Re f can add up to.
+    """
+
+    grid_points: int = 101
+    state_size: int = 25
+    input: InputKind = "displacement"
+    encoder_widths: tuple[int, ...] = (128, 128)
+    eigenvalue_widths: tuple[int, ...] = (128, 128)
+    multiplier_widths: tuple[int, ...] = ()
+    decoder_widths: tuple[int, ...] = ()
+    node_spacing: int = 40
+    rate_unit: float = 1e-3
+    gain_limit_db: float = 6.0
+
+    def __post_init__(self) -> None:
+        widths = ("encoder_widths", "eigenvalue_widths", "multiplier_widths", "decoder_widths")
+        check_sizes(self, "grid_points", "state_size", *widths, "node_spacing")
+        for name in ("rate_unit", "gain_limit_db"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class IntegratedPhaseState:
+    """The encoded start, the time reached, and what the network has added up.
+
+    Attributes:
+        origin: z(0), complex (batch, state_size).
+        time: samples of the trained rate since then. A fraction, so that thirds of a sample add up exactly.
+        integral: ∫ g(E) - g(0) from 0 to the node before the last one that `time` has reached, float64
+            (batch, 2 state_size) with the real parts first.
+    """
+
+    origin: Tensor
+    time: Fraction
+    integral: Tensor
+
+
+class _Rates(NamedTuple):
+    """The parameters of the motion in float64, once for all blocks."""
+
+    sigma: Tensor  # 1/samples, (state_size,)
+    omega: Tensor
+    coupling: Tensor  # K in radians and nepers a sample, transposed: (state_size, 2 state_size)
+
+
+class _Motion(NamedTuple):
+    """Beside the decay e^{-σt}: float64 (batch, times, state_size) each."""
+
+    gain: Tensor  # b tanh(Re I / b), in nepers
+    phase: Tensor  # ωt + Im I
+    gain_rate: Tensor  # their slopes, a sample
+    phase_rate: Tensor
+
+
+class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
+    """See the module."""
+
+    initialisations: ClassVar = ("random", "physics", "averaging")
+
+    def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
+        super().__init__()
+        self.configuration = c = configuration
+        self.grid_points = c.grid_points
+        n, values = c.state_size, input_size(c.input, c.grid_points)
+        self.encoder = nn.Linear(values, 2 * n)
+        self.encoder_residual = _mlp(values, c.encoder_widths, 2 * n)
+        self.nu_log = nn.Parameter(torch.zeros(n))
+        self.theta_log = nn.Parameter(torch.zeros(n))
+        self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
+        self.g = _mlp(n, c.eigenvalue_widths, 2 * n, last_bias=False)  # g(0) is subtracted: it would cancel
+        self.multiplier = _mlp(n, c.multiplier_widths, 2 * n)
+        self.decoder = nn.Linear(2 * n, c.grid_points)
+        self.decoder_residual = _mlp(2 * n, c.decoder_widths, c.grid_points)
+
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> IntegratedPhaseState:
+        """See the contract; `second` as in `engine.models.inputs.join_input`."""
+        values = join_input(self.configuration.input, displacement, second)
+        z = self.encoder(values)
+        if self.encoder_residual is not None:
+            z = z + self.encoder_residual(values)
+        return _at_rest(pack(z))
+
+    def advance(
+        self,
+        state: IntegratedPhaseState,
+        steps: int,
+        readout: Tensor | None = None,
+        step_size: Fraction | int = 1,
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        """See the contract.
+
+        Args:
+            step_size: samples of the trained rate in a frame: Fraction(16_000, 48_000) renders a model trained at
+                16 kHz at 48 kHz. Exact over any number of frames.
+
+        Raises:
+            ValueError: a step size that is not above 0.
+        """
+        if not step_size > 0:
+            raise ValueError(f"step_size must be above 0, not {step_size}")
+        rates, step = self._rates(), Fraction(step_size)
+        most = max(1, NUMBERS_AT_ONCE // self.configuration.state_size)
+        blocks = []
+        for done in range(0, steps, most):
+            block, state = self._render(state, rates, min(most, steps - done), step, readout)
+            blocks.append(block)
+        return torch.cat(blocks, dim=1), state
+
+    def at(self, state: IntegratedPhaseState, times: Tensor, readout: Tensor | None = None) -> Tensor:
+        """Displacement (batch, times, points) at `times` (times,), in samples from the state's own time.
+
+        Raises:
+            ValueError: a time before the state's.
+        """
+        if bool((times < 0).any()):
+            raise ValueError("times must not be before the state's own; encode again, or keep an earlier state")
+        return self.decode(self._latents_at(state, times), readout)
+
+    def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
+        """z of any frames ≥ 0 (whole or not, any order), complex (batch, frames, state_size)."""
+        return self._latents_at(_at_rest(origin), frames)
+
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+        """Displacement (..., points) of latents (..., state_size)."""
+        return self._displacement(latents.real, latents.imag, readout, slice(None))
+
+    def _rates(self) -> _Rates:
+        # below, σ is as good as none, and one of zero would be divided by; above, all is over within a sample
+        sigma = self.nu_log.double().exp().clamp(1e-9, 1e3)
+        return _Rates(sigma, self.theta_log.double().exp(), self.K.double().T * self.configuration.rate_unit)
+
+    def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor) -> Tensor:
+        """z at times (times,) after the state's, complex (batch, times, state_size)."""
+        rates = self._rates()
+        times = ahead.double() + float(state.time)
+        motion, _ = self._move(state, rates, times, state.time)
+        factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
+        return (state.origin[:, None] * factor).to(state.origin.dtype)
+
+    def _render(
+        self, state: IntegratedPhaseState, rates: _Rates, count: int, step: Fraction, readout: Tensor | None
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        """The next `count` frames and the state after them.
+
+        Level and phase are computed at the ends of short segments, in float64, and are cubics with the right slopes
+        in between (Hermite), which leaves errors of the order of h|f| (2σh)³/384 for segments of h samples: a frame
+        costs a sine, a cosine and an exponential a latent. Segments lie at fixed frames, so a frame is the same in
+        whichever block it is rendered. A gain that would change by more than b in a segment, which no string does,
+        has its slope held there: so within a segment no gain exceeds b by more than 8/27 of it.
+        """
+        length = max(1, int(min(SEGMENT, self.configuration.node_spacing) // step))  # frames in a segment
+        frames_done, offset = divmod(state.time, step)
+        first, last = (frames_done + 1) // length, (frames_done + count) // length
+        width = float(length * step)
+        times = torch.arange(first, last + 2, device=state.origin.device).double() * width + float(offset)
+        end = state.time + count * step
+        motion, integral = self._move(state, rates, times, end)
+
+        start = state.origin.to(torch.complex128)[:, None]
+        angle = torch.where(start == 0, 1, start).angle()  # at zero it has no gradient
+        level = motion.gain - rates.sigma * times[:, None] + start.abs().clamp(min=1e-300).log()
+        # a string's high modes are over long before it is, and numbers too small for float32 are slow
+        alive = (level.detach().amax((0, 1)) > SILENCE).nonzero()[:, 0]
+        if self.multiplier is not None or self.decoder_residual is not None:
+            alive = torch.arange(len(rates.sigma), device=times.device)  # their networks take every latent
+        left = torch.stack([level[:, :-1], torch.remainder(motion.phase[:, :-1] + angle, 2 * math.pi)])
+        right = left + torch.stack([level.diff(dim=1), motion.phase.diff(dim=1)])
+        held = (motion.gain_rate * width).clamp(-self._gain_limit, self._gain_limit)
+        slopes = torch.stack([held - rates.sigma * width, motion.phase_rate * width])
+        ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])[..., alive].to(
+            self.decoder.weight.dtype
+        )
+        # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
+        log_radius, phase = (_hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
+        radius = torch.exp(log_radius)
+        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
+        frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
+        begin = frames_done + 1 - first * length
+        return frames[:, begin : begin + count], IntegratedPhaseState(state.origin, end, integral)
+
+    def _move(
+        self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: Fraction
+    ) -> tuple[_Motion, Tensor]:
+        """Gain and phase at `times` (times,) since frame 0, and the `integral` of a state at the time `end`.
+
+        Everything is float64: what adds up over millions of samples keeps its last digits.
+        """
+        start = state.origin.to(torch.complex128)
+        energy = (start.real.square() + start.imag.square())[:, None]
+        fading = torch.exp(-2 * rates.sigma * times[:, None])
+        f = (energy * fading) @ rates.coupling
+        integral = (energy * ((1 - fading) / (2 * rates.sigma))) @ rates.coupling
+        integral_at_end = state.integral
+        if self.g is not None:
+            to_times, slopes, to_end = self._integrate_network(state, rates, energy, times, end)
+            integral = integral + state.integral[:, None] + to_times
+            f = f + slopes
+            integral_at_end = integral_at_end + to_end
+        growth, turn = integral.chunk(2, dim=-1)
+        growth_rate, turn_rate = f.chunk(2, dim=-1)
+        limit = self._gain_limit
+        saturated = torch.tanh((growth / limit).to(self.K.dtype)).double()
+        motion = _Motion(
+            limit * saturated,
+            rates.omega * times[:, None] + turn,
+            growth_rate * (1 - saturated.square()),
+            rates.omega + turn_rate,
+        )
+        return motion, integral_at_end
+
+    def _integrate_network(
+        self, state: IntegratedPhaseState, rates: _Rates, energy: Tensor, times: Tensor, end: Fraction
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """g(E) - g(0) integrated from where the state's integral ends.
+
+        Returns:
+            to each of `times`, and the slopes there, float64 (batch, times, 2 state_size); to where the integral of a
+            state at the time `end` ends, (batch, 2 state_size).
+        """
+        assert self.g is not None
+        spacing, dtype = self.configuration.node_spacing, self.K.dtype
+        first, last = _integrated_nodes(state.time, spacing), _integrated_nodes(end, spacing)
+        segments = max(1, math.ceil(float(times.max()) / spacing) - first, last - first)
+        nodes = torch.arange(2 * segments + 1, device=times.device).double() * (spacing / 2) + first * spacing
+        energies = energy * torch.exp(-2 * rates.sigma * nodes[:, None])
+        f = self.g(energies.to(dtype)) - self.g(energy.new_zeros(energy.shape[-1], dtype=dtype))
+        f = f.double() * self.configuration.rate_unit
+        positions = torch.cat([times / spacing - first, times.new_tensor([float(last - first)])])
+        integrals, slopes = integrate_parabolas(f, positions)
+        return integrals[:, :-1] * spacing, slopes[:, :-1], integrals[:, -1] * spacing
+
+    @property
+    def _gain_limit(self) -> float:
+        """b in nepers."""
+        return self.configuration.gain_limit_db * math.log(10) / 20
+
+    def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
+        """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
+        if self.multiplier is not None:
+            a, b = self.multiplier(real.square() + imag.square()).chunk(2, dim=-1)
+            real, imag = real + a * real - b * imag, imag + a * imag + b * real
+        weight, bias = read_layer(self.decoder, readout)
+        of_real, of_imag = weight.chunk(2, dim=-1)
+        found = nn.functional.linear(real, of_real[:, alive], bias)
+        found = found + nn.functional.linear(imag, of_imag[:, alive])
+        if self.decoder_residual is not None:
+            hidden, last = self.decoder_residual[:-1], dense_layers(self.decoder_residual)[-1]
+            parts = torch.cat([real, imag], dim=-1)
+            found = found + nn.functional.linear(hidden(parts), *read_layer(last, readout))
+        return found
+
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
+
+        random: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal encoder and decoder, K = 0: no physics.
+        physics: the first `modes` latents are the linear string (its eigenvalues, sine transform and inverse); the
+            others repeat those frequencies with other decay rates and are not yet heard. K = 0.
+        averaging: physics, and K of the tension-modulated string to first order in ΔT/T₀, by averaging over a
+            period: f_n = i k_n/4ω_n Σ_m η_m² E_m (1 + ½δ_nm). A solution without learning: a trained model must
+            beat it to have learned more.
+
+        The last two are prior knowledge that the paper's models do not have: say so in a table.
+        """
+        check_initialisation(self, how)
+        with torch.no_grad():
+            for network in (self.encoder_residual, self.g, self.multiplier, self.decoder_residual):
+                if network is not None:
+                    _initialise_mlp(network, generator)
+            for linear in (self.encoder, self.decoder):
+                initialise_orthogonal(linear, generator)
+            nn.init.zeros_(self.K)
+            if how == "random":
+                store_ring(self.nu_log, self.theta_log, generator)
+            else:
+                self._initialise_linear_string(physics, generator)
+            if how == "averaging" and physics.tension_modulated:
+                n, modes = self.configuration.state_size, physics.modes
+                averaged = averaged_coupling(physics) / self.configuration.rate_unit
+                self.K[n:, :modes] = averaged[torch.arange(n) % modes].to(self.K)
+
+    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+        n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
+        log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
+        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        analysis = analysis_matrix(points, modes).T[torch.arange(n) % modes]
+        first, second = _imaginary_parts(self.configuration.input, log_eigenvalues)
+        self.encoder.weight.zero_()
+        self.encoder.weight[:n, :points] = analysis.to(self.encoder.weight)
+        self.encoder.weight[n:, :points] = (first[:, None] * analysis).to(self.encoder.weight)
+        if second is not None:
+            self.encoder.weight[n:, points:] = (second[:, None] * analysis).to(self.encoder.weight)
+        self.decoder.weight.zero_()
+        self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T.to(self.decoder.weight)
+
+
+def _imaginary_parts(kind: InputKind, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor | None]:
+    """Factors (n,) of a mode's q and of its second input in Im z, where q = Re z and the motion is linear.
+
+    From q̇ = Re (z log λ), zero where only the displacement is known, or from the frame before, Re (z/λ).
+    """
+    sigma, omega = -log_eigenvalues.real, log_eigenvalues.imag
+    if kind == "two_frames":
+        return -1 / omega.tan(), torch.exp(-sigma) / omega.sin()
+    return -sigma / omega, -1 / omega if kind == "displacement_velocity" else None
+
+
+def averaged_coupling(physics: Physics) -> Tensor:
+    """Im K of `initialise`, float64 (modes, modes): rad/sample for squared amplitudes in normalised units."""
+    string, modes = physics.string, physics.modes
+    share = string.tension_coupling(modes) / (4 * string.undamped_frequencies(modes))
+    squares = string.wavenumbers(modes).square() * physics.scale_m**2
+    return share[:, None] * squares * (1 + 0.5 * torch.eye(modes, dtype=torch.float64)) / physics.rate_hz
+
+
+def integrate_parabolas(samples: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
+    """The integral from 0 of the parabolas through samples at 0, ½, 1 of every segment, and the parabolas themselves.
+
+    Simpson's rule over whole segments, and the cubic of the rest. Both have O(1) cost at a position.
+
+    Args:
+        samples: (batch, 2 segments + 1, values).
+        positions: (times,) in segments.
+
+    Returns:
+        (batch, times, values) each.
+    """
+    left, middle, right = samples[:, :-1:2], samples[:, 1::2], samples[:, 2::2]
+    whole = torch.cumsum((left + 4 * middle + right) / 6, dim=1)
+    segment = positions.floor().long().clamp(0, left.shape[1] - 1)
+    u = (positions - segment)[:, None]
+    left, middle, right = left[:, segment], middle[:, segment], right[:, segment]
+    before = nn.functional.pad(whole, (0, 0, 1, 0))[:, segment]
+    # left + u slope + u² bend
+    slope, bend = 4 * middle - 3 * left - right, 2 * (left + right) - 4 * middle
+    return before + u * (left + u * (slope / 2 + u * bend / 3)), left + u * (slope + u * bend)
+
+
+def _hermite(count: int, like: Tensor) -> Tensor:
+    """Weights (count, 4) of the values and of the slopes at both ends of a unit segment, at 0, 1/count, …"""
+    share = torch.arange(count, device=like.device).double() / count
+    square, cube = share**2, share**3
+    right = 3 * square - 2 * cube
+    return torch.stack([1 - right, right, share - 2 * square + cube, cube - square], dim=1).to(like)
+
+
+def _integrated_nodes(time: Fraction, spacing: int) -> int:
+    """The node at which the integral of a state ends: one is kept back for the segment that `time` lies in."""
+    return max(0, time // spacing - 1)
+
+
+def _at_rest(origin: Tensor) -> IntegratedPhaseState:
+    batch, n = origin.shape
+    return IntegratedPhaseState(origin, Fraction(0), origin.real.new_zeros(batch, 2 * n, dtype=torch.float64))
+
+
+def _mlp(values: int, widths: tuple[int, ...], outputs: int, last_bias: bool = True) -> nn.Sequential | None:
+    if not widths:
+        return None
+    layers: list[nn.Module] = []
+    for wide_in, wide_out in pairwise((values, *widths)):
+        layers += [nn.Linear(wide_in, wide_out), nn.SiLU()]
+    return nn.Sequential(*layers, nn.Linear(widths[-1], outputs, bias=last_bias))
+
+
+def _initialise_mlp(network: nn.Sequential, generator: torch.Generator) -> None:
+    layers = dense_layers(network)
+    for layer in layers:
+        std = layer.in_features**-0.5
+        nn.init.trunc_normal_(layer.weight, std=std, a=-2 * std, b=2 * std, generator=generator)
+        if layer.bias is not None:
+            nn.init.zeros_(layer.bias)
+    nn.init.zeros_(layers[-1].weight)

@@ -1,0 +1,86 @@
+"""LRU: linear recurrent units with exponentially parametrised eigenvalues.
+
+Source: the paper, §3.2, after Orvieto et al. 2023: λ = exp(-exp(ν_log) + i exp(θ_log)), B̄ = exp(γ_log) B. Stable for
+every parameter value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+from torch import Tensor, nn
+
+from engine.models import eigenvalues
+from engine.models.inputs import InputKind, input_size
+from engine.models.ssm import DiagonalSSM, SSMString
+
+
+@dataclass(frozen=True)
+class LRUConfiguration:
+    """Sizes; the defaults are the paper's (636,221 parameters).
+
+    Attributes:
+        input: what the encoder is told; see `engine.models.inputs`.
+        state_size: complex states of every layer.
+        layers: blocks after the first layer.
+    """
+
+    grid_points: int = 101
+    input: InputKind = "displacement"
+    state_size: int = 128
+    layers: int = 8
+
+    def __post_init__(self) -> None:
+        for name, least in (("grid_points", 3), ("state_size", 1), ("layers", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+
+
+class LRULayer(DiagonalSSM):
+    """One linear recurrent unit."""
+
+    conjugates: ClassVar = 1
+
+    def __init__(self, states: int, inputs: int, outputs: int) -> None:
+        super().__init__(states, inputs, outputs)
+        self.nu_log = nn.Parameter(torch.zeros(states))
+        self.theta_log = nn.Parameter(torch.zeros(states))
+        self.gamma_log = nn.Parameter(torch.zeros(states))
+
+    def log_eigenvalues(self) -> Tensor:
+        return torch.complex(-self.nu_log.double().exp(), self.theta_log.double().exp())
+
+    def input_matrix(self) -> Tensor:
+        return self.B * self.gamma_log.exp()[:, None, None]
+
+    def initialise(self, generator: torch.Generator) -> None:
+        """λ uniform in the ring 0.99 ≤ |λ| ≤ 1; γ keeps the states at unit variance under white noise."""
+        nu_log, theta_log = eigenvalues.draw_ring(self.nu_log.shape[0], generator)
+        self.nu_log.copy_(nu_log)
+        self.theta_log.copy_(theta_log)
+        self.gamma_log.copy_(0.5 * torch.log(-torch.expm1(-2 * nu_log.exp())))
+        self.B.normal_(std=(2 * self.B.shape[2]) ** -0.5, generator=generator)
+        self.C.normal_(std=self.C.shape[1] ** -0.5, generator=generator)
+        self.D.normal_(generator=generator)
+
+    def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
+        modes = len(log_eigenvalues)
+        self.nu_log[:modes] = (-log_eigenvalues.real).log()
+        self.theta_log[:modes] = log_eigenvalues.imag.log()
+        self.gamma_log[:modes] = 0
+        self.B[:modes] = input_matrix.to(self.B)
+
+
+class LRU(SSMString):
+    """See the module."""
+
+    def __init__(self, configuration: LRUConfiguration) -> None:
+        points, states = configuration.grid_points, configuration.state_size
+        super().__init__(
+            configuration.input,
+            LRULayer(states, input_size(configuration.input, points), points),
+            [LRULayer(states, points, points) for _ in range(configuration.layers)],
+        )
+        self.configuration = configuration

@@ -1,0 +1,119 @@
+"""S5: diagonal state-space layers discretised from continuous time, in conjugate pairs.
+
+Source: the paper, §3.2, after Smith et al. 2023. With the step Δ = exp(log_step) learned for every state and
+zero-order hold, λ = exp(ΛΔ) and B̄ = (λ - 1) Λ⁻¹ B. One state of each conjugate pair is kept; the output is 2 Re(C x).
+The real part of Λ is not bounded: a trained model may have |λ| > 1, which `unstable` lists.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+from torch import Tensor, nn
+
+from engine.models.inputs import InputKind, input_size
+from engine.models.ssm import DiagonalSSM, SSMString, draw_lecun, scale_rows
+
+SMALLEST_STEP, LARGEST_STEP = 0.001, 0.1  # of the initial draw of Δ, in the source's arbitrary unit of time
+
+
+@dataclass(frozen=True)
+class S5Configuration:
+    """Sizes; the defaults are the paper's (307,879 parameters).
+
+    Attributes:
+        input: what the encoder is told; see `engine.models.inputs`.
+        state_size: states of every layer; half of them, one of each conjugate pair, are stored.
+        hippo_blocks: diagonal blocks of the initial state matrix, each a HiPPO-LegS matrix.
+        layers: blocks after the first layer.
+    """
+
+    grid_points: int = 101
+    input: InputKind = "displacement"
+    state_size: int = 128
+    hippo_blocks: int = 16
+    layers: int = 6
+
+    def __post_init__(self) -> None:
+        for name, least in (("grid_points", 3), ("state_size", 2), ("hippo_blocks", 1), ("layers", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+        if self.state_size % (2 * self.hippo_blocks):
+            raise ValueError(
+                f"state_size must be a multiple of twice the {self.hippo_blocks} hippo_blocks, not {self.state_size}"
+            )
+
+
+def hippo_normal(size: int) -> tuple[Tensor, Tensor]:
+    """The normal part of the HiPPO-LegS matrix, diagonalised: Λ (size,) and V (size, size), complex128.
+
+    HiPPO-LegS is -½ I plus a skew-symmetric matrix plus a matrix of rank one, which is left out (Gu et al. 2022).
+    The eigenvalues come in order of their imaginary part, so the first half has one of each conjugate pair.
+    """
+    root = torch.sqrt(2 * torch.arange(size, dtype=torch.float64) + 1)
+    lower = torch.tril(torch.outer(root, root), -1) / 2
+    frequency, vectors = torch.linalg.eigh(1j * (lower - lower.T))
+    return torch.complex(torch.full_like(frequency, -0.5), frequency), vectors
+
+
+class S5Layer(DiagonalSSM):
+    """One S5 layer with `states` stored states."""
+
+    conjugates: ClassVar = 2
+
+    def __init__(self, states: int, inputs: int, outputs: int, hippo_blocks: int) -> None:
+        super().__init__(states, inputs, outputs)
+        self.hippo_blocks = hippo_blocks
+        self.Lambda_re = nn.Parameter(torch.full((states,), -0.5))
+        self.Lambda_im = nn.Parameter(torch.zeros(states))
+        self.log_step = nn.Parameter(torch.zeros(states, 1))
+
+    def log_eigenvalues(self) -> Tensor:
+        return self._rates() * self.log_step[:, 0].double().exp()
+
+    def input_matrix(self) -> Tensor:
+        return scale_rows(self.B, torch.special.expm1(self.log_eigenvalues()) / self._rates())
+
+    def initialise(self, generator: torch.Generator) -> None:
+        """HiPPO-LegS in `hippo_blocks` blocks; B and C are real draws in its coordinates; Δ is log-uniform."""
+        states, _, inputs = self.B.shape
+        outputs, size = self.C.shape[0], 2 * states // self.hippo_blocks
+        rates, vectors = hippo_normal(size)
+        rates, vectors = rates[: size // 2], vectors[:, : size // 2]
+        self.Lambda_re.copy_(rates.real.repeat(self.hippo_blocks))
+        self.Lambda_im.copy_(rates.imag.repeat(self.hippo_blocks))
+        everywhere = torch.block_diag(*[vectors] * self.hippo_blocks)  # (2 states, states)
+        real_B = draw_lecun((2 * states, inputs), 2 * states, generator)
+        drawn = everywhere.mH @ real_B.to(everywhere)
+        self.B.copy_(torch.stack([drawn.real, drawn.imag], dim=1))
+        pair = draw_lecun((outputs, 2 * states, 2), 2 * states, generator)
+        self.C.copy_(torch.view_as_real(torch.view_as_complex(pair) @ everywhere))
+        self.D.normal_(generator=generator)
+        self.log_step.uniform_(math.log(SMALLEST_STEP), math.log(LARGEST_STEP), generator=generator)
+
+    def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
+        modes = len(log_eigenvalues)
+        rates = log_eigenvalues / self.log_step[:modes, 0].double().exp()
+        self.Lambda_re[:modes] = rates.real.to(self.Lambda_re)
+        self.Lambda_im[:modes] = rates.imag.to(self.Lambda_im)
+        self.B[:modes] = scale_rows(input_matrix, rates / torch.special.expm1(log_eigenvalues)).to(self.B)
+
+    def _rates(self) -> Tensor:
+        """Λ, complex128 (states,)."""
+        return torch.complex(self.Lambda_re.double(), self.Lambda_im.double())
+
+
+class S5(SSMString):
+    """See the module."""
+
+    def __init__(self, configuration: S5Configuration) -> None:
+        points, states, blocks = configuration.grid_points, configuration.state_size // 2, configuration.hippo_blocks
+        super().__init__(
+            configuration.input,
+            S5Layer(states, input_size(configuration.input, points), points, blocks),
+            [S5Layer(states, points, points, blocks) for _ in range(configuration.layers)],
+        )
+        self.configuration = configuration

@@ -1,0 +1,362 @@
+"""What the state-space strings (LRU, S5) share: the recurrence, the block, the stack and its streaming state.
+
+Source: the paper, §3.2. A first linear layer takes the initial displacement u₀ as an impulse,
+x_{k+1} = Ā x_k + B̄ u_k δ_k, y_k = C̄ x_k, where y is one sample late. Blocks follow: batch norm, a diagonal
+state-space layer, GELU, a gate (two dense layers, GLU), a skip connection. Between the non-linearities, which are
+pointwise in time, every layer is linear and time-invariant, so a whole stretch of time goes through layer by layer.
+
+Inside, tensors are time-major: (steps, batch, features).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.inputs import InputKind, join_input
+from engine.sine_transform import analysis_matrix, synthesis_matrix
+
+CHUNK = 32  # steps between two exact carries; fewer cost more carries, more collect more rounding
+ROWS_AT_ONCE = 1024  # batch × steps that go through the layers together and still fit the cache
+
+
+def powers(log_eigenvalues: Tensor, exponents: Tensor) -> Tensor:
+    """λᵏ, complex128 (steps, n), of log λ, complex128 (n,), for k in `exponents` (steps,): exact phases for any k."""
+    k = exponents.to(torch.float64)[:, None]
+    magnitude = torch.exp(k * log_eigenvalues.real)
+    return torch.polar(magnitude, torch.remainder(k * log_eigenvalues.imag, 2 * math.pi))
+
+
+def first_powers(log_eigenvalues: Tensor, count: int) -> Tensor:
+    """λ¹ … λ^count, complex128 (count, n), by doubling: a few roundings in float64 instead of a sine each."""
+    table = powers(log_eigenvalues, torch.ones(1, device=log_eigenvalues.device))
+    while len(table) < count:
+        table = torch.cat([table, table * table[-1]])
+    return table[:count]
+
+
+def evolve(log_eigenvalues: Tensor, state: Tensor, steps: int, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
+    """x_k = λᵏ x₀ for k = 1 … steps, without recursion.
+
+    Args:
+        state: x₀, complex128 (batch, n).
+        dtype: complex type of the result.
+
+    Returns:
+        The states (steps, batch, n), and the last one as complex128.
+    """
+    exponents = torch.arange(0, steps, CHUNK, device=state.device)
+    coarse = powers(log_eigenvalues, exponents)[:, None] * state
+    fine = first_powers(log_eigenvalues, min(CHUNK, steps))
+    states = coarse.to(dtype)[:, None] * fine.to(dtype)[:, None]
+    last = coarse[-1] * fine[(steps - 1) % CHUNK]
+    return states.flatten(0, 1)[:steps], last
+
+
+def accumulate(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor, backwards: bool) -> tuple[Tensor, Tensor]:
+    """x_k = λ x_{k-1} + v_k in two levels: inside all chunks at once, then from chunk to chunk.
+
+    The carry is complex128 and its powers of λ are exact, so the rounding of `inputs` is bounded by what one chunk
+    collects, however long the layer remembers and wherever a caller splits the time.
+
+    Args:
+        inputs: v, complex (steps, batch, n).
+        state: x before the first step, complex128 (batch, n).
+        backwards: run from the last step to the first.
+
+    Returns:
+        All states, like `inputs`, and the last one computed, complex128.
+    """
+    steps, *row = inputs.shape
+    length = min(CHUNK, steps)
+    chunks = -(-steps // length)
+    missing = chunks * length - steps
+    if missing:
+        zeros = inputs.new_zeros(missing, *row)
+        inputs = torch.cat([zeros, inputs] if backwards else [inputs, zeros])
+    along = -1 if backwards else 1
+    power = first_powers(log_eigenvalues, length)
+
+    given = inputs.unflatten(0, (chunks, length))
+    states = torch.empty_like(given)
+    rows_given, rows = given.unbind(1)[::along], states.unbind(1)[::along]  # each (chunks, batch, n)
+    rows[0].copy_(rows_given[0])
+    eigenvalue = power[0].to(inputs.dtype)
+    for k in range(1, length):
+        torch.addcmul(rows_given[k], eigenvalue, rows[k - 1], out=rows[k])
+
+    carries = [state]
+    for end in rows[-1].to(state.dtype).unbind(0)[::along][:-1]:
+        carries.append(torch.addcmul(end, power[-1], carries[-1]))
+    final = length - 1 - missing
+    last = torch.addcmul(rows[final].unbind(0)[::along][-1].to(state.dtype), power[final], carries[-1])
+
+    carried = torch.stack(carries[::along]).to(inputs.dtype)
+    factor = (power.flip(0) if backwards else power).to(inputs.dtype)
+    states.addcmul_(factor[:, None], carried[:, None])
+    return states.flatten(0, 1).narrow(0, missing if backwards else 0, steps), last
+
+
+class _Recurrence(torch.autograd.Function):
+    """`accumulate` with its adjoint, which is the same recurrence with λ̄, backwards in time."""
+
+    @staticmethod
+    def forward(ctx: Any, inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        states, last = accumulate(inputs, log_eigenvalues, state, backwards=False)
+        ctx.set_materialize_grads(False)  # training rarely uses `last`
+        ctx.save_for_backward(states, log_eigenvalues, state)
+        return states, last
+
+    @staticmethod
+    def backward(ctx: Any, grad_states: Tensor | None, grad_last: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
+        states, log_eigenvalues, state = ctx.saved_tensors
+        grad_states = torch.zeros_like(states) if grad_states is None else grad_states
+        if grad_last is not None:
+            grad_states = torch.cat([grad_states[:-1], grad_states[-1:] + grad_last])
+        conjugate = log_eigenvalues.conj().resolve_conj()
+        adjoint, _ = accumulate(grad_states, conjugate, torch.zeros_like(state), backwards=True)
+        first = adjoint[0].to(state.dtype)
+        slope = (states[:-1].conj() * adjoint[1:]).sum((0, 1)) + (state.conj() * first).sum(0)
+        return adjoint, conjugate.exp() * slope, conjugate.exp() * first
+
+
+def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+    """x_k = λ x_{k-1} + v_k as in `accumulate`, by the route that suits: `inputs` may be overwritten.
+
+    Without gradients on a CPU a compiled loop over time is taken: for a block of 64 steps the chunks cost 25 times as
+    much, nearly all of it in calls.
+    """
+    if inputs.device.type == "cpu" and not torch.is_grad_enabled():
+        from engine.models._ssm_kernel import stream  # Numba only when it is needed
+
+        last = state.clone()
+        eigenvalues = torch.view_as_real(log_eigenvalues.exp())
+        stream(torch.view_as_real(inputs).numpy(), eigenvalues.numpy(), torch.view_as_real(last).numpy())
+        return inputs, last
+    states, last = _Recurrence.apply(inputs, log_eigenvalues, state)
+    return states, last
+
+
+def draw_lecun(shape: tuple[int, ...], fan_in: int, generator: torch.Generator) -> Tensor:
+    """float64 of variance 1/fan_in, normal, truncated at two standard deviations (the sources' `lecun_normal`)."""
+    drawn = torch.empty(shape, dtype=torch.float64)
+    nn.init.trunc_normal_(drawn, a=-2, b=2, generator=generator)
+    return drawn / (0.87962566103423978 * math.sqrt(fan_in))  # standard deviation of the truncated normal
+
+
+def scale_rows(matrix: Tensor, factor: Tensor) -> Tensor:
+    """Rows of a complex matrix, (n, 2, inputs) with real and imaginary parts in the middle, times complex (n,)."""
+    re, im = matrix.unbind(1)
+    scale_re, scale_im = factor.real.to(matrix.dtype)[:, None], factor.imag.to(matrix.dtype)[:, None]
+    return torch.stack([scale_re * re - scale_im * im, scale_re * im + scale_im * re], dim=1)
+
+
+class DiagonalSSM(nn.Module, ABC):
+    """x_k = λ x_{k-1} + B̄ u_k, y_k = Re(C̄ x_k) + D u_k with complex diagonal dynamics.
+
+    B is (states, 2, inputs) and C (outputs, states, 2), real and imaginary parts in the axis of size 2: products with
+    interleaved real and imaginary parts then need no copy. Subclasses say how λ and B̄ follow from what is stored.
+    """
+
+    conjugates: ClassVar[int]  # states that each stored one stands for: C̄ = conjugates · C
+
+    def __init__(self, states: int, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.B = nn.Parameter(torch.zeros(states, 2, inputs))
+        self.C = nn.Parameter(torch.zeros(outputs, states, 2))
+        self.D = nn.Parameter(torch.zeros(outputs))
+
+    @abstractmethod
+    def log_eigenvalues(self) -> Tensor:
+        """log λ per sample, complex128 (states,)."""
+
+    @abstractmethod
+    def input_matrix(self) -> Tensor:
+        """B̄ in the layout of B."""
+
+    @abstractmethod
+    def initialise(self, generator: torch.Generator) -> None:
+        """Draws every weight as the source does."""
+
+    @abstractmethod
+    def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
+        """Stores the first states so that they have these λ, complex128 (modes,), and this B̄, in the layout of B."""
+
+    def enter(self, inputs: Tensor, matrix: Tensor) -> Tensor:
+        """`matrix` u, complex (..., states), of real inputs (..., inputs)."""
+        return torch.view_as_complex(functional.linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
+
+    def read(self, states: Tensor) -> Tensor:
+        """Re(C̄ x), (..., outputs)."""
+        matrix = (
+            torch.conj_physical(torch.view_as_complex(self.C)) * self.conjugates
+        )  # Re(c x) = c_re x_re - c_im x_im
+        return functional.linear(torch.view_as_real(states).flatten(-2), torch.view_as_real(matrix).flatten(1))
+
+    def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """y (steps, batch, outputs) for u (steps, batch, inputs), and the last x."""
+        driven = self.enter(inputs, self.input_matrix())
+        states, last = recur(driven, self.log_eigenvalues(), state)
+        return torch.addcmul(self.read(states), self.D, inputs), last
+
+
+class Block(nn.Module):
+    """Batch norm, state-space layer, GELU, gate, skip: (steps, batch, features) to the same.
+
+    Batch norm is over batch and time in training and uses the stored statistics in evaluation.
+    """
+
+    def __init__(self, seq: DiagonalSSM, features: int) -> None:
+        super().__init__()
+        self.normalization = nn.BatchNorm1d(features)
+        self.seq = seq
+        self.gate = nn.Linear(features, 2 * features)  # the source's out1, then its out2
+
+    def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        normalised = self.normalization(inputs.flatten(0, 1)).view_as(inputs)
+        outputs, last = self.seq(normalised, state)
+        gated = functional.glu(self.gate(functional.gelu(outputs, approximate="tanh")), dim=-1)
+        return inputs + gated, last
+
+    def initialise(self, generator: torch.Generator) -> None:
+        self.normalization.reset_parameters()
+        self.seq.initialise(generator)
+        self.gate.weight.copy_(draw_lecun(tuple(self.gate.weight.shape), self.gate.in_features, generator))
+        self.gate.bias.zero_()
+
+
+@dataclass(frozen=True)
+class SSMState:
+    """Every layer's x, complex128 (batch, states) each, the first layer's first.
+
+    Double precision keeps the carried phases exact; the layers themselves run in the precision of the weights.
+    """
+
+    latents: tuple[Tensor, ...]
+
+
+class SSMString(StringModel[SSMState], ABC):
+    """A first layer from the initial condition or an excitation, then blocks."""
+
+    initialisations: ClassVar = ("paper", "physics")
+
+    def __init__(self, kind: InputKind, first_layer: DiagonalSSM, blocks: Sequence[DiagonalSSM]) -> None:
+        super().__init__()
+        self.input: InputKind = kind
+        self.grid_points = grid_points = first_layer.C.shape[0]
+        self.first_layer = first_layer
+        self.layers = nn.ModuleList([Block(seq, grid_points) for seq in blocks])
+
+    def rest(self, batch: int) -> SSMState:
+        """The state of `batch` strings at rest."""
+        ssms = self._ssms()
+        return SSMState(
+            tuple(torch.zeros(batch, s.B.shape[0], dtype=torch.complex128, device=s.B.device) for s in ssms)
+        )
+
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> SSMState:
+        """See the contract; `second` as in `engine.models.inputs.join_input`."""
+        origin = join_input(self.input, displacement, second)
+        origin = self.first_layer.enter(origin, self.first_layer.input_matrix()).to(torch.complex128)
+        return SSMState((origin, *self.rest(displacement.shape[0]).latents[1:]))
+
+    def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
+        return self._run(state, steps, None, readout)
+
+    def drive(self, state: SSMState, excitation: Tensor, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
+        """Like `advance`, with any excitation: §3.2 with u_k for every k in place of u_k δ_k.
+
+        An impulse at k = 0 from `rest` is `encode` and `advance` of the same displacement; zeros are `advance`.
+
+        Args:
+            excitation: (batch, steps, inputs), what the string is given at the present frame, at the next …, in the
+                form of the model's input (grid_points, or twice that with a second array) and normalised units. It
+                is heard from the frame after on.
+        """
+        return self._run(state, excitation.shape[1], excitation.transpose(0, 1), readout)
+
+    @property
+    def unstable(self) -> tuple[complex, ...]:
+        """Every eigenvalue with |λ| > 1, of all layers: with one of them the motion may grow without bound."""
+        with torch.no_grad():
+            eigenvalues = torch.cat([ssm.log_eigenvalues() for ssm in self._ssms()])
+        return tuple(eigenvalues[eigenvalues.real > 0].exp().tolist())
+
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """See the contract.
+
+        paper: as the source draws every layer.
+        physics: the first layer is the linear string, released from rest or with what else the model is given, on its
+            first `modes` states; its other states are not yet heard, and the blocks start as small corrections. Prior
+            knowledge that the paper's models do not have: say so in a table.
+        """
+        check_initialisation(self, how)
+        with torch.no_grad():
+            for ssm_or_block in (self.first_layer, *self.layers):
+                ssm_or_block.initialise(generator)
+            if how == "physics":
+                self._initialise_linear_string(physics)
+
+    def _initialise_linear_string(self, physics: Physics) -> None:
+        points, modes, first = self.grid_points, physics.modes, self.first_layer
+        if first.B.shape[0] < modes:
+            raise ValueError(
+                f"initialisation 'physics' needs a stored state for each of the {modes} modes, not {first.B.shape[0]}"
+            )
+        log_eigenvalues = physics.string.eigenvalues(modes) / physics.rate_hz
+        # q_k = Re(z λᵏ) with Re z = q₀; Im z is what makes the velocity or the frame before right
+        if self.input == "two_frames":
+            before = torch.exp(-log_eigenvalues)
+            imaginary = (before.real / before.imag, -1 / before.imag)
+        else:
+            imaginary = (log_eigenvalues.real / log_eigenvalues.imag, -1 / log_eigenvalues.imag)
+        analysis = analysis_matrix(points, modes).T
+        matrix = torch.zeros(modes, 2, 2 * points, dtype=torch.float64)
+        matrix[:, 0, :points] = analysis
+        matrix[:, 1] = torch.cat([factor[:, None] * analysis for factor in imaginary], dim=1)
+        first.set_modes(log_eigenvalues, matrix[:, :, : first.B.shape[2]])
+        first.C.zero_()
+        first.C[:, :modes, 0] = (synthesis_matrix(points, modes).T / first.conjugates).to(first.C)
+        for block in self.layers:
+            assert isinstance(block, Block)
+            block.gate.weight[:points].mul_(0.01)
+
+    def _ssms(self) -> list[DiagonalSSM]:
+        return [module for module in self.modules() if isinstance(module, DiagonalSSM)]  # the first layer's first
+
+    def _run(
+        self, state: SSMState, steps: int, excitation: Tensor | None, readout: Tensor | None
+    ) -> tuple[Tensor, SSMState]:
+        # batch statistics need the whole time at once
+        at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
+        parts = []
+        for done in range(0, steps, at_once):
+            count = min(at_once, steps - done)
+            part, state = self._stretch(state, count, None if excitation is None else excitation[done : done + count])
+            parts.append(part if readout is None else part @ readout.to(part))
+        return torch.cat(parts).transpose(0, 1), state
+
+    def _stretch(self, state: SSMState, steps: int, excitation: Tensor | None) -> tuple[Tensor, SSMState]:
+        """Frames, time-major, and the state after them."""
+        first = self.first_layer
+        if excitation is None:
+            dtype = first.B.dtype.to_complex()
+            states, last = evolve(first.log_eigenvalues(), state.latents[0], steps, dtype)
+        else:
+            # y is one sample late: x_{k+1} = λ (x_k + B̄ u_k)
+            log_eigenvalues = first.log_eigenvalues()
+            matrix = scale_rows(first.input_matrix(), log_eigenvalues.exp())
+            states, last = recur(first.enter(excitation, matrix), log_eigenvalues, state.latents[0])
+        frames, latents = first.read(states), [last]
+        for block, latent in zip(self.layers, state.latents[1:], strict=True):
+            frames, last = block(frames, latent)
+            latents.append(last)
+        return frames, SSMState(tuple(latents))

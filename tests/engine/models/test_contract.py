@@ -1,0 +1,145 @@
+"""The contract of `engine.models.base`, for every model in the table at the paper's sizes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from engine.models import MODELS, StringModel, build_model, count_parameters
+from engine.models.base import Physics
+from engine.pluck import Pluck
+from engine.preset import load_preset, read_info, save_preset
+from engine.schema import SchemaError, write
+from engine.sine_transform import listening_weights
+from engine.sources import ModelSource, project
+from engine.string import StringParameters
+
+PAPER_COUNTS = {
+    "koopman": 191_077,
+    "koopman_var": 134_885,
+    "lru": 636_221,
+    "s5": 307_879,
+    "fgru": 640_033,
+    "frnn": 643_201,
+}
+PHYSICS = Physics(StringParameters(), 10, 4_000)
+
+
+def made(name: str, seed: int = 0) -> StringModel[Any]:
+    model = build_model(name)
+    model.initialise(model.initialisations[0], PHYSICS, torch.Generator().manual_seed(seed))
+    return model.eval()
+
+
+@pytest.fixture(scope="module", params=list(MODELS))
+def named_model(request: pytest.FixtureRequest) -> tuple[str, StringModel[Any]]:
+    return request.param, made(request.param)
+
+
+@pytest.mark.parametrize("name", PAPER_COUNTS)
+def test_the_counts_are_those_of_table_2(name: str) -> None:
+    with torch.device("meta"):
+        assert count_parameters(build_model(name)) == PAPER_COUNTS[name]
+
+
+@torch.inference_mode()
+def test_any_splitting_into_blocks_is_the_same_motion(named_model: tuple[str, StringModel[Any]]) -> None:
+    _, model = named_model
+    initial = (Pluck().displacement(101) / 1e-3).float()[None]
+    whole = model(initial, 700)
+    state, parts = model.encode(initial), []
+    for steps in (1, 64, 65, 257, 313):
+        part, state = model.advance(state, steps)
+        parts.append(part)
+    torch.testing.assert_close(torch.cat(parts, 1), whole, rtol=0, atol=1e-5 * float(whole.abs().max()))
+
+
+@torch.inference_mode()
+def test_a_state_can_be_gone_on_from_twice(named_model: tuple[str, StringModel[Any]]) -> None:
+    _, model = named_model
+    initial = (Pluck().displacement(101) / 1e-3).float()[None]
+    _, state = model.advance(model.encode(initial), 50)
+    first, _ = model.advance(state, 30)
+    again, _ = model.advance(state, 30)
+    assert torch.equal(first, again)
+
+
+@torch.inference_mode()
+def test_listening_is_the_grid_at_that_point(named_model: tuple[str, StringModel[Any]]) -> None:
+    _, model = named_model
+    initial = (Pluck().displacement(101) / 1e-3).float()[None]
+    weights = listening_weights(torch.tensor([0.37, 0.61], dtype=torch.float64), 101).float()
+    grid = model(initial, 64)
+    heard = model(initial, 64, weights)
+    assert heard.shape == (1, 64, 2)
+    torch.testing.assert_close(heard, grid @ weights, rtol=0, atol=2e-5 * float(grid.abs().max()))
+
+
+def test_the_seed_decides_all(named_model: tuple[str, StringModel[Any]]) -> None:
+    name, model = named_model
+    again = made(name).state_dict()
+    assert all(torch.equal(again[key], tensor) for key, tensor in model.state_dict().items())
+
+
+def test_an_unknown_initialisation_is_named(named_model: tuple[str, StringModel[Any]]) -> None:
+    _, model = named_model
+    with pytest.raises(ValueError, match="'guess'"):
+        model.initialise("guess", PHYSICS, torch.Generator())
+
+
+def test_a_preset_of_it_renders_what_the_model_does(
+    named_model: tuple[str, StringModel[Any]], preset_file: Path, tmp_path: Path
+) -> None:
+    name, model = named_model
+    info = replace(
+        read_info(preset_file),
+        model=name,
+        model_configuration=write(model.configuration),
+        initialisation=model.initialisations[0],
+    )
+    path = tmp_path / f"{name}.safetensors"
+    save_preset(path, info, model)
+    preset = load_preset(path)
+    for key, tensor in model.state_dict().items():
+        assert torch.equal(preset.model.state_dict()[key], tensor)
+    source = ModelSource(preset)
+    initial = project(Pluck(0.4, 3.0).displacement(101), info.modes)[None]
+    frames, _ = source.advance(source.start(initial), 16)
+    with torch.inference_mode():
+        expected = model((initial / info.scale_m).float(), 16) * info.scale_m
+    torch.testing.assert_close(frames, expected)
+
+
+def test_sizes_are_checked_by_name() -> None:
+    with pytest.raises(SchemaError, match="unknown field 'depht'"):
+        build_model("frnn", {"depht": 3})
+
+
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "dmd"])
+def test_a_velocity_can_be_given_and_at_rest_it_is_zero(name: str, preset_file: Path, tmp_path: Path) -> None:
+    model = build_model(name, {"input": "displacement_velocity"})
+    model.initialise(model.initialisations[0], PHYSICS, torch.Generator().manual_seed(0))
+    info = replace(read_info(preset_file), model=name, model_configuration=write(model.configuration))
+    path = tmp_path / f"{name}.safetensors"
+    save_preset(path, info, model)
+    source = ModelSource(load_preset(path))
+    initial = project(Pluck(0.4, 3.0).displacement(101), info.modes)[None]
+    frames, _ = source.advance(source.start(initial), 4)
+    displacement = (initial / info.scale_m).float()
+    with torch.inference_mode():
+        state = model.eval().encode(displacement, torch.zeros_like(displacement))
+        expected = model.advance(state, 4)[0] * info.scale_m
+    torch.testing.assert_close(frames, expected)
+
+
+def test_a_preset_that_needs_two_frames_says_so(preset_file: Path, tmp_path: Path) -> None:
+    model = build_model("koopman", {"input": "two_frames"})
+    model.initialise("paper", PHYSICS, torch.Generator())
+    info = replace(read_info(preset_file), model="koopman", model_configuration=write(model.configuration))
+    save_preset(tmp_path / "two.safetensors", info, model)
+    with pytest.raises(ValueError, match=r"two\.safetensors: its model needs the frame before"):
+        ModelSource(load_preset(tmp_path / "two.safetensors"))

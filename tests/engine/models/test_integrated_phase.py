@@ -1,0 +1,281 @@
+"""Koopman with integrated phase against a plain quadrature, the physics, and the laws of the contract."""
+
+import math
+from fractions import Fraction
+
+import pytest
+import torch
+from torch import Tensor
+
+from engine.excitation import draw_gaussians
+from engine.models import MODELS, IntegratedPhaseConfiguration, KoopmanIntegrated, count_parameters
+from engine.models.base import Physics
+from engine.models.integrated_phase import integrate_parabolas
+from engine.reference import ModalState, SplittingSolver, solve_linear
+from engine.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
+from engine.string import StringParameters
+
+SMALL = {"encoder_widths": (12,), "eigenvalue_widths": (12, 12)}
+KINDS: tuple[dict, ...] = (
+    {"encoder_widths": (), "eigenvalue_widths": ()},
+    SMALL,
+    SMALL | {"multiplier_widths": (8,), "decoder_widths": (8,), "node_spacing": 7},
+)
+
+
+def string_model(how: str = "averaging", seed: int = 0, **sizes: object) -> KoopmanIntegrated:
+    model = KoopmanIntegrated(IntegratedPhaseConfiguration(**{"state_size": 12, **SMALL, **sizes}))  # type: ignore[arg-type]
+    model.initialise(how, Physics(StringParameters(), 10, 4_000, 1e-3), torch.Generator().manual_seed(seed))
+    return model.eval()
+
+
+@torch.no_grad()
+def stirred_model(**sizes: object) -> KoopmanIntegrated:
+    """One that uses all it has: every last layer and the real part of K are away from zero."""
+    model = string_model(**sizes)
+    generator = torch.Generator().manual_seed(5)
+    for name, parameter in model.named_parameters():
+        if parameter.abs().max() == 0 and name != "K":
+            parameter.normal_(0, 0.1, generator=generator)
+    model.K[:12].normal_(0, 0.02, generator=generator)
+    return model
+
+
+def initial(batch: int = 2) -> Tensor:
+    amplitudes = torch.randn(batch, 10, generator=torch.Generator().manual_seed(1))
+    return to_grid(amplitudes / torch.arange(1, 11), 101)
+
+
+def relative(found: Tensor, expected: Tensor) -> float:
+    return float((found - expected).abs().max() / expected.abs().max())
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("sizes", KINDS)
+def test_agrees_with_a_plain_quadrature(sizes: dict) -> None:
+    """The definition, with the network's integral by the trapezoid rule at every hundredth of a sample."""
+    model = stirred_model(**sizes | {"node_spacing": 4}).double()
+    c = model.configuration
+    z = model.encode(initial(1).double()).origin[0]
+    sigma, omega = model.nu_log.exp(), model.theta_log.exp()
+    limit = c.gain_limit_db * math.log(10) / 20
+
+    def energies(times: Tensor) -> Tensor:
+        return z.abs().square() * torch.exp(-2 * sigma * times[:, None])
+
+    def f(times: Tensor) -> Tensor:
+        found = energies(times) @ model.K.T
+        if model.g is not None:
+            found = found + model.g(energies(times)) - model.g(torch.zeros(12).double())
+        return found * c.rate_unit
+
+    fine = torch.arange(60 * 100 + 1, dtype=torch.float64) / 100
+    integral = torch.cumulative_trapezoid(f(fine), fine, dim=0)[99::100]
+    growth, turn = integral.chunk(2, dim=-1)
+    times = torch.arange(1, 61, dtype=torch.float64)[:, None]
+    expected = z * torch.exp(torch.complex(limit * torch.tanh(growth / limit) - sigma * times, omega * times + turn))
+    assert relative(model.latents(z[None], times[:, 0])[0], expected) < 1e-6
+    assert relative(model(initial(1).double(), 60)[0], model.decode(expected)) < 1e-6
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("sizes", KINDS)
+def test_any_splitting_into_blocks_is_the_same_motion(sizes: dict) -> None:
+    model = stirred_model(**sizes)
+    whole = model(initial(), 8000)
+    state, parts = model.encode(initial()), []
+    for steps in (1, 64, 65, 2047, 3, 5820):
+        part, state = model.advance(state, steps)
+        parts.append(part)
+    assert relative(torch.cat(parts, 1), whole) < 1e-5
+    assert state.time == 8000
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("sizes", KINDS)
+def test_rendering_is_random_access(sizes: dict) -> None:
+    model = stirred_model(**sizes)
+    whole = model(initial(), 2000)
+    frames = torch.tensor([1700, 3, 40, 2000])
+    z = model.latents(model.encode(initial()).origin, frames)
+    assert relative(model.decode(z), whole[:, frames - 1]) < 1e-5
+    _, state = model.advance(model.encode(initial()), 1000)
+    assert relative(model.at(state, torch.tensor([0.0, 700, 3])), whole[:, [999, 1699, 1002]]) < 1e-5
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("step", [Fraction(1, 3), Fraction(160, 441), Fraction(2), Fraction(50)])
+def test_renders_at_any_rate(step: Fraction) -> None:
+    model = stirred_model()
+    state = model.encode(initial())
+    times = torch.arange(1, 301, dtype=torch.float64) * float(step)
+    expected = model.at(state, times)
+    first, later = model.advance(state, 77, step_size=step)
+    second, later = model.advance(later, 223, step_size=step)
+    assert relative(torch.cat([first, second], 1), expected) < 1e-5
+    assert later.time == 300 * step
+    third, _ = model.advance(later, 20)  # and another rate from there
+    assert relative(third, model.at(later, torch.arange(1.0, 21.0))) < 1e-5
+    with pytest.raises(ValueError, match="step_size must be above 0, not 0"):
+        model.advance(state, 1, step_size=0)
+    with pytest.raises(ValueError, match="before the state's own"):
+        model.at(later, torch.tensor([-1.0]))
+
+
+@torch.no_grad()
+def test_phases_stay_exact_after_a_million_steps() -> None:
+    """Against rational arithmetic's substitute, the phase reduced step by step in two parts; f is spent by then."""
+    model = string_model("physics")
+    model.nu_log.fill_(math.log(1e-7))
+    state = model.encode(initial(1))
+    late = type(state)(state.origin, Fraction(1_000_000), state.integral)
+    omega = model.theta_log.double().exp()
+    thousand = torch.remainder(1000 * omega, 2 * math.pi)
+    angle = torch.remainder(1000 * thousand, 2 * math.pi) + omega
+    factor = torch.polar(torch.full_like(angle, math.exp(-1e-7 * 1_000_001)), angle)
+    expected = model.decode((state.origin * factor).to(state.origin.dtype))
+    assert relative(model.advance(late, 1)[0][:, 0], expected) < 1e-5
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("sizes", KINDS)
+def test_listening_is_the_grid_at_that_point(sizes: dict) -> None:
+    model = stirred_model(**sizes)
+    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 101)
+    assert relative(model(initial(), 50, weights), model(initial(), 50) @ weights.float()) < 1e-5
+
+
+@torch.no_grad()
+def test_integration_is_exact_for_parabolas() -> None:
+    half_nodes, times = torch.arange(7).double() / 2, torch.tensor([0, 0.3, 1, 1.5, 2.9, 3]).double()
+    integral, slope = integrate_parabolas((1 + 2 * half_nodes - 3 * half_nodes**2)[None, :, None], times)
+    torch.testing.assert_close(integral[0, :, 0], times + times**2 - times**3)
+    torch.testing.assert_close(slope[0, :, 0], 1 + 2 * times - 3 * times**2)
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("kind", ["displacement", "displacement_velocity", "two_frames"])
+def test_physics_initialisation_is_the_linear_string(kind: str) -> None:
+    string, rate_hz = StringParameters(), 4_000
+    generator = torch.Generator().manual_seed(2)
+    velocity = torch.randn(1, 10, dtype=torch.float64, generator=generator) * 1e3
+    state = ModalState(
+        torch.randn(1, 10, dtype=torch.float64, generator=generator), velocity * (kind != "displacement")
+    )
+    truth = to_grid(solve_linear(string, state, torch.arange(402, dtype=torch.float64) / rate_hz), 101)
+    begin, second = 0, None
+    if kind == "displacement_velocity":
+        second = to_grid(velocity / rate_hz, 101)
+    elif kind == "two_frames":
+        begin, second = 1, truth[:, 0]
+    model = string_model("physics", input=kind).double()
+    found, _ = model.advance(model.encode(truth[:, begin], second), 400)
+    assert relative(found, truth[:, begin + 1 : begin + 401]) < 1e-4  # the logarithms were float32
+
+
+@torch.no_grad()
+def test_averaging_is_nearly_the_tension_modulated_string() -> None:
+    string, rate_hz, steps = StringParameters(), 4_000, 4000
+    amplitudes = to_modes(draw_gaussians(8, 101, torch.Generator().manual_seed(0)), 10)
+    solver = SplittingSolver(string, 10, rate_hz, tension_modulated=True)
+    truth = solver.solve(ModalState.at_rest(amplitudes), steps) @ (synthesis_matrix(101, 10) / 1e-3)
+    errors = {}
+    for how in ("physics", "averaging"):
+        model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
+        model.initialise(how, Physics(string, 10, rate_hz, 1e-3), torch.Generator().manual_seed(0))
+        difference = model(truth[:, 0].float(), steps) - truth[:, 1:]
+        errors[how] = float((difference.square().sum((1, 2)) / truth[:, 1:].square().sum((1, 2))).mean())
+    assert errors["averaging"] < 2e-4
+    assert errors["physics"] > 0.5
+
+
+def test_averaging_of_the_linear_string_is_the_linear_string() -> None:
+    model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
+    physics = Physics(StringParameters(), 10, 4_000, 1e-3, tension_modulated=False)
+    model.initialise("averaging", physics, torch.Generator().manual_seed(0))
+    assert not model.K.any()
+
+
+@torch.no_grad()
+def test_no_parameters_let_it_grow() -> None:
+    """|z(t)| ≤ |z(0)| e^{b - σt} whatever the weights; a render keeps to it within 8/27 of b between its segments."""
+    for scale in (1.0, 30.0, 1e3):
+        model = string_model("random", decoder_widths=())
+        generator = torch.Generator().manual_seed(3)
+        for parameter in model.parameters():
+            parameter.normal_(0, scale, generator=generator)
+        for logarithm in (model.nu_log, model.theta_log):
+            logarithm.uniform_(-12, 3, generator=generator)
+        state = model.encode(initial(1) / scale)
+        model.decoder.weight.copy_(torch.eye(101, 24))
+        model.decoder.bias.zero_()
+        parts = model.advance(state, 3000)[0][0, :, :24].double()
+        found = torch.hypot(*parts.chunk(2, dim=-1))
+        b, sigma = 0.3 * math.log(10), model.nu_log.double().exp()
+        bound = state.origin.abs().double() * torch.exp(35 / 27 * b - sigma * torch.arange(1, 3001)[:, None])
+        assert torch.isfinite(found).all()
+        assert (found <= bound * (1 + 1e-4) + 1e-30).all()
+        frames = torch.tensor([1, 10, 100, 1000])
+        exact = model.latents(state.origin, frames)[0].abs().double()
+        assert (exact <= state.origin.abs() * torch.exp(b - sigma * frames[:, None]) * (1 + 1e-5)).all()
+
+
+@pytest.mark.parametrize("how", KoopmanIntegrated.initialisations)
+def test_the_seed_decides_all(how: str) -> None:
+    first, again, other = (string_model(how, seed).state_dict() for seed in (1, 1, 2))
+    assert all(torch.equal(first[name], again[name]) for name in first)
+    assert not torch.equal(first["nu_log"], other["nu_log"])
+
+
+@pytest.mark.parametrize("sizes", KINDS)
+def test_every_parameter_learns(sizes: dict) -> None:
+    """Random access and rendering have the same finite gradients, also for a latent that is exactly zero."""
+    model = stirred_model(**sizes).double()
+    start = initial(1).double()
+    frames = torch.tensor([3, 50, 200])
+    with torch.no_grad():
+        for network in (model.encoder, model.encoder_residual):
+            for layer in network.modules() if network else ():
+                if isinstance(layer, torch.nn.Linear) and layer.out_features == 24:
+                    layer.weight[[4, 16]] = 0
+                    layer.bias[[4, 16]] = 0
+    gradients = []
+    for found in (model.decode(model.latents(model.encode(start).origin, frames)), model(start, 200)[:, frames - 1]):
+        model.zero_grad()
+        found.square().sum().backward()
+        gradients.append({name: p.grad.clone() for name, p in model.named_parameters() if p.grad is not None})
+    assert gradients[0].keys() == dict(model.named_parameters()).keys()
+    for name, gradient in gradients[0].items():
+        assert torch.isfinite(gradient).all(), name
+        assert torch.isfinite(gradients[1][name]).all(), name
+        if not name.startswith("encoder"):  # the latent at zero: polar coordinates have no gradient there
+            assert relative(gradients[1][name], gradient) < 1e-3, name
+
+
+def test_sizes_and_name() -> None:
+    one = IntegratedPhaseConfiguration(state_size=10, multiplier_widths=(128, 128))
+    assert 77_000 < count_parameters(KoopmanIntegrated(one)) < 78_000
+    assert MODELS["koopman_integrated"] == (KoopmanIntegrated, IntegratedPhaseConfiguration)
+    with torch.device("meta"):
+        assert KoopmanIntegrated(IntegratedPhaseConfiguration()).K.is_meta
+
+
+@pytest.mark.parametrize(
+    "sizes", [{"grid_points": 0}, {"state_size": -1}, {"eigenvalue_widths": (4, 0)}, {"node_spacing": 0}]
+)
+def test_impossible_sizes_are_named(sizes: dict) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(sizes))} must be at least 1"):
+        IntegratedPhaseConfiguration(**sizes)
+
+
+def test_impossible_units_are_named() -> None:
+    for name in ("rate_unit", "gain_limit_db"):
+        with pytest.raises(ValueError, match=f"{name} must be above 0"):
+            IntegratedPhaseConfiguration(**{name: 0.0})  # type: ignore[arg-type]
+
+
+def test_physics_initialisation_needs_a_latent_for_each_mode() -> None:
+    with pytest.raises(ValueError, match="at least the 10 modes, not 5"):
+        string_model("physics", state_size=5)
+    with pytest.raises(ValueError, match="'guess' is not one of random, physics, averaging"):
+        string_model("guess")

@@ -1,0 +1,199 @@
+"""The laws of the contract for both state-space strings, and the recurrence that they share."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from engine.models import LRU, S5, LRUConfiguration, S5Configuration
+from engine.models.base import Physics
+from engine.models.ssm import SSMString, evolve, recur
+from engine.reference import ModalState, solve_linear
+from engine.sine_transform import listening_weights, to_grid
+from engine.string import StringParameters
+
+PHYSICS = Physics(StringParameters(), 10, 4_000)
+NAMES = ("lru", "s5")
+
+
+def small_model(name: str, seed: int = 0, how: str = "paper", kind: str = "displacement") -> SSMString:
+    model: SSMString
+    if name == "lru":
+        model = LRU(LRUConfiguration(21, kind, state_size=24, layers=3))  # type: ignore[arg-type]
+    else:
+        model = S5(S5Configuration(21, kind, state_size=32, hippo_blocks=4, layers=3))  # type: ignore[arg-type]
+    model.initialise(how, PHYSICS, torch.Generator().manual_seed(seed))
+    return model.eval()
+
+
+def initial(batch: int = 2, points: int = 21) -> torch.Tensor:
+    return torch.randn(batch, points, generator=torch.Generator().manual_seed(1))
+
+
+def random_recurrence(steps: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """v, log λ and x₀, all in double precision."""
+    generator = torch.Generator().manual_seed(3)
+
+    def draw(*shape: int) -> torch.Tensor:
+        return torch.randn(*shape, dtype=torch.complex128, generator=generator)
+
+    log_eigenvalues = torch.complex(-0.1 * draw(5).abs(), 2 * draw(5).real)
+    return draw(steps, 2, 5), log_eigenvalues, draw(2, 5)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 31, 32, 33, 64, 100])
+def test_both_routes_are_the_plain_recurrence(steps: int) -> None:
+    inputs, log_eigenvalues, state = random_recurrence(steps)
+    expected, x = [], state
+    for v in inputs:
+        x = log_eigenvalues.exp() * x + v
+        expected.append(x)
+    parallel, last = recur(inputs, log_eigenvalues, state)
+    torch.testing.assert_close(parallel, torch.stack(expected), rtol=0, atol=1e-12)
+    torch.testing.assert_close(last, expected[-1], rtol=0, atol=1e-12)
+    with torch.no_grad():
+        sequential, last = recur(inputs.clone(), log_eigenvalues, state)
+    torch.testing.assert_close(sequential, torch.stack(expected), rtol=0, atol=1e-12)
+    torch.testing.assert_close(last, expected[-1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [1, 34])
+def test_the_adjoint_is_the_derivative(steps: int) -> None:
+    given = tuple(tensor[..., :1].clone().requires_grad_() for tensor in random_recurrence(steps))
+    assert torch.autograd.gradcheck(recur, given)
+    assert torch.autograd.gradcheck(lambda a, x: evolve(a, x, steps, torch.complex128), given[1:])
+
+
+def test_phases_stay_exact_after_a_million_steps() -> None:
+    log_eigenvalues = torch.tensor([-1e-7 + 0.3j, -1e-8 + 3.1j], dtype=torch.complex128)
+    state, done = torch.ones(1, 2, dtype=torch.complex128), 0
+    for steps in (1000, 1, 997, 2) * 500:
+        _, state = evolve(log_eigenvalues, state, steps, torch.complex64)
+        done += steps
+    assert done == 1_000_000
+    phase = torch.remainder(done * log_eigenvalues.imag, 2 * torch.pi)
+    expected = torch.polar(torch.exp(done * log_eigenvalues.real), phase)
+    torch.testing.assert_close(state[0], expected, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@torch.no_grad()
+def test_any_splitting_into_blocks_is_the_same_motion(name: str) -> None:
+    model = small_model(name)
+    whole = model(initial(), 5000)
+    state, parts = model.encode(initial()), []
+    for steps in (1, 64, 65, 1, 1, 31, 2047, 2790):
+        part, state = model.advance(state, steps)
+        parts.append(part)
+    torch.testing.assert_close(torch.cat(parts, 1), whole, rtol=0, atol=1e-5 * float(whole.abs().max()))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_training_and_rendering_take_the_same_path(name: str) -> None:
+    """With gradients the chunks run in parallel, without them the loop over time."""
+    model = small_model(name)
+    parallel = model(initial(), 300)
+    assert parallel.requires_grad
+    with torch.no_grad():
+        sequential = model(initial(), 300)
+    torch.testing.assert_close(parallel.detach(), sequential, rtol=0, atol=1e-5 * float(sequential.abs().max()))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_training_normalises_over_batch_and_time_and_reaches_every_weight(name: str) -> None:
+    model = small_model(name).train()
+    model(initial(3), 40).square().mean().backward()
+    unreached = [name for name, weight in model.named_parameters() if weight.grad is None or not weight.grad.any()]
+    assert unreached == ["first_layer.D"]  # as in the source: counted, not used
+    assert all(block.normalization.running_mean.any() for block in model.layers)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@torch.no_grad()
+def test_listening_is_the_grid_at_that_point(name: str) -> None:
+    model = small_model(name)
+    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 21)
+    heard = model(initial(), 50, weights)
+    torch.testing.assert_close(heard, model(initial(), 50) @ weights.float(), rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@torch.no_grad()
+def test_an_impulse_is_an_initial_condition(name: str) -> None:
+    model = small_model(name).double()
+    impulse = torch.zeros(2, 200, 21, dtype=torch.float64)
+    impulse[:, 0] = initial().double()
+    driven, state = model.drive(model.rest(2), impulse)
+    plucked, other = model.advance(model.encode(impulse[:, 0]), 200)
+    torch.testing.assert_close(driven, plucked, rtol=0, atol=1e-11)
+    for mine, theirs in zip(state.latents, other.latents, strict=True):
+        torch.testing.assert_close(mine, theirs, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@torch.no_grad()
+def test_an_excitation_adds_to_the_motion(name: str) -> None:
+    """Silence advances; the first layer superposes; any splitting is the same motion."""
+    model = small_model(name)
+    state = model.encode(initial())
+    silent, _ = model.drive(state, torch.zeros(2, 70, 21))
+    torch.testing.assert_close(silent, model.advance(state, 70)[0], rtol=1e-4, atol=1e-5)
+    excitation = torch.randn(2, 300, 21, generator=torch.Generator().manual_seed(4))
+    whole, last = model.drive(state, excitation)
+    first, state = model.drive(state, excitation[:, :77])
+    second, state = model.drive(state, excitation[:, 77:])
+    torch.testing.assert_close(torch.cat([first, second], 1), whole, rtol=1e-4, atol=1e-4)
+    superposed = model.encode(excitation[:, 0] + excitation[:, 1]).latents[0]
+    torch.testing.assert_close(
+        superposed, model.encode(excitation[:, 0]).latents[0] + model.encode(excitation[:, 1]).latents[0]
+    )
+    assert last.latents[0].shape == superposed.shape
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", ["displacement", "displacement_velocity", "two_frames"])
+@torch.no_grad()
+def test_physics_initialisation_is_nearly_the_linear_string(name: str, kind: str) -> None:
+    model = small_model(name, how="physics", kind=kind)
+    amplitudes = torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
+    start = 0 if kind == "displacement" else 7  # later, the string has a velocity
+    times_s = (start + torch.arange(-1, 201, dtype=torch.float64)) / PHYSICS.rate_hz
+    moving = solve_linear(PHYSICS.string, ModalState.at_rest(amplitudes), times_s.clamp(min=0))
+    truth = to_grid(moving, 21).float()
+    second = None
+    if kind == "displacement_velocity":
+        near_s = (start + torch.tensor([-1e-3, 1e-3], dtype=torch.float64)) / PHYSICS.rate_hz
+        earlier, later = solve_linear(PHYSICS.string, ModalState.at_rest(amplitudes), near_s).unbind(1)
+        second = to_grid((later - earlier) / 2e-3, 21).float()
+    elif kind == "two_frames":
+        second = truth[:, 0]
+    found, _ = model.advance(model.encode(truth[:, 1], second), 200)
+    assert float((found - truth[:, 2:]).norm() / truth[:, 2:].norm()) < 0.1
+    linear, _ = evolve(
+        model.first_layer.log_eigenvalues(), model.encode(truth[:, 1], second).latents[0], 200, torch.complex64
+    )
+    heard = model.first_layer.read(linear).transpose(0, 1)
+    torch.testing.assert_close(heard, truth[:, 2:], rtol=0, atol=2e-3 * float(truth.abs().max()))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_seed_decides_all(name: str) -> None:
+    first, again, other = (small_model(name, seed).state_dict() for seed in (1, 1, 2))
+    assert all(torch.equal(first[key], again[key]) for key in first)
+    assert not torch.equal(first["layers.1.seq.B"], other["layers.1.seq.B"])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_models_can_be_built_without_memory(name: str) -> None:
+    with torch.device("meta"):
+        model = LRU(LRUConfiguration()) if name == "lru" else S5(S5Configuration())
+    assert all(weight.is_meta for weight in model.state_dict().values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_physics_initialisation_needs_a_state_for_each_mode(name: str) -> None:
+    model = small_model(name)
+    with pytest.raises(ValueError, match="each of the 30 modes"):
+        model.initialise("physics", Physics(StringParameters(), 30, 4_000), torch.Generator())
+    with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
+        model.initialise("guess", PHYSICS, torch.Generator())
