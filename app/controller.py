@@ -241,8 +241,8 @@ class Controller(QObject):
 
     def _choose_first_preset(self) -> None:
         if self.entry is None and self.entries:
-            wanted = max(self.entries, key=lambda e: e.info.rate_hz)
-            self.session.update(preset=wanted.name)
+            best = min(self.entries, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae)
+            self.session.update(preset=best.name)
 
     # Rendering
 
