@@ -241,7 +241,9 @@ class Controller(QObject):
 
     def _choose_first_preset(self) -> None:
         if self.entry is None and self.entries:
-            best = min(self.entries, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae)
+            highest_hz = max(entry.info.rate_hz for entry in self.entries)
+            fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
+            best = min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae)
             self.session.update(preset=best.name)
 
     # Rendering
