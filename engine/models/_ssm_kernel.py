@@ -1,19 +1,55 @@
-"""The compiled recurrence of a diagonal state space layer, for rendering in short blocks."""
+"""The compiled parts of a state-space block for rendering: the diagonal recurrence and what is pointwise."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
+from engine.models._fno_kernel import _COMPILED, _HALF, _ONE, _tanh
 
-@njit(cache=True, nogil=True)
+_CUBIC, _ROOT = np.float32(0.044715), np.float32(np.sqrt(2 / np.pi))
+
+
+@njit(**_COMPILED)
 def stream(inputs: np.ndarray, eigenvalues: np.ndarray, state: np.ndarray) -> None:
-    """x_k = λ x_{k-1} + v_k step by step in float64, in place in `inputs` (steps, batch, n, 2) and `state`."""
-    steps, batch, n, _ = inputs.shape
-    for k in range(steps):
-        for b in range(batch):
+    """x_k = λ x_{k-1} + v_k step by step in float64, in place.
+
+    Args:
+        inputs: (steps, batch, 2, n), apart in real and imaginary parts, so that the loop becomes vector instructions.
+        eigenvalues: float64 (n, 2).
+        state: float64 (batch, n, 2).
+    """
+    steps, batch, _, n = inputs.shape
+    a, b = eigenvalues[:, 0].copy(), eigenvalues[:, 1].copy()
+    for row in range(batch):
+        re, im = state[row, :, 0].copy(), state[row, :, 1].copy()
+        for k in range(steps):
+            v, w = inputs[k, row, 0], inputs[k, row, 1]
             for i in range(n):
-                re = eigenvalues[i, 0] * state[b, i, 0] - eigenvalues[i, 1] * state[b, i, 1] + inputs[k, b, i, 0]
-                im = eigenvalues[i, 0] * state[b, i, 1] + eigenvalues[i, 1] * state[b, i, 0] + inputs[k, b, i, 1]
-                state[b, i, 0], state[b, i, 1] = re, im
-                inputs[k, b, i, 0], inputs[k, b, i, 1] = re, im
+                p = a[i] * re[i] - b[i] * im[i] + v[i]
+                q = a[i] * im[i] + b[i] * re[i] + w[i]
+                re[i], im[i] = p, q
+                v[i], w[i] = p, q
+        state[row, :, 0] = re
+        state[row, :, 1] = im
+
+
+@njit(**_COMPILED)
+def add_and_gelu(outputs: np.ndarray, frames: np.ndarray, scale: np.ndarray, shift: np.ndarray) -> None:
+    """GELU(outputs + scale · frames + shift), in place in `outputs`; all float32, (rows, features) or (features,)."""
+    rows, features = outputs.shape
+    for r in range(rows):
+        y, u = outputs[r], frames[r]
+        for f in range(features):
+            x = y[f] + scale[f] * u[f] + shift[f]
+            y[f] = _HALF * x * (_ONE + _tanh(_ROOT * x * (_ONE + _CUBIC * x * x)))
+
+
+@njit(**_COMPILED)
+def add_gated(frames: np.ndarray, gates: np.ndarray) -> None:
+    """Adds the gated linear unit of `gates`, float32 (rows, 2 features), to `frames`, float32 (rows, features)."""
+    rows, features = frames.shape
+    for r in range(rows):
+        y, value, gate = frames[r], gates[r, :features], gates[r, features:]
+        for f in range(features):
+            y[f] += value[f] * (_HALF + _HALF * _tanh(_HALF * gate[f]))

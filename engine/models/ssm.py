@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor, nn
@@ -129,7 +129,7 @@ class _Recurrence(torch.autograd.Function):
 
 
 def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-    """x_k = λ x_{k-1} + v_k as in `accumulate`, by the route that suits: `inputs` may be overwritten.
+    """x_k = λ x_{k-1} + v_k as in `accumulate`, by the route that suits.
 
     Without gradients on a CPU a compiled loop over time is taken: for a block of 64 steps the chunks cost 25 times as
     much, nearly all of it in calls.
@@ -138,9 +138,10 @@ def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tenso
         from engine.models._ssm_kernel import stream  # Numba only when it is needed
 
         last = state.clone()
+        apart = torch.stack([inputs.real, inputs.imag], dim=-2)
         eigenvalues = torch.view_as_real(log_eigenvalues.exp())
-        stream(torch.view_as_real(inputs).numpy(), eigenvalues.numpy(), torch.view_as_real(last).numpy())
-        return inputs, last
+        stream(apart.numpy(), eigenvalues.numpy(), torch.view_as_real(last).numpy())
+        return torch.complex(*apart.unbind(-2)), last
     states, last = _Recurrence.apply(inputs, log_eigenvalues, state)
     return states, last
 
@@ -194,6 +195,11 @@ class DiagonalSSM(nn.Module, ABC):
         """`matrix` u, complex (..., states), of real inputs (..., inputs)."""
         return torch.view_as_complex(functional.linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
 
+    def apart(self) -> tuple[Tensor, Tensor]:
+        """B̄ (2 states, inputs) and the matrix of Re(C̄ x) (outputs, 2 states), all real parts before all imaginary."""
+        real, imaginary = (self.conjugates * self.C).unbind(-1)
+        return self.input_matrix().transpose(0, 1).flatten(0, 1), torch.cat([real, -imaginary], dim=1)
+
     def read(self, states: Tensor) -> Tensor:
         """Re(C̄ x), (..., outputs)."""
         matrix = (
@@ -226,11 +232,67 @@ class Block(nn.Module):
         gated = functional.glu(self.gate(functional.gelu(outputs, approximate="tanh")), dim=-1)
         return inputs + gated, last
 
+    def fold(self) -> FoldedBlock:
+        """This block in evaluation."""
+        norm = self.normalization
+        assert norm.running_mean is not None and norm.running_var is not None
+        scale = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
+        shift = norm.bias - norm.running_mean * scale
+        enter, read = self.seq.apart()
+        return FoldedBlock(
+            enter=enter * scale,
+            enter_bias=enter @ shift,
+            eigenvalues=torch.view_as_real(self.seq.log_eigenvalues().exp()),
+            read=read,
+            through=self.seq.D * scale,
+            through_bias=self.seq.D * shift,
+            gate=self.gate,
+        )
+
     def initialise(self, generator: torch.Generator) -> None:
         self.normalization.reset_parameters()
         self.seq.initialise(generator)
         self.gate.weight.copy_(draw_lecun(tuple(self.gate.weight.shape), self.gate.in_features, generator))
         self.gate.bias.zero_()
+
+
+@dataclass(frozen=True)
+class FoldedBlock:
+    """A block in evaluation for rendering on a CPU: batch norm is in the matrices, and what is left is few calls.
+
+    Attributes:
+        enter, enter_bias: what drives the states, (2 states, features), all real parts first.
+        eigenvalues: λ, float64 (states, 2).
+        read: (features, 2 states).
+        through, through_bias: D, (features,).
+        gate: of the block.
+    """
+
+    enter: Tensor
+    enter_bias: Tensor
+    eigenvalues: Tensor
+    read: Tensor
+    through: Tensor
+    through_bias: Tensor
+    gate: nn.Linear
+
+    def __call__(self, frames: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """As the block; `frames` may be overwritten."""
+        from engine.models import _ssm_kernel as kernel  # Numba only when it is needed
+
+        last = state.clone()
+        states = functional.linear(frames, self.enter, self.enter_bias)
+        kernel.stream(
+            states.unflatten(-1, (2, -1)).numpy(), self.eigenvalues.numpy(), torch.view_as_real(last).numpy()
+        )
+        outputs = functional.linear(states, self.read)
+        if frames.dtype != torch.float32:
+            outputs = outputs + self.through * frames + self.through_bias
+            return frames + functional.glu(self.gate(functional.gelu(outputs, approximate="tanh"))), last
+        rows = frames.flatten(0, 1).numpy()
+        kernel.add_and_gelu(outputs.flatten(0, 1).numpy(), rows, self.through.numpy(), self.through_bias.numpy())
+        kernel.add_gated(rows, self.gate(outputs).flatten(0, 1).numpy())
+        return frames, last
 
 
 @dataclass(frozen=True)
@@ -337,14 +399,22 @@ class SSMString(StringModel[SSMState], ABC):
     ) -> tuple[Tensor, SSMState]:
         # batch statistics need the whole time at once
         at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
+        rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
+        layers = cast("Iterable[Block]", self.layers)
+        blocks: Iterable[Block | FoldedBlock] = (block.fold() if rendering else block for block in layers)
+        if steps > at_once:
+            blocks = list(blocks)  # a single stretch folds one block after the other, in the same memory
         parts = []
         for done in range(0, steps, at_once):
             count = min(at_once, steps - done)
-            part, state = self._stretch(state, count, None if excitation is None else excitation[done : done + count])
+            given = None if excitation is None else excitation[done : done + count]
+            part, state = self._stretch(blocks, state, count, given)
             parts.append(part if readout is None else part @ readout.to(part))
         return torch.cat(parts).transpose(0, 1), state
 
-    def _stretch(self, state: SSMState, steps: int, excitation: Tensor | None) -> tuple[Tensor, SSMState]:
+    def _stretch(
+        self, blocks: Iterable[Block | FoldedBlock], state: SSMState, steps: int, excitation: Tensor | None
+    ) -> tuple[Tensor, SSMState]:
         """Frames, time-major, and the state after them."""
         first = self.first_layer
         if excitation is None:
@@ -356,7 +426,7 @@ class SSMString(StringModel[SSMState], ABC):
             matrix = scale_rows(first.input_matrix(), log_eigenvalues.exp())
             states, last = recur(first.enter(excitation, matrix), log_eigenvalues, state.latents[0])
         frames, latents = first.read(states), [last]
-        for block, latent in zip(self.layers, state.latents[1:], strict=True):
+        for block, latent in zip(blocks, state.latents[1:], strict=True):
             frames, last = block(frames, latent)
             latents.append(last)
         return frames, SSMState(tuple(latents))
