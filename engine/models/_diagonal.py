@@ -44,11 +44,16 @@ class DiagonalModel(StringModel[KoopmanState]):
         """Displacement (batch, count, points) of frames first … first + count - 1."""
 
     def advance(self, state: KoopmanState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, KoopmanState]:
+        most = self._frames_at_once(len(state.origin))
         blocks = [
-            self.render(state.origin, state.step + 1 + done, min(FRAMES_AT_ONCE, steps - done), readout)
-            for done in range(0, steps, FRAMES_AT_ONCE)
+            self.render(state.origin, state.step + 1 + done, min(most, steps - done), readout)
+            for done in range(0, steps, most)
         ]
         return torch.cat(blocks, dim=1), KoopmanState(state.origin, state.step + steps)
+
+    def _frames_at_once(self, batch: int) -> int:
+        """Frames in a block of a long advance."""
+        return FRAMES_AT_ONCE
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z_k = λᵏ z₀ of any frames (int64, any order), complex (batch, frames, state_size)."""

@@ -46,6 +46,9 @@ from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import analysis_matrix, synthesis_matrix
 
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
+SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
+MOST_PRODUCTS = 1024  # frames of a listening point's segment: rounding grows with their cube, to 1e-7
+LISTENING_POINTS = 8  # at most: more are better read off with matrix products
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
 
@@ -119,6 +122,20 @@ class _Motion(NamedTuple):
     phase_rate: Tensor
 
 
+class _Segments(NamedTuple):
+    """Cubics of log |z| and of its phase, one a segment.
+
+    Attributes:
+        ends: left and right values and slopes, float64 (4, 2, batch, segments, state_size), levels before phases.
+        alive: the latents that are loud enough to count.
+        begin: the wanted frames' place in the first segment.
+    """
+
+    ends: Tensor
+    alive: Tensor
+    begin: int
+
+
 class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     """See the module."""
 
@@ -167,10 +184,14 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             raise ValueError(f"step_size must be above 0, not {step_size}")
         rates, step = self._rates(), Fraction(step_size)
         most = max(1, NUMBERS_AT_ONCE // self.configuration.state_size)
-        blocks = []
-        for done in range(0, steps, most):
-            block, state = self._render(state, rates, min(most, steps - done), step, readout)
+        blocks, done = [], 0
+        while done < steps:
+            if readout is not None and self._can_listen(state, readout):
+                block, state = self._listen(state, rates, min(SEGMENT * most, steps - done), step, readout)
+            else:
+                block, state = self._render(state, rates, min(most, steps - done), step, readout)
             blocks.append(block)
+            done += block.shape[1]
         return torch.cat(blocks, dim=1), state
 
     def at(self, state: IntegratedPhaseState, times: Tensor, readout: Tensor | None = None) -> Tensor:
@@ -211,11 +232,74 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
 
         Level and phase are computed at the ends of short segments, in float64, and are cubics with the right slopes
         in between (Hermite), which leaves errors of the order of h|f| (2σh)³/384 for segments of h samples: a frame
-        costs a sine, a cosine and an exponential a latent. Segments lie at fixed frames, so a frame is the same in
-        whichever block it is rendered. A gain that would change by more than b in a segment, which no string does,
-        has its slope held there: so within a segment no gain exceeds b by more than 8/27 of it.
+        costs a sine, a cosine and an exponential a latent.
         """
-        length = max(1, int(min(SEGMENT, self.configuration.node_spacing) // step))  # frames in a segment
+        length = self._segment_length(SEGMENT, step)
+        segments, later = self._segments(state, rates, count, step, length)
+        alive = segments.alive
+        if self.multiplier is not None or self.decoder_residual is not None:
+            alive = torch.arange(len(rates.sigma), device=alive.device)  # their networks take every latent
+        ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
+        # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
+        log_radius, phase = (_hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
+        radius = torch.exp(log_radius)
+        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
+        frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
+        return frames[:, segments.begin : segments.begin + count], later
+
+    def _can_listen(self, state: IntegratedPhaseState, readout: Tensor) -> bool:
+        """Whether `_listen` applies: a linear decoder at a few points, on a processor, and no gradients asked for."""
+        return (
+            self.multiplier is None
+            and self.decoder_residual is None
+            and readout.shape[-1] <= LISTENING_POINTS
+            and state.origin.device.type == "cpu"
+            and not torch.is_grad_enabled()
+        )
+
+    def _listen(
+        self, state: IntegratedPhaseState, rates: _Rates, most: int, step: Fraction, readout: Tensor
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        """As `_render`, of at most `most` frames, with the sum over latents in a compiled kernel.
+
+        The kernel advances the exponential of a cubic by products, so that the segments' ends are what costs; they
+        lie further apart once t ≥ 16h. What changes f on a time scale of h has faded by then: of the energies' decay
+        at any rate σ at most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and where a segment lies between two nodes
+        the network's integral is a cubic itself.
+        """
+        from engine.models._diagonal_kernel import listen  # Numba only when it is needed
+
+        spacing = self.configuration.node_spacing
+        ahead = math.ceil(SETTLED * spacing / step) - (state.time // step + 1)  # frames of short segments
+        length = min(self._segment_length(SEGMENT if ahead > 0 else spacing, step), MOST_PRODUCTS)
+        count = min(most, ahead) if ahead > 0 else most
+        segments, later = self._segments(state, rates, count, step, length)
+        log_radius, phase = (
+            (_differences(length).to(segments.ends) @ segments.ends.flatten(1)).view_as(segments.ends).unbind(1)
+        )
+        radius = torch.exp(log_radius[..., segments.alive])
+        phase = phase[..., segments.alive]
+        factors = torch.stack([radius * torch.cos(phase), radius * torch.sin(phase)])
+        weight, bias = read_layer(self.decoder, readout)
+        weights = torch.stack(weight.double().chunk(2, dim=-1))[..., segments.alive]
+        frames = factors.new_empty(*factors.shape[2:4], length, len(bias))
+        listen(factors.numpy(), weights.contiguous().numpy(), frames.numpy())
+        frames = frames.flatten(1, 2)[:, segments.begin : segments.begin + count]
+        return frames.to(bias.dtype) + bias, later
+
+    def _segment_length(self, samples: int, step: Fraction) -> int:
+        """Frames in a segment of at most so many samples."""
+        return max(1, int(min(samples, self.configuration.node_spacing) // step))
+
+    def _segments(
+        self, state: IntegratedPhaseState, rates: _Rates, count: int, step: Fraction, length: int
+    ) -> tuple[_Segments, IntegratedPhaseState]:
+        """The segments of `length` frames that hold the next `count` frames, and the state after those.
+
+        Segments lie at fixed frames, so a frame is the same in whichever block it is rendered. A gain that would
+        change by more than b in a segment, which no string does, has its slope held there: so within a segment no
+        gain exceeds b by more than 8/27 of it.
+        """
         frames_done, offset = divmod(state.time, step)
         first, last = (frames_done + 1) // length, (frames_done + count) // length
         width = float(length * step)
@@ -228,22 +312,13 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         level = motion.gain - rates.sigma * times[:, None] + start.abs().clamp(min=1e-300).log()
         # a string's high modes are over long before it is, and numbers too small for float32 are slow
         alive = (level.detach().amax((0, 1)) > SILENCE).nonzero()[:, 0]
-        if self.multiplier is not None or self.decoder_residual is not None:
-            alive = torch.arange(len(rates.sigma), device=times.device)  # their networks take every latent
         left = torch.stack([level[:, :-1], torch.remainder(motion.phase[:, :-1] + angle, 2 * math.pi)])
         right = left + torch.stack([level.diff(dim=1), motion.phase.diff(dim=1)])
         held = (motion.gain_rate * width).clamp(-self._gain_limit, self._gain_limit)
         slopes = torch.stack([held - rates.sigma * width, motion.phase_rate * width])
-        ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])[..., alive].to(
-            self.decoder.weight.dtype
-        )
-        # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
-        log_radius, phase = (_hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
-        radius = torch.exp(log_radius)
-        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
-        frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
-        begin = frames_done + 1 - first * length
-        return frames[:, begin : begin + count], IntegratedPhaseState(state.origin, end, integral)
+        ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])
+        segments = _Segments(ends, alive, frames_done + 1 - first * length)
+        return segments, IntegratedPhaseState(state.origin, end, integral)
 
     def _move(
         self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: Fraction
@@ -408,6 +483,15 @@ def _hermite(count: int, like: Tensor) -> Tensor:
     square, cube = share**2, share**3
     right = 3 * square - 2 * cube
     return torch.stack([1 - right, right, share - 2 * square + cube, cube - square], dim=1).to(like)
+
+
+def _differences(count: int) -> Tensor:
+    """As `_hermite`, weights (4, 4) of the value at 0 and of the first three differences at spacing 1/count."""
+    slope = torch.tensor([0, 0, 1, 0], dtype=torch.float64) / count
+    bend = torch.tensor([-3, 3, -2, -1], dtype=torch.float64) / count**2
+    cube = torch.tensor([2, -2, 1, 1], dtype=torch.float64) / count**3
+    value = torch.tensor([1, 0, 0, 0], dtype=torch.float64)
+    return torch.stack([value, slope + bend + cube, 2 * bend + 6 * cube, 6 * cube])
 
 
 def _integrated_nodes(time: Fraction, spacing: int) -> int:

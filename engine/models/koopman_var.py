@@ -21,6 +21,7 @@ from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models._diagonal import (
+    FRAMES_AT_ONCE,
     SEGMENT,
     DiagonalModel,
     KoopmanState,
@@ -40,6 +41,7 @@ from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import analysis_matrix, synthesis_matrix
 
+LONG = 4 * FRAMES_AT_ONCE  # frames, times the batch, of a block with interpolated multipliers: they hold few latents
 SHORT = 512  # frames of a block of which every multiplier is computed: to look for fewer takes as long
 
 
@@ -95,11 +97,17 @@ class KoopmanVar(DiagonalModel):
         return dense(latents * self._multipliers(latents), *read_layer(self.decoder, readout))
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
-        if self.training or self.multiplier_tolerance == 0 or count <= SHORT:
+        if not self._interpolates() or count <= SHORT:
             return self.decode(self.successive_latents(origin, first, count), readout)
         start, stop = first // SEGMENT * SEGMENT, -(-(first + count) // SEGMENT) * SEGMENT
         frames = self._render_interpolated(origin, start, stop, readout)
         return frames[:, first - start : first - start + count]
+
+    def _interpolates(self) -> bool:
+        return not self.training and self.multiplier_tolerance > 0
+
+    def _frames_at_once(self, batch: int) -> int:
+        return max(FRAMES_AT_ONCE, LONG // batch) if self._interpolates() and batch else FRAMES_AT_ONCE
 
     def _multipliers(self, latents: Tensor) -> Tensor:
         """m(|z|²), complex (..., state_size)."""

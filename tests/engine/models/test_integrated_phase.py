@@ -146,6 +146,49 @@ def test_listening_is_the_grid_at_that_point(sizes: dict) -> None:
 
 
 @torch.no_grad()
+@pytest.mark.parametrize("step", [Fraction(1), Fraction(1, 3), Fraction(160, 441), Fraction(50)])
+@pytest.mark.parametrize("sizes", KINDS[:2])
+def test_listening_is_the_same_motion_over_long_segments(sizes: dict, step: Fraction) -> None:
+    """Linear decoders have a route of their own to a few points, with longer segments after t = 640 samples."""
+    model = stirred_model(**sizes)
+    state, weights = model.encode(initial()), listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 101)
+    heard, _ = model.advance(state, 3000, weights, step)
+    exact = model.at(state, torch.arange(1, 3001, dtype=torch.float64) * float(step), weights)
+    late = int(700 / step)
+    assert relative(heard, exact) < 3e-6
+    assert relative(heard[:, late:], exact[:, late:]) < 3e-6
+    assert relative(heard, model.advance(state, 3000, step_size=step)[0] @ weights.float()) < 1e-5
+    parts, later = [], state
+    for steps in (1, 64, 575, 3, 1357, 1000):
+        part, later = model.advance(later, steps, weights, step)
+        parts.append(part)
+    assert relative(torch.cat(parts, 1), heard) < 1e-5
+    assert later.time == 3000 * step
+
+
+def test_listening_with_gradients_is_listening_without() -> None:
+    model = stirred_model()
+    weights = listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)
+    heard = model(initial(), 1000, weights)
+    heard.square().sum().backward()
+    assert model.K.grad is not None
+    with torch.no_grad():
+        assert relative(model(initial(), 1000, weights), heard.detach()) < 1e-5
+
+
+@torch.no_grad()
+def test_phases_stay_exact_at_a_listening_point() -> None:
+    """The compiled sum a million samples on, against random access."""
+    model = stirred_model()
+    model.nu_log.fill_(math.log(1e-7))
+    state = model.encode(initial(1))
+    late = type(state)(state.origin, Fraction(1_000_000), state.integral)
+    weights = listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)
+    heard, _ = model.advance(late, 300, weights)
+    assert relative(heard, model.at(late, torch.arange(1.0, 301.0), weights)) < 1e-5
+
+
+@torch.no_grad()
 def test_integration_is_exact_for_parabolas() -> None:
     half_nodes, times = torch.arange(7).double() / 2, torch.tensor([0, 0.3, 1, 1.5, 2.9, 3]).double()
     integral, slope = integrate_parabolas((1 + 2 * half_nodes - 3 * half_nodes**2)[None, :, None], times)

@@ -62,13 +62,14 @@ def test_agrees_with_a_plain_recurrence() -> None:
 
 
 @torch.no_grad()
-def test_any_splitting_into_blocks_is_the_same_motion() -> None:
+@pytest.mark.parametrize("readout", [None, listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)])
+def test_any_splitting_into_blocks_is_the_same_motion(readout: torch.Tensor | None) -> None:
     model = small_model()
     initial = torch.randn(2, 101, generator=torch.Generator().manual_seed(1))
-    whole = model(initial, 5000)
+    whole = model(initial, 20_000, readout)
     state, parts = model.encode(initial), []
-    for steps in (1, 64, 65, 2047, 2823):
-        part, state = model.advance(state, steps)
+    for steps in (1, 64, 65, 2047, 2823, 10_000, 5000):
+        part, state = model.advance(state, steps, readout)
         parts.append(part)
     torch.testing.assert_close(torch.cat(parts, 1), whole, rtol=0, atol=1e-5 * float(whole.abs().max()))
 
