@@ -144,11 +144,3 @@ def dense_layers(model: nn.Module) -> list[nn.Linear]:
 def initialise_orthogonal(layer: nn.Linear, generator: torch.Generator) -> None:
     nn.init.orthogonal_(layer.weight, generator=generator)
     nn.init.zeros_(layer.bias)
-
-
-def check_sizes(configuration: object, *names: str) -> None:
-    """Raises ValueError, naming the field, where a size or one of a tuple of sizes is below 1."""
-    for name in names:
-        value = getattr(configuration, name)
-        if any(size < 1 for size in (value if isinstance(value, tuple) else (value,))):
-            raise ValueError(f"{name} must be at least 1, not {value}")

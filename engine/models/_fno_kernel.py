@@ -20,27 +20,15 @@ frequencies as points; widths are even.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from engine.models._compiled import COMPILED, HALF, ZERO, tanh
+
 Array = NDArray[np.float32]
 Pair = tuple[Array, Array]
-
-# Fast mathematics without "nnan" and "ninf": a model that blows up shall be seen to. NumPy's errors: Python's test of
-# every divisor keeps loops from becoming vector instructions.
-_COMPILED: dict[str, Any] = {
-    "cache": True,
-    "nogil": True,
-    "fastmath": {"reassoc", "contract", "nsz", "arcp"},
-    "error_model": "numpy",
-}
-# A number in the source would be a double and take the whole expression with it.
-_ZERO, _HALF, _ONE, _TWO, _LARGE = (np.float32(x) for x in (0, 0.5, 1, 2, 9))
-_P0, _P1, _P2 = (np.float32(x) for x in (135135, 17325, 378))
-_Q0, _Q1, _Q2, _Q3 = (np.float32(x) for x in (135135, 62370, 3150, 28))
 
 
 @cache
@@ -57,7 +45,7 @@ def transform_matrices(points: int) -> Pair:
     return forward.astype(np.float32), np.ascontiguousarray(inverse, dtype=np.float32)
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def advance_fgru(
     hidden: Array,
     frames: Array,
@@ -85,17 +73,17 @@ def advance_fgru(
         _convolve(spectrum, weights[1], biases[1], inverse, product, folded, r)
         for t in range(points):
             for w in range(width):
-                r[t, w] = (_HALF + _HALF * _tanh(_HALF * r[t, w])) * hidden[t, w]
+                r[t, w] = (HALF + HALF * tanh(HALF * r[t, w])) * hidden[t, w]
         _analyse(r, forward, folded, spectrum)
         _convolve(spectrum, weights[2], biases[2], inverse, product, folded, candidate)
         for t in range(points):
             for w in range(width):
-                gate = _HALF + _HALF * _tanh(_HALF * z[t, w])
-                hidden[t, w] += gate * (_tanh(candidate[t, w]) - hidden[t, w])
+                gate = HALF + HALF * tanh(HALF * z[t, w])
+                hidden[t, w] += gate * (tanh(candidate[t, w]) - hidden[t, w])
         _read(hidden, out, frames[step])
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def advance_frnn(
     hidden: Array,
     frames: Array,
@@ -123,12 +111,12 @@ def advance_frnn(
             for t in range(points):
                 for w in range(width):
                     value = branch[t, w]
-                    positive = _ZERO if value < _ZERO else value  # in this order NaN is kept
+                    positive = ZERO if value < ZERO else value  # in this order NaN is kept
                     hidden[t, w] = positive + straight[t, w] + bias[w]
         _read(hidden, out, frames[step])
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def _analyse(field: Array, forward: Array, folded: Array, spectrum: Array) -> None:
     """The spectrum of a field, by its symmetric and its antisymmetric half."""
     points, width = field.shape
@@ -141,7 +129,7 @@ def _analyse(field: Array, forward: Array, folded: Array, spectrum: Array) -> No
     np.dot(forward[1], folded[1], spectrum[1])
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def _convolve(
     spectrum: Array, weights: Array, bias: Array, inverse: Array, product: Array, folded: Array, field: Array
 ) -> None:
@@ -169,7 +157,7 @@ def _convolve(
             field[points - t, w] = bias[points - t, w] + folded[0, t, w] - folded[1, t, w]
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def _read(hidden: Array, out: Pair, frame: Array) -> None:
     """The displacement of every point."""
     weights, biases = out
@@ -178,15 +166,3 @@ def _read(hidden: Array, out: Pair, frame: Array) -> None:
         for w in range(hidden.shape[1]):
             total += hidden[t, w] * weights[0, w, 0]
         frame[t] = total
-
-
-@njit(**_COMPILED)
-def _tanh(x: np.float32) -> np.float32:
-    """tanh x to 1.3e-7: Lambert's continued fraction of tanh(x/2) to depth 7, then tanh 2y = 2 tanh y/(1 + tanh² y).
-
-    Beyond ±9 it is ±1 in single precision.
-    """
-    y = _HALF * (-_LARGE if x < -_LARGE else _LARGE if x > _LARGE else x)  # in this order NaN is kept
-    s = y * y
-    t = y * (_P0 + s * (_P1 + s * (_P2 + s))) / (_Q0 + s * (_Q1 + s * (_Q2 + _Q3 * s)))
-    return _TWO * t / (_ONE + t * t)

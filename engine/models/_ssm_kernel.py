@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from engine.models._fno_kernel import _COMPILED, _HALF, _ONE, _tanh
+from engine.models._compiled import COMPILED, HALF, ONE, tanh
 
 _CUBIC, _ROOT = np.float32(0.044715), np.float32(np.sqrt(2 / np.pi))
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def stream(inputs: np.ndarray, eigenvalues: np.ndarray, state: np.ndarray) -> None:
     """x_k = λ x_{k-1} + v_k step by step in float64, in place.
 
@@ -34,7 +34,7 @@ def stream(inputs: np.ndarray, eigenvalues: np.ndarray, state: np.ndarray) -> No
         state[row, :, 1] = im
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def add_and_gelu(outputs: np.ndarray, frames: np.ndarray, scale: np.ndarray, shift: np.ndarray) -> None:
     """GELU(outputs + scale · frames + shift), in place in `outputs`; all float32, (rows, features) or (features,)."""
     rows, features = outputs.shape
@@ -42,14 +42,14 @@ def add_and_gelu(outputs: np.ndarray, frames: np.ndarray, scale: np.ndarray, shi
         y, u = outputs[r], frames[r]
         for f in range(features):
             x = y[f] + scale[f] * u[f] + shift[f]
-            y[f] = _HALF * x * (_ONE + _tanh(_ROOT * x * (_ONE + _CUBIC * x * x)))
+            y[f] = HALF * x * (ONE + tanh(_ROOT * x * (ONE + _CUBIC * x * x)))
 
 
-@njit(**_COMPILED)
+@njit(**COMPILED)
 def add_gated(frames: np.ndarray, gates: np.ndarray) -> None:
     """Adds the gated linear unit of `gates`, float32 (rows, 2 features), to `frames`, float32 (rows, features)."""
     rows, features = frames.shape
     for r in range(rows):
         y, value, gate = frames[r], gates[r, :features], gates[r, features:]
         for f in range(features):
-            y[f] += value[f] * (_HALF + _HALF * _tanh(_HALF * gate[f]))
+            y[f] += value[f] * (HALF + HALF * tanh(HALF * gate[f]))

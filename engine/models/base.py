@@ -81,6 +81,14 @@ def check_initialisation(model: StringModel[State], how: str) -> None:
         raise ValueError(f"initialisation {how!r} is not one of {', '.join(model.initialisations)}")
 
 
+def check_sizes(configuration: object, *names: str) -> None:
+    """Raises ValueError, naming the field, where a size or one of a tuple of sizes is below 1."""
+    for name in names:
+        value = getattr(configuration, name)
+        if any(size < 1 for size in (value if isinstance(value, tuple) else (value,))):
+            raise ValueError(f"{name} must be at least 1, not {value}")
+
+
 def count_parameters(model: nn.Module) -> int:
     """Trainable numbers, a complex one counted as two."""
     return sum(p.numel() * (2 if p.is_complex() else 1) for p in model.parameters() if p.requires_grad)

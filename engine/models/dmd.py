@@ -19,8 +19,8 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models._diagonal import DiagonalModel, KoopmanState, check_sizes, dense
-from engine.models.base import Physics, check_initialisation
+from engine.models._diagonal import DiagonalModel, KoopmanState, dense
+from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import synthesis_matrix
 

@@ -21,17 +21,6 @@ def powers(nu_log: Tensor, theta_log: Tensor, steps: Tensor) -> Tensor:
     return torch.polar(magnitude, phase)
 
 
-def successive_powers(nu_log: Tensor, theta_log: Tensor, first: int, count: int) -> Tensor:
-    """λᵏ for k = first … first + count - 1, complex128 (count, n).
-
-    As products λᵃ λᵇ of a coarse and a fine table: two roundings in float64 instead of a sine each.
-    """
-    device = nu_log.device
-    fine = powers(nu_log, theta_log, torch.arange(min(64, count), device=device))
-    coarse = powers(nu_log, theta_log, torch.arange(first, first + count, 64, device=device))
-    return (coarse[:, None] * fine).flatten(0, 1)[:count]
-
-
 def draw_ring(
     size: int, generator: torch.Generator, inner: float = 0.99, outer: float = 1.0
 ) -> tuple[Tensor, Tensor]:
@@ -44,8 +33,3 @@ def draw_ring(
 def pack(pair: Tensor) -> Tensor:
     """(..., 2n) with the real parts first to complex (..., n)."""
     return torch.complex(*pair.chunk(2, dim=-1))
-
-
-def unpack(value: Tensor) -> Tensor:
-    """Complex (..., n) to (..., 2n) with the real parts first."""
-    return torch.cat([value.real, value.imag], dim=-1)

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class FGRUConfiguration:
     input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
-        _check_sizes(self, "grid_points", "width")
+        check_sizes(self, "grid_points", "width")
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,7 @@ class FRNNConfiguration:
     input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
-        _check_sizes(self, "grid_points", "width", "depth")
-
-
-def _check_sizes(configuration: object, *names: str) -> None:
-    for name in names:
-        if getattr(configuration, name) < 1:
-            raise ValueError(f"{name} must be at least 1, not {getattr(configuration, name)}")
+        check_sizes(self, "grid_points", "width", "depth")
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,6 @@ import torch
 from torch import Tensor, nn
 
 from engine.models._diagonal import (
-    check_sizes,
     dense_layers,
     initialise_orthogonal,
     linear_string_eigenvalues,
@@ -40,7 +39,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import analysis_matrix, synthesis_matrix

@@ -20,7 +20,6 @@ from engine.models import eigenvalues
 from engine.models._diagonal import (
     DiagonalModel,
     KoopmanState,
-    check_sizes,
     dense,
     dense_layers,
     initialise_orthogonal,
@@ -30,7 +29,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import Physics, check_initialisation
+from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 

@@ -25,7 +25,6 @@ from engine.models._diagonal import (
     SEGMENT,
     DiagonalModel,
     KoopmanState,
-    check_sizes,
     dense,
     dense_layers,
     energy,
@@ -36,7 +35,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import Physics, check_initialisation
+from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import analysis_matrix, synthesis_matrix
