@@ -10,6 +10,7 @@ from platformdirs import user_config_path
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from app.session import Choices
+from engine.whole_file import whole_file
 
 
 class ExportChoices(BaseModel):
@@ -74,9 +75,5 @@ def load_settings(path: Path) -> tuple[Settings, str]:
 def save_settings(path: Path, settings: Settings) -> None:
     """Writes whole or not at all. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(f".{os.getpid()}.unfinished")
-    try:
+    with whole_file(path) as unfinished:
         unfinished.write_text(settings.model_dump_json(indent=2), encoding="utf-8")
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)

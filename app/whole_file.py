@@ -1,13 +1,14 @@
-"""Files that are written whole or not at all."""
+"""Results that are written whole or not at all, and told in plain words why not."""
 
 from __future__ import annotations
 
 import errno
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
+
+from engine import whole_file as engine_files
 
 REMEDIES = {
     errno.ENOSPC: "free some space, or choose another disk",
@@ -38,13 +39,8 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         target = path.resolve()  # through a link, to the file that it names
         if target.exists() and not target.is_file():  # a folder, or a device that must not be replaced
             raise WriteError(f"{path}: not a file that can be replaced; choose another name")
-        unfinished = target.with_name(f".{target.name[:100]}.{os.getpid()}.unfinished")
-        try:
-            with unfinished.open("wb") as file:
-                yield file
-            unfinished.replace(target)
-        finally:
-            unfinished.unlink(missing_ok=True)
+        with engine_files.whole_file(target) as unfinished, unfinished.open("wb") as file:
+            yield file
     except OSError as error:
         raise WriteError(explain(path, error)) from error
 

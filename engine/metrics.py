@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
+
+NULL_FLOOR_DB = -200.0  # of a null depth: what float64 can tell of two equal signals, and finite for a file
 
 
 @dataclass(frozen=True)
@@ -16,6 +21,11 @@ class RelativeError:
 
     rel_mse: float
     rel_mae: float
+
+    @property
+    def null_depth_db(self) -> float:
+        """10 log₁₀ of the relative MSE: what is left where prediction and truth are subtracted, -200 dB at least."""
+        return max(10 * math.log10(self.rel_mse), NULL_FLOOR_DB) if self.rel_mse > 0 else NULL_FLOOR_DB
 
 
 @dataclass(frozen=True)
@@ -27,30 +37,51 @@ class WindowError(RelativeError):
 
 
 class ErrorSums:
-    """Sums per frame over any number of batches, so that a long validation never lies in memory at once."""
+    """Sums per frame and per trajectory over any number of blocks: a long validation never lies in memory at once.
+
+    A prediction that is not a number is an infinite error.
+    """
 
     def __init__(self, steps: int) -> None:
-        self._sums = torch.zeros(4, steps, dtype=torch.float64)
+        self._frames = torch.zeros(4, steps, dtype=torch.float64)
+        self._trajectories = torch.zeros(4, 0, dtype=torch.float64)
+        self._row = 0  # of the last block
 
-    def add(self, predicted: Tensor, truth: Tensor, first: int = 0) -> None:
+    def add(self, predicted: Tensor, truth: Tensor, first: int = 0, row: int | None = None) -> None:
         """Adds trajectories (batch, steps, points) of equal shape; frame 0 (the input) is not among them.
 
         Args:
             first: where a block of frames belongs: 0 where it starts with frame 1.
+            row: which trajectory the block's first one is. By default a block with `first` 0 is of new trajectories,
+                and any other goes on with those of the block before it.
         """
         if predicted.shape != truth.shape:
             raise ValueError(f"prediction {tuple(predicted.shape)} and truth {tuple(truth.shape)} differ in shape")
         error = predicted - truth
         terms = (error.square(), truth.square(), error.abs(), truth.abs())
-        sums = torch.stack([term.sum(dim=(0, 2), dtype=torch.float64) for term in terms])
-        self._sums[:, first : first + truth.shape[1]] += sums.cpu()
+        sums = torch.stack([term.sum(dim=2, dtype=torch.float64) for term in terms]).cpu()
+        sums[::2].masked_fill_(sums[::2].isnan(), math.inf)
+        self._frames[:, first : first + truth.shape[1]] += sums.sum(1)
+        if row is None:
+            row = self._row if first else self._trajectories.shape[1]
+        self._row, end = row, row + len(truth)
+        if (missing := end - self._trajectories.shape[1]) > 0:
+            self._trajectories = torch.cat([self._trajectories, self._frames.new_zeros(4, missing)], dim=1)
+        self._trajectories[:, row:end] += sums.sum(2)
 
-    def total(self) -> RelativeError:
-        return RelativeError(*self._relative(slice(None)))
+    def total(self, steps: int | None = None) -> RelativeError:
+        """The errors of the first `steps` frames, of all by default.
+
+        Raises:
+            ValueError: there are not so many frames, or less than one is asked for.
+        """
+        if steps is not None and not 1 <= steps <= self._frames.shape[1]:
+            raise ValueError(f"steps must lie in 1 … {self._frames.shape[1]}, not {steps}")
+        return RelativeError(*self._relative(slice(steps)))
 
     def windows(self, rate_hz: float, edges_s: Sequence[float]) -> list[WindowError]:
         """Errors between successive edges; windows that lie past the last frame are left out."""
-        steps = self._sums.shape[1]
+        steps = self._frames.shape[1]
         found = []
         for start_s, stop_s in pairwise(edges_s):
             first, last = (min(round(edge * rate_hz), steps) for edge in (start_s, stop_s))
@@ -58,9 +89,23 @@ class ErrorSums:
                 found.append(WindowError(*self._relative(slice(first, last)), start_s, stop_s))
         return found
 
+    def per_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Relative MSE and MAE of each frame over all trajectories, (steps,) each (the paper's Fig. 4)."""
+        return _ratios(self._frames)
+
+    def per_trajectory(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Relative MSE and MAE of each trajectory over all frames, (trajectories,) each."""
+        return _ratios(self._trajectories)
+
+    def spread(self) -> RelativeError:
+        """The population's standard deviation of the trajectories' own errors; infinite where one of them is."""
+        return RelativeError(
+            *(float(own.std()) if len(own) and np.isfinite(own).all() else math.inf for own in self.per_trajectory())
+        )
+
     def _relative(self, frames: slice) -> tuple[float, float]:
-        squared, squared_truth, absolute, absolute_truth = self._sums[:, frames].sum(1).tolist()
-        return _ratio(squared, squared_truth), _ratio(absolute, absolute_truth)
+        mse, mae = _ratios(self._frames[:, frames].sum(1, keepdim=True))
+        return float(mse[0]), float(mae[0])
 
 
 def relative_error(predicted: Tensor, truth: Tensor) -> RelativeError:
@@ -70,8 +115,9 @@ def relative_error(predicted: Tensor, truth: Tensor) -> RelativeError:
     return sums.total()
 
 
-def _ratio(error: float, truth: float) -> float:
-    """error/truth; a silent truth matched by silence is no error, unmatched an infinite one."""
-    if truth == 0:
-        return 0.0 if error == 0 else float("inf")
-    return error / truth
+def _ratios(sums: Tensor) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of sums (4, n); a silent truth matched by silence is no error, unmatched an infinite one."""
+    error, truth = sums[::2], sums[1::2]
+    silent = torch.where(error == 0, 0.0, math.inf).to(error)
+    mse, mae = torch.where(truth == 0, silent, error / truth).numpy()
+    return mse, mae

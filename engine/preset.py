@@ -8,8 +8,6 @@ each tensor's name, type and shape, then that every number is finite.
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -23,6 +21,7 @@ from engine.models import MODELS, StringModel, build_model, count_parameters
 from engine.pluck import Pluck
 from engine.schema import SchemaError, read, write
 from engine.string import StringParameters
+from engine.whole_file import whole_file
 
 FORMAT_VERSION = 1
 METADATA_KEY = "learned_strings"
@@ -126,14 +125,9 @@ def save_preset(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
         _check_finite(path, name, tensor)
     text = json.dumps(write(info), allow_nan=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, unfinished = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".unfinished", dir=path.parent)
-    os.close(handle)
-    try:
+    with whole_file(path) as unfinished:
         save_file(tensors, unfinished, metadata={METADATA_KEY: text})
-        Path(unfinished).chmod(0o644)
-        Path(unfinished).replace(path)
-    finally:
-        Path(unfinished).unlink(missing_ok=True)
+        unfinished.chmod(0o644)
 
 
 def read_info(path: Path) -> PresetInfo:

@@ -13,7 +13,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from engine.models.inputs import InputKind
 from engine.preset import Preset, PresetInfo
 from engine.reference import ModalState, SplittingSolver
 from engine.sine_transform import synthesis_matrix, to_grid, to_modes
@@ -63,8 +62,7 @@ class ModelSource(StringSource):
 
     def __init__(self, preset: Preset) -> None:
         self._model = preset.model
-        self._input: InputKind = getattr(preset.model.configuration, "input", "displacement")
-        if self._input == "two_frames":
+        if preset.model.configuration.input == "two_frames":
             raise ValueError(
                 f"{preset.path}: its model needs the frame before the first, which a string at rest does not have;"
                 " call the model itself with two frames"
@@ -77,8 +75,7 @@ class ModelSource(StringSource):
     def start(self, displacement_m: Tensor) -> SourceState:
         _check_grid(displacement_m, self.grid_points)
         displacement = (displacement_m / self._scale_m).float()
-        at_rest = () if self._input == "displacement" else (torch.zeros_like(displacement),)
-        inner = self._model.encode(displacement, *at_rest)
+        inner = self._model.release(displacement)
         return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(displacement_m.abs().max()), 1e-4))
 
     @torch.inference_mode()

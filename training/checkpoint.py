@@ -7,7 +7,6 @@ moments and the iteration are all that a bit-for-bit continuation needs.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from engine.whole_file import whole_file
+
 
 @dataclass(frozen=True)
 class Checkpoint:
@@ -25,6 +26,7 @@ class Checkpoint:
 
     model: Mapping[str, Tensor]
     best_model: Mapping[str, Tensor]
+    average: Mapping[str, Tensor]  # a running mean of the weights; empty where the run keeps none
     optimiser: Mapping[str, Mapping[str, Tensor]]  # parameter index -> name of the moment -> value
     facts: Mapping[str, Any]
 
@@ -32,23 +34,21 @@ class Checkpoint:
         """Writes whole or not at all."""
         tensors = {f"model/{name}": t for name, t in self.model.items()}
         tensors |= {f"best/{name}": t for name, t in self.best_model.items()}
+        tensors |= {f"average/{name}": t for name, t in self.average.items()}
         for index, moments in self.optimiser.items():
             tensors |= {f"optimiser/{index}/{name}": t for name, t in moments.items()}
         # clones: safetensors refuses tensors that share memory
         whole = {name: t.detach().to("cpu", copy=True).contiguous() for name, t in tensors.items()}
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_suffix(f".{os.getpid()}.unfinished")
-        try:
+        with whole_file(path) as unfinished:
             save_file(whole, unfinished, metadata={"facts": json.dumps(self.facts)})
-            unfinished.replace(path)
-        finally:
-            unfinished.unlink(missing_ok=True)
 
     @classmethod
     def load(cls, path: Path) -> Checkpoint:
         """Raises ValueError, naming the file and the remedy, where it is damaged."""
         model: dict[str, Tensor] = {}
         best: dict[str, Tensor] = {}
+        average: dict[str, Tensor] = {}
         optimiser: dict[str, dict[str, Tensor]] = {}
         try:
             with safe_open(path, framework="pt") as file:
@@ -59,10 +59,10 @@ class Checkpoint:
                         index, _, moment = name.partition("/")
                         optimiser.setdefault(index, {})[moment] = file.get_tensor(key)
                     else:
-                        {"model": model, "best": best}[part][name] = file.get_tensor(key)
+                        {"model": model, "best": best, "average": average}[part][name] = file.get_tensor(key)
         except (SafetensorError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path}: damaged checkpoint ({error}); delete it to start the run again") from error
-        return cls(model, best, optimiser, facts)
+        return cls(model, best, average, optimiser, facts)
 
 
 def optimiser_moments(optimiser: torch.optim.Optimizer) -> dict[str, dict[str, Tensor]]:

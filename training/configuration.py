@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from engine.models import MODELS
-from engine.schema import SchemaError, read
+from engine.schema import SchemaError, read, write
 from engine.string import StringParameters
 
 CONFIGURATIONS = Path(__file__).parent / "configurations"
@@ -45,11 +47,15 @@ class Recipe:
     initialisation: str = ""  # one of the model's `initialisations`; empty: the first, its source's own
     batch_size: int = 50
     peak_learning_rate: float = 3e-3
+    schedule: Literal["one_cycle", "constant"] = "one_cycle"
+    start_share: float = 0.04  # of the peak rate, at the start of a cycle
     warm_up: float = 0.1  # share of the run until the peak; then a cosine down to zero
     eigenvalue_rate: float = 0.2  # learning rate of ν_log and θ_log, as a share
     weight_decay: float = 0.01  # AdamW's
     clip_norm: float = 1.0
-    steps_per_batch: int = 64  # random frames of a batch
+    loss: Literal["mse", "log10_mse"] = "mse"  # of the prediction
+    random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
+    steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
     grow_until: float = 0.5  # … over this share of the run
     prediction_weight: float = 1.0  # α₁ of the paper's loss
@@ -57,12 +63,17 @@ class Recipe:
     consistency_weight: float = 0.01  # α₃
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
+    patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
+    average_decay: float = 0.0  # of a running mean of the weights, an iteration; above 0 that mean is the result
 
     def __post_init__(self) -> None:
-        for name in ("epochs", "batch_size", "steps_per_batch", "first_horizon", "validate_every"):
+        for name in ("epochs", "batch_size", "first_horizon", "validate_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        for name in ("warm_up", "grow_until"):
+        for name in ("steps_per_batch", "patience"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
+        for name in ("warm_up", "grow_until", "average_decay"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must lie in 0 … 1, not {getattr(self, name)}")
 
@@ -77,26 +88,57 @@ class TrainingConfiguration:
     recipe: Recipe
     description: str = ""
     model_configuration: dict[str, Any] = field(default_factory=dict)
+    horizon: int | None = None  # frames that are trained and measured; None: all of the data's
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        if not 1 <= self.steps <= self.data.steps:
+            raise ValueError(f"horizon must lie in 1 … {self.data.steps}, the data's steps, not {self.horizon}")
+
+    @property
+    def steps(self) -> int:
+        """Frames that are trained and measured."""
+        return self.data.steps if self.horizon is None else self.horizon
+
+    @property
+    def digest(self) -> str:
+        """Of all that determines the run's result; what it is called does not."""
+        plain = {**write(self), "horizon": self.steps}
+        del plain["title"], plain["description"]
+        return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def load(name_or_path: str) -> TrainingConfiguration:
-    """A committed configuration by name, or any TOML file by path.
+    """A committed configuration by its file's name, a cell of the tables by its name, or any TOML file by path.
 
     Raises:
         SchemaError: not found, not TOML, or a field is wrong; the message names the file and the field.
     """
+    from training.cell import Cell, configuration_of  # cells are made of what this module defines
+
     path = Path(name_or_path)
     if not path.suffix:
         path = CONFIGURATIONS / f"{name_or_path}.toml"
+        if not path.is_file() and (cell := Cell.parse(name_or_path)) is not None:
+            return configuration_of(cell)
     if not path.is_file():
         known = ", ".join(sorted(p.stem for p in CONFIGURATIONS.glob("*.toml")))
-        raise SchemaError(f"no training configuration {name_or_path!r}; give a .toml file or one of: {known}")
+        raise SchemaError(
+            f"no training configuration {name_or_path!r}; give a .toml file, a cell of the tables like "
+            f"nylon_nonlinear_noise_16k_koopman_var_400_seed1, or one of: {known}"
+        )
+    return read(TrainingConfiguration, read_toml(path), str(path))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        SchemaError: not TOML.
+        OSError: it cannot be read.
+    """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SchemaError(f"{path}: not valid TOML: {error}") from error
-    return read(TrainingConfiguration, data, str(path))

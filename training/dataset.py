@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,8 +26,9 @@ from engine.schema import write
 from engine.sine_transform import synthesis_matrix, to_modes
 from training.configuration import DatasetConfiguration
 
-CACHE_VERSION = 1  # raise when the solver or a draw changes what it yields
+CACHE_VERSION = 2  # raise when the solver, a draw or the files change what they hold
 CHUNK = 50  # trajectories a step of the progress
+START_EVERY = 100  # frames between those of which the velocity is kept, from which a trajectory can be entered
 
 SPLITS = ("train", "validation", "test")
 
@@ -36,18 +39,27 @@ class Dataset:
 
     Attributes:
         amplitudes: float32 (count, steps + 1, modes) in m, memory-mapped from the cache.
+        velocities: float32 (count, starts, modes) in m/s, of frames 0, START_EVERY, 2 START_EVERY, …
         scale_m: one standard deviation of displacement over the training split; models see displacement/scale.
     """
 
     configuration: DatasetConfiguration
     amplitudes: Tensor
+    velocities: Tensor
     scale_m: float
 
     def split(self, name: str) -> Tensor:
-        """The amplitudes of "train", "validation" or "test": 80/10/10 in order."""
-        if name not in SPLITS:
-            raise ValueError(f"split {name!r} is not one of {', '.join(SPLITS)}")
-        return _split(self.amplitudes, name)
+        """The amplitudes of "train", "validation" or "test"."""
+        return self.amplitudes[split_rows(self.configuration.count, name)]
+
+
+def split_rows(count: int, name: str) -> slice:
+    """The trajectories of a split: 80/10/10 in order."""
+    if name not in SPLITS:
+        raise ValueError(f"split {name!r} is not one of {', '.join(SPLITS)}")
+    train, validation = count * 8 // 10, count // 10
+    first = {"train": 0, "validation": train, "test": train + validation}[name]
+    return slice(first, {"train": train, "validation": train + validation, "test": count}[name])
 
 
 def default_cache() -> Path:
@@ -90,17 +102,32 @@ def load_dataset(
     folder = dataset_folder(configuration, cache)
     if not folder.exists():
         _generate(configuration, folder, progress)
-    shape = (configuration.count, configuration.steps + 1, configuration.modes)
-    file = folder / "amplitudes.npy"
     try:
-        amplitudes = np.load(file, mmap_mode="c")  # copy on write: nothing can change the cache
+        amplitudes = _map(folder / "amplitudes.npy", _amplitudes_shape(configuration))
+        velocities = _map(folder / "velocities.npy", _velocities_shape(configuration))
         facts = json.loads((folder / "dataset.json").read_text(encoding="utf-8"))
         scale_m = float(facts["scale_m"])
-        if amplitudes.shape != shape or amplitudes.dtype != np.float32:
-            raise ValueError(f"holds {amplitudes.dtype} {amplitudes.shape}, expected float32 {shape}")
-    except (ValueError, KeyError, OSError, EOFError) as error:
-        raise ValueError(f"{file}: damaged data cache ({error}); delete {folder} to make it again") from error
-    return Dataset(configuration, torch.from_numpy(amplitudes), scale_m)
+        if not (scale_m > 0 and math.isfinite(scale_m)):
+            raise ValueError(f"dataset.json: scale_m is {scale_m}")
+    except (ValueError, KeyError, TypeError, OSError, EOFError) as error:
+        raise ValueError(f"{folder}: damaged data cache ({error}); delete that folder to make it again") from error
+    return Dataset(configuration, torch.from_numpy(amplitudes), torch.from_numpy(velocities), scale_m)
+
+
+def _amplitudes_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
+    return c.count, c.steps + 1, c.modes
+
+
+def _velocities_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
+    return c.count, -(-c.steps // START_EVERY), c.modes
+
+
+def _map(file: Path, shape: tuple[int, int, int]) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """An array of the cache, copied on write: nothing can change the cache."""
+    values = np.load(file, mmap_mode="c")
+    if values.shape != shape or values.dtype != np.float32:
+        raise ValueError(f"{file.name} holds {values.dtype} {values.shape}, expected float32 {shape}")
+    return values
 
 
 def _generate(configuration: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> None:
@@ -110,18 +137,26 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
     try:
         c = configuration
         solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated)
-        shape = (c.count, c.steps + 1, c.modes)
-        file = np.lib.format.open_memmap(unfinished / "amplitudes.npy", "w+", np.float32, shape)
+        new = np.lib.format.open_memmap
+        amplitudes = new(unfinished / "amplitudes.npy", "w+", np.float32, _amplitudes_shape(c))
+        velocities = new(unfinished / "velocities.npy", "w+", np.float32, _velocities_shape(c))
         initial = draw_initial(c)
-        for start in range(0, c.count, CHUNK):
-            progress(start, c.count)
-            state = ModalState.at_rest(initial[start : start + CHUNK])
-            file[start : start + CHUNK] = solver.solve(state, c.steps).numpy()
-        file.flush()
-        scale_m = displacement_deviation(_split(torch.from_numpy(file), "train"), c.grid_points)
+        for first in range(0, c.count, CHUNK):
+            progress(first, c.count)
+            rows = slice(first, first + CHUNK)
+            state = ModalState.at_rest(initial[rows])
+            amplitudes[rows, 0] = state.amplitude.numpy()
+            for start, frame in enumerate(range(0, c.steps, START_EVERY)):
+                velocities[rows, start] = state.velocity.numpy()
+                frames, state = solver.advance(state, min(START_EVERY, c.steps - frame))
+                amplitudes[rows, frame + 1 : frame + 1 + frames.shape[1]] = frames.numpy()
+        amplitudes.flush()
+        velocities.flush()
+        training = torch.from_numpy(amplitudes)[split_rows(c.count, "train")]
+        scale_m = displacement_deviation(training, c.grid_points)
         facts = {"configuration": write(c), "cache_version": CACHE_VERSION, "scale_m": scale_m}
         (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
-        del file
+        del amplitudes, velocities, training
         if folder.exists():  # another process was faster with the same data
             return
         unfinished.rename(folder)
@@ -142,11 +177,3 @@ def displacement_deviation(amplitudes: Tensor, grid_points: int) -> float:
         total += float((chunk @ column).sum())
     mean = total / len(frames)
     return (squared / len(frames) - mean**2) ** 0.5
-
-
-def _split(amplitudes: Tensor, name: str) -> Tensor:
-    count = len(amplitudes)
-    train, validation = count * 8 // 10, count // 10
-    first = {"train": 0, "validation": train, "test": train + validation}[name]
-    last = {"train": train, "validation": train + validation, "test": count}[name]
-    return amplitudes[first:last]

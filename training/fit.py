@@ -8,26 +8,30 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
-from torch import Tensor
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from engine.metrics import RelativeError
-from engine.models import StringModel, build_model
+from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
-from engine.schema import write
+from engine.schema import SchemaError, read, write
 from engine.sine_transform import synthesis_matrix
+from training.batches import TrainingData, batches
 from training.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.configuration import Recipe, TrainingConfiguration
 from training.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.losses import loss_terms
+from training.losses import training_loss
 
 CHECKPOINT_EVERY_S = 45.0
+LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
+EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
 
 
 class Diverged(RuntimeError):
@@ -54,6 +58,8 @@ class FitResult:
 
     model: StringModel[Any]
     validation: RelativeError
+    initialisation: str
+    epochs: int
     best_epoch: int
     seconds: float
 
@@ -65,99 +71,41 @@ def fit(
     *,
     device: torch.device | str = "cpu",
     report: Callable[[Progress], None] = lambda progress: None,
+    checkpoint_every_s: float | None = None,
 ) -> FitResult:
-    """Trains, or goes on with the run in `run_folder`.
+    """Trains, or goes on with the run in `run_folder`; what has a closed form (DMD) is computed at once.
+
+    Args:
+        report: called after every epoch.
+        checkpoint_every_s: None: CHECKPOINT_EVERY_S.
 
     Raises:
-        Diverged: the loss became infinite or not a number.
+        Diverged: the loss became infinite or not a number, or no validation error was ever a number.
         ValueError: the checkpoint there is damaged or of another configuration.
     """
-    recipe = configuration.recipe
-    data = _TrainingData(dataset, torch.device(device))
-    model = new_model(configuration, dataset.scale_m).to(device)
-    optimiser = torch.optim.AdamW(
-        [
-            {"params": [p for n, p in model.named_parameters() if not _is_eigenvalue(n)], "share": 1.0},
-            {
-                "params": [p for n, p in model.named_parameters() if _is_eigenvalue(n)],
-                "share": recipe.eigenvalue_rate,
-                "weight_decay": 0.0,
-            },
-        ],
-        lr=recipe.peak_learning_rate,
-        weight_decay=recipe.weight_decay,
-    )
-    batches = -(-data.count // recipe.batch_size)
+    if configuration.model == "dmd":
+        return _fit_dmd(configuration, dataset, report)
+    run = _Run(configuration, dataset, torch.device(device))
     path = run_folder / "checkpoint.safetensors"
-    plain = write(configuration)
-    best_state, best = _clone(model), None
-    epoch, earlier_s = 0, 0.0
-    best_epoch = 0
+    every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
     if path.exists():
-        checkpoint = Checkpoint.load(path)
-        if checkpoint.facts["configuration"] != plain:
-            raise ValueError(f"{path}: belongs to another configuration; delete it or choose another run folder")
-        model.load_state_dict(dict(checkpoint.model))
-        best_state = {name: t.to(device) for name, t in checkpoint.best_model.items()}
-        restore_moments(optimiser, checkpoint.optimiser)
-        epoch, earlier_s = checkpoint.facts["epoch"], checkpoint.facts["seconds"]
-        best_epoch = checkpoint.facts["best_epoch"]
-        best = RelativeError(**checkpoint.facts["best"]) if checkpoint.facts["best"] else None
-
+        run.restore(Checkpoint.load(path), path)
     started = saved = time.monotonic()
-    first_epoch = epoch
-    while epoch < recipe.epochs:
-        total = 0.0
-        model.train()
-        for batch, rows in enumerate(_batches(recipe, data.count, epoch)):
-            iteration = epoch * batches + batch
-            horizon = horizon_at(recipe, iteration / (recipe.epochs * batches), dataset.configuration.steps)
-            for group in optimiser.param_groups:
-                group["lr"] = learning_rate_at(recipe, iteration / (recipe.epochs * batches)) * group["share"]
-            initial, frames, target = data.draw(recipe, rows, horizon, iteration)
-            terms = loss_terms(model, initial, frames, target)
-            weights = (recipe.prediction_weight, recipe.encoding_weight, recipe.consistency_weight)
-            loss = torch.stack([w * term for w, term in zip(weights, terms, strict=True)]).sum()
-            optimiser.zero_grad(set_to_none=True)
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
-            optimiser.step()
-            total += float(terms[0].detach())
-        epoch += 1
-        if not math.isfinite(total):
-            raise Diverged(f"the loss is {total} in epoch {epoch}; lower peak_learning_rate")
-        validation = None
-        if epoch % recipe.validate_every == 0 or epoch == recipe.epochs:
-            validation = evaluate_model(model, dataset, "validation").total()
-            if best is None or validation.rel_mae < best.rel_mae:
-                best, best_state, best_epoch = validation, _clone(model), epoch
+    first_epoch, earlier_s = run.epoch, run.seconds
+    while not run.ended:
+        loss, horizon, learning_rate = run.train_epoch()
+        if not math.isfinite(loss):
+            raise Diverged(f"the loss is {loss} in epoch {run.epoch}; lower peak_learning_rate")
+        validation = run.validate() if run.validation_is_due else None
         now = time.monotonic()
-        seconds = earlier_s + now - started
-        report(
-            Progress(
-                epoch,
-                recipe.epochs,
-                horizon,
-                optimiser.param_groups[0]["lr"],
-                total / batches,
-                validation,
-                seconds,
-                (now - started) / (epoch - first_epoch) * (recipe.epochs - epoch),
-            )
-        )
-        if now - saved > CHECKPOINT_EVERY_S or epoch == recipe.epochs:
-            facts = {
-                "configuration": plain,
-                "epoch": epoch,
-                "seconds": seconds,
-                "best": write(best) if best else None,
-                "best_epoch": best_epoch,
-            }
-            Checkpoint(model.state_dict(), best_state, optimiser_moments(optimiser), facts).save(path)
+        run.seconds = earlier_s + now - started
+        epochs = configuration.recipe.epochs
+        left_s = (now - started) / (run.epoch - first_epoch) * (epochs - run.epoch)
+        report(Progress(run.epoch, epochs, horizon, learning_rate, loss, validation, run.seconds, left_s))
+        if now - saved > every_s or run.ended:
+            run.checkpoint().save(path)
             saved = now
-    assert best is not None
-    model.load_state_dict(best_state)
-    return FitResult(model.eval(), best, best_epoch, earlier_s + time.monotonic() - started)
+    return run.result()
 
 
 def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringModel[Any]:
@@ -173,9 +121,12 @@ def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringMod
 
 
 def learning_rate_at(recipe: Recipe, share: float) -> float:
-    """One cycle: a linear warm-up to the peak, then a cosine to zero. `share`: of the run, 0 … 1."""
+    """Constant, or one cycle: a linear warm-up to the peak, then a cosine to zero. `share`: of the run, 0 … 1."""
+    if recipe.schedule == "constant":
+        return recipe.peak_learning_rate
     if share < recipe.warm_up:
-        return recipe.peak_learning_rate * (0.04 + 0.96 * share / recipe.warm_up)
+        rise = share / recipe.warm_up
+        return recipe.peak_learning_rate * (recipe.start_share + (1 - recipe.start_share) * rise)
     return recipe.peak_learning_rate * 0.5 * (1 + math.cos(math.pi * (share - recipe.warm_up) / (1 - recipe.warm_up)))
 
 
@@ -187,41 +138,135 @@ def horizon_at(recipe: Recipe, share: float, steps: int) -> int:
     return round(first * (steps / first) ** (share / recipe.grow_until))
 
 
-class _TrainingData:
-    """The training split on the device, and random batches of it in normalised displacement."""
+class _Run:
+    """A training between two epochs: all that a checkpoint holds."""
 
-    def __init__(self, dataset: Dataset, device: torch.device) -> None:
-        c = dataset.configuration
-        self._amplitudes = dataset.split("train").to(device)
-        self._synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float().to(device)
-        self._mirror = torch.tensor([(-1.0) ** n for n in range(c.modes)], device=device)  # x -> ℓ - x
-        self.count = len(self._amplitudes)
+    def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
+        recipe = configuration.recipe
+        self._configuration, self._recipe, self._dataset = configuration, recipe, dataset
+        self._model = new_model(configuration, dataset.scale_m).to(device)
+        kind = self._model.configuration.input
+        if recipe.random_start and kind != "displacement_velocity":
+            raise ValueError("recipe.random_start needs a model of the input 'displacement_velocity'")
+        self._data = TrainingData(dataset, configuration.steps, kind, device)
+        self._optimiser = _optimiser(self._model, recipe)
+        self._average: AveragedModel | None = None
+        if recipe.average_decay:
+            mean = get_ema_multi_avg_fn(recipe.average_decay)
+            self._average = AveragedModel(self._model, multi_avg_fn=mean, use_buffers=True)
+        self.epoch, self.seconds = 0, 0.0
+        self._best: RelativeError | None = None
+        self._best_epoch = 0
+        self._best_model = _copy(self._model)
 
-    def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> tuple[Tensor, Tensor, Tensor]:
-        """Frame 0 (batch, grid), frame numbers (frames,) and those frames (batch, frames, grid)."""
-        device = self._amplitudes.device
-        generator = torch.Generator().manual_seed((recipe.seed + 1) * 1_000_003 + iteration)
-        count = min(recipe.steps_per_batch, horizon)
-        # one frame from each of `count` equal parts of the horizon: less noise than independent draws
-        edges = torch.arange(count) * horizon / count
-        frames = (edges + torch.rand(count, generator=generator) * horizon / count).long().clamp(max=horizon - 1) + 1
-        wanted = torch.cat([torch.zeros(1, dtype=torch.long), frames]).to(device)
-        amplitudes = self._amplitudes[rows.to(device)[:, None], wanted[None, :]]
-        if recipe.flip:
-            coin = torch.randint(0, 2, (2, len(rows), 1, 1), generator=generator).to(device)
-            amplitudes = amplitudes * (1 - 2 * coin[0]) * torch.where(coin[1] == 1, self._mirror, 1.0)
-        displacement = amplitudes @ self._synthesis
-        return displacement[:, 0], wanted[1:], displacement[:, 1:]
+    @property
+    def ended(self) -> bool:
+        patience = self._recipe.patience
+        tired = patience > 0 and self.epoch - self._best_epoch >= patience
+        return self.epoch >= self._recipe.epochs or tired
+
+    @property
+    def validation_is_due(self) -> bool:
+        return self.epoch % self._recipe.validate_every == 0 or self.epoch == self._recipe.epochs
+
+    def train_epoch(self) -> tuple[float, int, float]:
+        """The mean square of the predictions' errors, and horizon and learning rate at the end."""
+        recipe, model = self._recipe, self._model
+        per_epoch = -(-self._data.count // recipe.batch_size)
+        total = torch.zeros((), device=next(model.parameters()).device)
+        model.train()
+        for number, rows in enumerate(batches(recipe, self._data.count, self.epoch)):
+            iteration = self.epoch * per_epoch + number
+            share = iteration / (recipe.epochs * per_epoch)
+            horizon = horizon_at(recipe, share, self._configuration.steps)
+            learning_rate = learning_rate_at(recipe, share)
+            for group in self._optimiser.param_groups:
+                group["lr"] = learning_rate * group["share"]
+            loss, error = training_loss(model, self._data.draw(recipe, rows, horizon, iteration), recipe)
+            self._optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
+            self._optimiser.step()
+            if self._average is not None:
+                self._average.update_parameters(model)
+            total += error
+        self.epoch += 1
+        return float(total) / per_epoch, horizon, learning_rate
+
+    def validate(self) -> RelativeError:
+        """The validation error; the best model so far is kept."""
+        model = self._measured()
+        error = evaluate_model(model, self._dataset, "validation", self._configuration.steps).total()
+        if math.isfinite(error.rel_mae) and (self._best is None or error.rel_mae < self._best.rel_mae):
+            self._best, self._best_epoch, self._best_model = error, self.epoch, _copy(model)
+        return error
+
+    def result(self) -> FitResult:
+        if self._best is None:
+            raise Diverged("the validation error was never a number; lower peak_learning_rate")
+        model = self._measured()
+        model.load_state_dict(self._best_model)
+        how = self._recipe.initialisation or model.initialisations[0]
+        return FitResult(model.eval(), self._best, how, self.epoch, self._best_epoch, self.seconds)
+
+    def checkpoint(self) -> Checkpoint:
+        facts = {
+            "configuration": write(self._configuration),
+            "epoch": self.epoch,
+            "seconds": self.seconds,
+            "best": write(self._best) if self._best else None,
+            "best_epoch": self._best_epoch,
+        }
+        average = self._average.state_dict() if self._average is not None else {}
+        moments = optimiser_moments(self._optimiser)
+        return Checkpoint(self._model.state_dict(), self._best_model, average, moments, facts)
+
+    def restore(self, checkpoint: Checkpoint, path: Path) -> None:
+        facts, device = checkpoint.facts, next(self._model.parameters()).device
+        try:  # read, not compared as it is: fields that came later have their defaults
+            other = read(TrainingConfiguration, facts["configuration"], f"{path}: configuration")
+        except SchemaError as error:
+            raise ValueError(f"{error}; delete it to start the run again") from error
+        if other.digest != self._configuration.digest:
+            raise ValueError(f"{path}: belongs to another configuration; delete it or choose another run folder")
+        self._model.load_state_dict(dict(checkpoint.model))
+        if self._average is not None:
+            self._average.load_state_dict(dict(checkpoint.average))
+        restore_moments(self._optimiser, checkpoint.optimiser)
+        self._best_model = {name: t.to(device) for name, t in checkpoint.best_model.items()}
+        self.epoch, self.seconds = facts["epoch"], facts["seconds"]
+        self._best_epoch = facts["best_epoch"]
+        self._best = RelativeError(**facts["best"]) if facts["best"] else None
+
+    def _measured(self) -> StringModel[Any]:
+        """The model that the run is judged by: the running mean of its weights, where it keeps one."""
+        return self._model if self._average is None else cast("StringModel[Any]", self._average.module)
 
 
-def _batches(recipe: Recipe, count: int, epoch: int) -> Iterator[Tensor]:
-    generator = torch.Generator().manual_seed(recipe.seed * 7_368_787 + epoch)
-    return iter(torch.randperm(count, generator=generator).split(recipe.batch_size))
+def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[Progress], None]) -> FitResult:
+    started = time.monotonic()
+    c = dataset.configuration
+    sizes: Any = read(MODELS["dmd"][1], configuration.model_configuration, "model_configuration")
+    synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float()
+    model = DMD.fit(dataset.split("train")[:, : configuration.steps + 1] @ synthesis, sizes)
+    error = evaluate_model(model, dataset, "validation", configuration.steps).total()
+    seconds = time.monotonic() - started
+    report(Progress(1, 1, configuration.steps, 0.0, error.rel_mse, error, seconds, 0.0))
+    return FitResult(model.eval(), error, LEAST_SQUARES, 1, 1, seconds)
+
+
+def _optimiser(model: torch.nn.Module, recipe: Recipe) -> torch.optim.Optimizer:
+    named = list(model.named_parameters())
+    groups = [
+        {"params": [p for n, p in named if not _is_eigenvalue(n)], "share": 1.0},
+        {"params": [p for n, p in named if _is_eigenvalue(n)], "share": recipe.eigenvalue_rate, "weight_decay": 0.0},
+    ]
+    return torch.optim.AdamW(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
 
 
 def _is_eigenvalue(name: str) -> bool:
-    return name.rpartition(".")[2] in ("nu_log", "theta_log")
+    return name.rpartition(".")[2] in EIGENVALUES
 
 
-def _clone(model: torch.nn.Module) -> dict[str, Any]:
-    return {name: t.detach().clone() for name, t in model.state_dict().items()}
+def _copy(model: torch.nn.Module) -> dict[str, Any]:
+    return {name: deepcopy(t.detach()) for name, t in model.state_dict().items()}

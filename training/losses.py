@@ -1,50 +1,83 @@
 """The losses of the paper, on displacement in normalised units.
 
-Koopman models are trained on prediction, encoding and consistency (§4.2); the others on prediction alone. Both take
-any selection of frames: a Koopman rollout needs no recursion, the others run up to the last of them.
+Koopman models are trained on prediction, encoding and consistency (§4.2); the others on prediction alone, the Fourier
+models on its logarithm. All take any selection of frames: a Koopman rollout needs no recursion, the others run up to
+the last of them.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
 
 from engine.models import StringModel
+from training.configuration import Recipe
 
-Terms = tuple[Tensor, Tensor, Tensor]
+
+@dataclass(frozen=True)
+class Batch:
+    """Trajectories in normalised units.
+
+    Attributes:
+        initial: the frame that a model sets out from, (batch, grid_points).
+        second: what its encoder is told beside; see `engine.models.inputs`.
+        frames: int64 (frames,), any selection of 1 … N, counted from `initial`.
+        target: the truth at these frames, (batch, frames, grid_points).
+    """
+
+    initial: Tensor
+    second: Tensor | None
+    frames: Tensor
+    target: Tensor
 
 
 @runtime_checkable
 class KoopmanModel(Protocol):
     """A model whose latents can be had at any frame."""
 
-    def encode(self, displacement: Tensor) -> Any: ...
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> Any: ...
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
     def decode(self, latents: Tensor) -> Tensor: ...
 
 
-def loss_terms(model: StringModel[Any], initial: Tensor, frames: Tensor, target: Tensor) -> Terms:
-    """Prediction, encoding and consistency terms, each a mean square; the last two are zero where a model has none.
+def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tuple[Tensor, Tensor]:
+    """The weighted loss that is minimised, and the mean square of the prediction's error alone.
 
-    Args:
-        initial: frame 0, (batch, grid_points).
-        frames: int64 (frames,), any selection of 1 … N.
-        target: the truth at these frames, (batch, frames, grid_points).
+    A term of weight 0 costs nothing. Consistency compares with the encoded truth, and where the encoder is told more
+    than the displacement the truth of later frames is not at hand: there its weight must be 0.
+
+    Raises:
+        ValueError: it is not.
     """
-    if isinstance(model, KoopmanModel):
-        return _koopman_terms(model, initial, frames, target)
-    predicted = model(initial, int(frames.max()))[:, frames - 1]
-    zero = target.new_zeros(())
-    return (predicted - target).square().mean(), zero, zero
+    if not isinstance(model, KoopmanModel):
+        prediction = _mean_square(_predicted(model, batch), batch.target)
+        return recipe.prediction_weight * _scaled(prediction, recipe), prediction.detach()
+    origin = model.encode(batch.initial, batch.second).origin
+    latents = model.latents(origin, batch.frames)
+    prediction = _mean_square(model.decode(latents), batch.target)
+    loss = recipe.prediction_weight * _scaled(prediction, recipe)
+    if recipe.encoding_weight:
+        loss = loss + recipe.encoding_weight * _mean_square(model.decode(origin), batch.initial)
+    if recipe.consistency_weight:
+        if batch.second is not None:
+            raise ValueError("consistency_weight must be 0 for a model that is told more than the displacement")
+        encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
+        consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()
+        loss = loss + recipe.consistency_weight * consistency
+    return loss, prediction.detach()
 
 
-def _koopman_terms(model: KoopmanModel, initial: Tensor, frames: Tensor, target: Tensor) -> Terms:
-    origin = model.encode(initial).origin
-    latents = model.latents(origin, frames)
-    prediction = (model.decode(latents) - target).square().mean()
-    encoding = (model.decode(origin) - initial).square().mean()
-    encoded = model.encode(target.flatten(0, 1)).origin.view_as(latents)
-    consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()
-    return prediction, encoding, consistency
+def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
+    frames, _ = model.advance(model.encode(batch.initial, batch.second), int(batch.frames[-1]))
+    return frames if frames.shape[1] == len(batch.frames) else frames[:, batch.frames - 1]
+
+
+def _mean_square(found: Tensor, wanted: Tensor) -> Tensor:
+    return (found - wanted).square().mean()
+
+
+def _scaled(prediction: Tensor, recipe: Recipe) -> Tensor:
+    return prediction.log10() if recipe.loss == "log10_mse" else prediction

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
 from engine.excitation import CENTRE_RANGE, PEAK_RANGE_M, WIDTH_RANGE
-from engine.metrics import RelativeError
+from engine.metrics import ErrorSums, RelativeError
 from engine.models import MODELS
 from engine.preset import Preset, PresetInfo, TrainedRange, load_preset, save_preset
 from engine.schema import read, write
+from engine.whole_file import whole_file
+from training import provenance
 from training.configuration import TrainingConfiguration
-from training.dataset import Dataset
+from training.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
-from training.fit import FitResult, Progress, fit
+from training.fit import Diverged, FitResult, Progress, fit
+from training.results import QUARTERS, SHORT_HORIZON, Row
 
 LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
 REPEAT_TOLERANCE = 1e-5  # relative; a sum in another order moves a float32 error by less
@@ -31,10 +36,9 @@ class TrainedPreset:
     """A run's result: the preset as read back from its file, and the errors measured with it."""
 
     preset: Preset
-    validation: RelativeError
-    test: RelativeError
-    best_epoch: int
-    seconds: float
+    validation: ErrorSums
+    test: ErrorSums
+    result: FitResult
 
 
 def train(
@@ -45,6 +49,7 @@ def train(
     *,
     device: torch.device | str = "cpu",
     report: Callable[[Progress], None] = lambda progress: None,
+    checkpoint_every_s: float | None = None,
 ) -> TrainedPreset:
     """Makes the preset `output`; goes on with the run in `run_folder` where one was interrupted.
 
@@ -66,14 +71,121 @@ def train(
         log.add(progress)
         report(progress)
 
-    result = fit(configuration, dataset, run_folder, device=device, report=log_and_report)
+    result = fit(
+        configuration,
+        dataset,
+        run_folder,
+        device=device,
+        report=log_and_report,
+        checkpoint_every_s=checkpoint_every_s,
+    )
     result = replace(result, model=result.model.cpu())
     info = preset_info(configuration, dataset, result)
     save_preset(output, info, result.model)
     preset = load_preset(output)
-    validation, test = (evaluate_model(preset.model, dataset, split).total() for split in ("validation", "test"))
-    _check_repeats(info, validation, test, output)
-    return TrainedPreset(preset, validation, test, result.best_epoch, result.seconds)
+    validation, test = (
+        evaluate_model(preset.model, dataset, split, configuration.steps) for split in ("validation", "test")
+    )
+    _check_repeats(info, validation.total(), test.total(), output)
+    return TrainedPreset(preset, validation, test, result)
+
+
+def run_row(
+    name: str,
+    recipe: str,
+    configuration: TrainingConfiguration,
+    runs: Path,
+    *,
+    cache: Path | None = None,
+    device: torch.device | str = "cpu",
+    report: Callable[[Progress], None] = lambda progress: None,
+    preset: Path | None = None,
+    checkpoint_every_s: float | None = None,
+) -> Row:
+    """A run as a row of the results file. Where it was done before, its row is read and nothing is trained.
+
+    A run that diverges is a result too: a row that says so.
+
+    Args:
+        name, recipe: as the row shall carry them.
+        runs: the run's folder is runs/name: checkpoint, log and its plot, row, and the preset where `preset` is None.
+
+    Raises:
+        ValueError, RuntimeError, OSError: see `train`.
+    """
+    folder = runs / name
+    file = folder / "row.json"
+    output = preset or folder / f"{name}.safetensors"
+    if file.exists() and output.exists():
+        row = _read_row(file)
+        if row.digest == configuration.digest:
+            return row
+    dataset = load_dataset(configuration.data, cache)
+    facts: dict[str, Any] = {
+        "digest": configuration.digest,
+        "name": name,
+        "model": configuration.model,
+        "string": "nonlinear" if configuration.data.tension_modulated else "linear",
+        "initial": configuration.data.initial,
+        "rate_hz": configuration.data.rate_hz,
+        "horizon": configuration.steps,
+        "recipe": recipe,
+        "seed": configuration.recipe.seed,
+        "device": torch.device(device).type,
+        "threads": torch.get_num_threads(),
+        "hardware": provenance.hardware(device),
+        "torch": torch.__version__,
+        "commit": provenance.commit(),
+    }
+    try:
+        trained = train(
+            configuration,
+            dataset,
+            output,
+            folder,
+            device=device,
+            report=report,
+            checkpoint_every_s=checkpoint_every_s,
+        )
+    except Diverged as error:
+        return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
+    row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained))
+    with whole_file(file) as unfinished:
+        unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
+    return row
+
+
+def _figures(trained: TrainedPreset) -> dict[str, Any]:
+    """The errors of a run and what it took, as a row names them."""
+    info, result, sums = trained.preset.info, trained.result, trained.validation
+    spread = sums.spread()
+    figures: dict[str, Any] = {
+        "initialisation": result.initialisation,
+        "rel_mse": info.rel_mse,
+        "rel_mae": info.rel_mae,
+        "test_rel_mse": info.test_rel_mse,
+        "test_rel_mae": info.test_rel_mae,
+        "rel_mse_spread": spread.rel_mse,
+        "rel_mae_spread": spread.rel_mae,
+        "parameters": trained.preset.parameters,
+        "epochs": result.epochs,
+        "best_epoch": result.best_epoch,
+        "seconds": result.seconds,
+    }
+    if info.horizon_steps >= SHORT_HORIZON:
+        short = sums.total(SHORT_HORIZON)
+        figures |= {"rel_mse_400": short.rel_mse, "rel_mae_400": short.rel_mae}
+    edges_s = [info.horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
+    for number, window in enumerate(sums.windows(info.rate_hz, edges_s), 1):
+        figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
+    return figures
+
+
+def _read_row(file: Path) -> Row:
+    try:
+        return read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
+    except ValueError as error:
+        raise ValueError(f"{error}; delete {file} to measure the run again") from error
 
 
 def default_runs() -> Path:
@@ -85,7 +197,9 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
     """What the preset of a finished fit says of itself, its errors measured here."""
     data, recipe = configuration.data, configuration.recipe
     sizes: object = read(MODELS[configuration.model][1], configuration.model_configuration, "model_configuration")
-    validation, test = (evaluate_model(result.model, dataset, split).total() for split in ("validation", "test"))
+    validation, test = (
+        evaluate_model(result.model, dataset, split, configuration.steps).total() for split in ("validation", "test")
+    )
     return PresetInfo(
         title=configuration.title,
         description=configuration.description,
@@ -97,10 +211,10 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         rate_hz=data.rate_hz,
         modes=data.modes,
         grid_points=data.grid_points,
-        horizon_steps=data.steps,
+        horizon_steps=configuration.steps,
         scale_m=dataset.scale_m,
         trained_range=trained_range(data.initial),
-        initialisation=recipe.initialisation or result.model.initialisations[0],
+        initialisation=result.initialisation,
         seed=recipe.seed,
         rel_mse=validation.rel_mse,
         rel_mae=validation.rel_mae,
@@ -142,13 +256,8 @@ class TrainingLog:
             with self._path.open(newline="", encoding="utf-8") as file:
                 kept = [row for row in csv.reader(file) if _is_whole(row) and int(row[0]) < epoch]
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = self._path.with_suffix(f".{os.getpid()}.unfinished")
-        try:
-            with unfinished.open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file).writerows([LOG_FIELDS, *kept])
-            unfinished.replace(self._path)
-        finally:
-            unfinished.unlink(missing_ok=True)
+        with whole_file(self._path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([LOG_FIELDS, *kept])
 
 
 def _row(progress: Progress) -> list[str]:

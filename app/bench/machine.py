@@ -9,9 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import torch
+
+from training.provenance import processor
 
 
 @dataclass(frozen=True)
@@ -29,22 +30,12 @@ class Machine:
     def here(cls) -> Machine:
         return cls(
             os.cpu_count() or 1,
-            _processor(),
+            processor(),
             torch.get_num_threads(),
             torch.__version__,
             platform.python_version(),
             platform.system(),
         )
-
-
-def _processor() -> str:
-    """The processor's name; Linux tells it in a file alone."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
 
 
 def times_s(work: Callable[[], object], repeats: int, *, warm_up: bool = True) -> list[float]:

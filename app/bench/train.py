@@ -11,7 +11,8 @@ from app.bench.machine import Machine, median_s
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.string import StringParameters
-from training.losses import loss_terms
+from training.configuration import Recipe
+from training.losses import Batch, training_loss
 
 BATCH = 50
 FRAMES = 400
@@ -51,11 +52,12 @@ def _step_s(name: str) -> float:
     model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
     optimiser = torch.optim.AdamW(model.parameters())
     target = torch.randn(BATCH, FRAMES, model.grid_points, generator=torch.Generator().manual_seed(0))
-    frames = torch.arange(1, FRAMES + 1)
+    batch = Batch(target[:, 0], None, torch.arange(1, FRAMES + 1), target)
+    recipe = Recipe(epochs=1)
 
     def step() -> None:
         optimiser.zero_grad(set_to_none=True)
-        torch.stack(loss_terms(model, target[:, 0], frames, target)).sum().backward()
+        training_loss(model, batch, recipe)[0].backward()
         optimiser.step()
 
     return median_s(step, REPEATS)

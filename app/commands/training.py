@@ -96,9 +96,10 @@ def train(
         say(f"stopped; the same command goes on with {run_folder}")
         raise
     print(trained.preset.path)
-    for split, error in (("validation", trained.validation), ("test", trained.test)):
+    for split, sums in (("validation", trained.validation), ("test", trained.test)):
+        error = sums.total()
         print(f"{split:<11} rel. MSE {number(error.rel_mse)}, rel. MAE {number(error.rel_mae)}")
-    print(f"trained in  {duration(trained.seconds)}, best epoch {trained.best_epoch}")
+    print(f"trained in  {duration(trained.result.seconds)}, best epoch {trained.result.best_epoch}")
 
 
 def evaluate(

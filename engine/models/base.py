@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import torch
 from torch import Tensor, nn
 
+from engine.models.inputs import second_at_rest
 from engine.string import StringParameters
 
 State = TypeVar("State")
@@ -70,9 +71,17 @@ class StringModel(nn.Module, ABC, Generic[State]):
             displacement (batch, steps, points or grid_points) in normalised units, and the last state.
         """
 
+    def release(self, displacement: Tensor) -> State:
+        """The state at frame 0 of strings that are released at rest from displacements (batch, grid_points).
+
+        Raises:
+            ValueError: the model needs the frame before, which they do not have.
+        """
+        return self.encode(displacement, second_at_rest(self.configuration.input, displacement))
+
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
-        """Frames 1 … steps after `displacement` (batch, grid_points): (batch, steps, points)."""
-        return self.advance(self.encode(displacement), steps, readout)[0]
+        """Frames 1 … steps after a release from `displacement` (batch, grid_points): (batch, steps, points)."""
+        return self.advance(self.release(displacement), steps, readout)[0]
 
 
 def check_initialisation(model: StringModel[State], how: str) -> None:

@@ -42,3 +42,14 @@ def join_input(kind: InputKind, displacement: Tensor, second: Tensor | None) -> 
             f"{_SECOND[kind]} has shape {tuple(second.shape)}, the displacement {tuple(displacement.shape)}"
         )
     return torch.cat([displacement, second], dim=-1)
+
+
+def second_at_rest(kind: InputKind, displacement: Tensor) -> Tensor | None:
+    """What an encoder is told beside the displacement (..., grid_points) of a string that is released at rest.
+
+    Raises:
+        ValueError: a string at rest has no frame before.
+    """
+    if kind == "two_frames":
+        raise ValueError("input 'two_frames' needs the frame before, which a string at rest does not have")
+    return torch.zeros_like(displacement) if kind == "displacement_velocity" else None

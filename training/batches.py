@@ -1,0 +1,79 @@
+"""The batches of a training: which trajectories, from which frame, and which frames of them.
+
+Every random choice is a function of (seed, iteration) alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import torch
+from torch import Tensor
+
+from engine.models.inputs import InputKind
+from engine.sine_transform import synthesis_matrix
+from training.configuration import Recipe
+from training.dataset import START_EVERY, Dataset
+from training.losses import Batch
+
+
+class TrainingData:
+    """The training split on a device, and random batches of it.
+
+    Args:
+        steps: frames of a trajectory that may be used.
+        kind: what the model's encoder is told.
+
+    Raises:
+        ValueError: the data do not hold what it is told.
+    """
+
+    def __init__(self, dataset: Dataset, steps: int, kind: InputKind, device: torch.device) -> None:
+        c = dataset.configuration
+        if kind == "two_frames":
+            raise ValueError("a model of the input 'two_frames' cannot be trained; choose 'displacement_velocity'")
+        self._kind = kind
+        self._steps = steps
+        self._amplitudes = dataset.split("train").to(device)
+        count = len(self._amplitudes)
+        # displacement a sample, as an encoder wants it; the training split comes first
+        self._velocities = dataset.velocities[:count].to(device) / c.rate_hz
+        self._synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float().to(device)
+        self._mirror = torch.tensor([(-1.0) ** n for n in range(c.modes)], device=device)  # x -> ℓ - x
+        self.count = count
+
+    def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> Batch:
+        """A batch of the trajectories `rows`, over at most `horizon` frames."""
+        device = self._amplitudes.device
+        generator = torch.Generator().manual_seed((recipe.seed + 1) * 1_000_003 + iteration)
+        frames = _frames(recipe, horizon, generator)
+        rows, wanted = rows.to(device), torch.cat([torch.zeros(1, dtype=torch.long), frames]).to(device)
+        starts = torch.zeros(len(rows), dtype=torch.long, device=device)
+        if recipe.random_start:
+            last = (self._steps - horizon) // START_EVERY  # the whole horizon lies before the last frame
+            starts = torch.randint(0, last + 1, (len(rows),), generator=generator).to(device)
+        amplitudes = self._amplitudes[rows[:, None], START_EVERY * starts[:, None] + wanted]
+        velocities = self._velocities[rows, starts.clamp(max=self._velocities.shape[1] - 1)][:, None]
+        if recipe.flip:
+            coin = torch.randint(0, 2, (2, len(rows), 1, 1), generator=generator).to(device)
+            turn = (1 - 2 * coin[0]) * torch.where(coin[1] == 1, self._mirror, 1.0)
+            amplitudes, velocities = amplitudes * turn, velocities * turn
+        displacement = amplitudes @ self._synthesis
+        second = None if self._kind == "displacement" else (velocities @ self._synthesis)[:, 0]
+        return Batch(displacement[:, 0], second, wanted[1:], displacement[:, 1:])
+
+
+def batches(recipe: Recipe, count: int, epoch: int) -> Iterator[Tensor]:
+    """The rows of each batch of an epoch: every trajectory once."""
+    generator = torch.Generator().manual_seed(recipe.seed * 7_368_787 + epoch)
+    return iter(torch.randperm(count, generator=generator).split(recipe.batch_size))
+
+
+def _frames(recipe: Recipe, horizon: int, generator: torch.Generator) -> Tensor:
+    """Frames 1 … horizon, all or a random choice, ascending."""
+    if not recipe.steps_per_batch or recipe.steps_per_batch >= horizon:
+        return torch.arange(1, horizon + 1)
+    count = recipe.steps_per_batch
+    # one frame from each of `count` equal parts of the horizon: less noise than independent draws
+    edges = torch.arange(count) * horizon / count
+    return (edges + torch.rand(count, generator=generator) * horizon / count).long().clamp(max=horizon - 1) + 1

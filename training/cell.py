@@ -1,0 +1,206 @@
+"""A cell of the paper's tables: one model on one data set over one horizon, by one recipe, from one seed.
+
+A cell has a name, which is its preset's, and from the name alone its whole configuration follows: the paper's
+protocol gives the data, `recipes/RECIPE.toml` gives the rest.
+
+    nylon_nonlinear_noise_16k_koopman_var                     4000 frames, our recipe, seed 0
+    nylon_linear_gaussian_4k_lru_400_paper_seed3              400 frames, the paper's recipe, seed 3
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from engine.models import MODELS
+from engine.schema import SchemaError, read, write
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration, read_toml
+
+RECIPES = Path(__file__).parent / "recipes"
+MODES = {4000: 10, 16000: 25}  # kept by the authors at each sample rate in Hz
+HORIZON = 4000  # frames, unless a name says otherwise
+RECIPE = "ours"
+
+MODEL_NAMES = {
+    "dmd": "DMD",
+    "koopman": "Koopman",
+    "koopman_var": "Koopman_var",
+    "koopman_integrated": "integrated phase",
+    "lru": "LRU",
+    "s5": "S5",
+    "fgru": "FGRU",
+    "frnn": "FRNN",
+}
+
+Initial = Literal["gaussian", "noise"]
+_NAME = re.compile(
+    r"nylon_(?P<kind>linear|nonlinear)_(?P<initial>gaussian|noise)_(?P<rate>\d+)k_(?P<model>[a-z0-9_]+?)"
+    r"(_(?P<horizon>\d+))?(_(?P<recipe>[a-z]+))?(_seed(?P<seed>\d+))?"
+)
+
+
+@dataclass(frozen=True, order=True)
+class Cell:
+    """See the module."""
+
+    model: str
+    tension_modulated: bool
+    initial: Initial
+    rate_hz: int
+    horizon: int = HORIZON
+    recipe: str = RECIPE
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.model not in MODELS:
+            raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        if self.rate_hz not in MODES:
+            raise ValueError(f"rate_hz must be one of {', '.join(map(str, MODES))}, the paper's, not {self.rate_hz}")
+        if self.horizon < 1:
+            raise ValueError(f"horizon must be at least 1 frame, not {self.horizon}")
+        if self.seed < 0:
+            raise ValueError(f"seed must be at least 0, not {self.seed}")
+        if self.recipe not in recipe_names():
+            raise ValueError(f"recipe {self.recipe!r} is not one of {', '.join(recipe_names())}")
+
+    @property
+    def string_kind(self) -> str:
+        """The word of names and tables: "linear" or "nonlinear"."""
+        return "nonlinear" if self.tension_modulated else "linear"
+
+    @property
+    def name(self) -> str:
+        parts = ["nylon", self.string_kind, self.initial, f"{self.rate_hz // 1000}k", self.model]
+        if self.horizon != HORIZON:
+            parts.append(str(self.horizon))
+        if self.recipe != RECIPE:
+            parts.append(self.recipe)
+        if self.seed:
+            parts.append(f"seed{self.seed}")
+        return "_".join(parts)
+
+    @classmethod
+    def parse(cls, name: str) -> Cell | None:
+        """The cell of a name; None where it is no cell's.
+
+        Raises:
+            SchemaError: it has a cell's form, but names no cell, for example an unknown model.
+        """
+        # the longest model first: koopman_var is not koopman by the recipe var
+        models = "|".join(sorted(MODELS, key=len, reverse=True))
+        found = re.fullmatch(_NAME.pattern.replace("[a-z0-9_]+?", models), name) or _NAME.fullmatch(name)
+        if found is None:
+            return None
+        try:
+            return cls(
+                found["model"],
+                found["kind"] == "nonlinear",
+                found["initial"],
+                1000 * int(found["rate"]),
+                int(found["horizon"] or HORIZON),
+                found["recipe"] or RECIPE,
+                int(found["seed"] or 0),
+            )
+        except ValueError as error:
+            raise SchemaError(f"{name}: {error}") from error
+
+
+@dataclass(frozen=True)
+class Case:
+    """Where a recipe differs from its default: in cells that match every field given here."""
+
+    model: tuple[str, ...] = ()  # any of these; empty: all
+    initial: tuple[str, ...] = ()
+    rate_hz: tuple[int, ...] = ()
+    horizon: tuple[int, ...] = ()
+    tension_modulated: bool | None = None
+    set: dict[str, Any] = field(default_factory=dict)  # fields of the recipe
+    model_configuration: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for model in self.model:
+            if model not in MODELS:
+                raise ValueError(f"model {model!r} is not one of {', '.join(MODELS)}")
+
+    def matches(self, cell: Cell) -> bool:
+        wanted = (
+            (self.model, cell.model),
+            (self.initial, cell.initial),
+            (self.rate_hz, cell.rate_hz),
+            (self.horizon, cell.horizon),
+        )
+        kind = self.tension_modulated in (None, cell.tension_modulated)
+        return kind and all(not choice or value in choice for choice, value in wanted)
+
+
+@dataclass(frozen=True)
+class RecipeBook:
+    """A file of `recipes/`: its defaults, and the cases that change them, the later ones last."""
+
+    description: str
+    default: dict[str, Any]
+    case: tuple[Case, ...] = ()
+
+
+def recipe_names() -> list[str]:
+    return sorted(path.stem for path in RECIPES.glob("*.toml"))
+
+
+def configuration_of(
+    cell: Cell, data: Mapping[str, Any] | None = None, recipe: Mapping[str, Any] | None = None
+) -> TrainingConfiguration:
+    """The run that fills a cell.
+
+    Args:
+        data, recipe: fields that differ from the protocol and from the recipe: for a quick trial.
+
+    Raises:
+        SchemaError: the recipe's file, or a field given here, is wrong.
+    """
+    path = RECIPES / f"{cell.recipe}.toml"
+    book = read(RecipeBook, read_toml(path), str(path))
+    settings: dict[str, Any] = dict(book.default)
+    sizes: dict[str, Any] = {}
+    for case in book.case:
+        if case.matches(cell):
+            settings |= case.set
+            sizes |= case.model_configuration
+    protocol = DatasetConfiguration(cell.initial, cell.rate_hz, MODES[cell.rate_hz], cell.tension_modulated)
+    plain = {**write(protocol), **(data or {})}
+    dataset = read(DatasetConfiguration, plain, "data")
+    fitted = read(Recipe, {**settings, "seed": cell.seed, **(recipe or {})}, str(path))
+    try:
+        return TrainingConfiguration(
+            title=_title(cell),
+            model=cell.model,
+            data=dataset,
+            recipe=fitted,
+            description=_description(cell),
+            model_configuration=sizes,
+            horizon=cell.horizon,
+        )
+    except ValueError as error:
+        raise SchemaError(f"{cell.name}: {error}") from error
+
+
+def _title(cell: Cell) -> str:
+    details = [MODEL_NAMES[cell.model]]
+    if not cell.tension_modulated:
+        details.append("linear")
+    if cell.horizon != HORIZON:
+        details.append(f"{cell.horizon} frames")
+    if cell.recipe != RECIPE:
+        details.append(f"{cell.recipe} recipe")
+    if cell.seed:
+        details.append(f"seed {cell.seed}")
+    start = "plucked" if cell.initial == "gaussian" else "noise"
+    return f"Nylon B3, {start}, {cell.rate_hz // 1000} kHz ({', '.join(details)})"
+
+
+def _description(cell: Cell) -> str:
+    string = "tension-modulated" if cell.tension_modulated else "linear"
+    start = "Gaussian plucks" if cell.initial == "gaussian" else "noise as first displacement"
+    return f"The paper's {string} nylon string after {start}, learned over {cell.horizon} frames."

@@ -1,0 +1,159 @@
+"""The results file: one row a run, tidy CSV, safe to write from several processes and to merge from several machines.
+
+A row is found again by the digest of its configuration, which holds the seed; a later row replaces an earlier one
+of the same run. From a row's `name` follows the command that repeats it: `learned-strings train NAME`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, get_type_hints
+
+from filelock import FileLock
+
+from engine.schema import SchemaError, read
+from engine.whole_file import whole_file
+
+QUARTERS = 4  # windows of the horizon, with an error each
+SHORT_HORIZON = 400  # frames; the paper's second horizon, over which every run is measured too
+RESULTS = Path(__file__).parent / "results.csv"
+
+Status = Literal["done", "diverged", "failed"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A run and what came of it. Errors are None where there are none: diverged, failed.
+
+    Attributes:
+        digest: of the configuration; see `TrainingConfiguration.digest`.
+        name: the cell's or the configuration's.
+        string: "linear" or "nonlinear".
+        horizon: frames that were trained and measured.
+        rel_mse, rel_mae: over the validation set and the horizon, as in the paper's tables.
+        rel_mse_spread, rel_mae_spread: standard deviation over the validation trajectories, as the paper's for DMD.
+        rel_mse_q1 …: of the quarters of the horizon.
+        rel_mse_400, rel_mae_400: over the first 400 frames, where the horizon reaches so far.
+        seconds: of training.
+        commit: of the code, "" where it is not known.
+        finished: UTC, ISO 8601.
+    """
+
+    digest: str
+    name: str
+    status: Status
+    model: str
+    string: str
+    initial: str
+    rate_hz: int
+    horizon: int
+    recipe: str
+    seed: int
+    initialisation: str = ""
+    rel_mse: float | None = None
+    rel_mae: float | None = None
+    test_rel_mse: float | None = None
+    test_rel_mae: float | None = None
+    rel_mse_spread: float | None = None
+    rel_mae_spread: float | None = None
+    rel_mse_400: float | None = None
+    rel_mae_400: float | None = None
+    rel_mse_q1: float | None = None
+    rel_mse_q2: float | None = None
+    rel_mse_q3: float | None = None
+    rel_mse_q4: float | None = None
+    rel_mae_q1: float | None = None
+    rel_mae_q2: float | None = None
+    rel_mae_q3: float | None = None
+    rel_mae_q4: float | None = None
+    parameters: int | None = None
+    epochs: int | None = None
+    best_epoch: int | None = None
+    seconds: float | None = None
+    device: str = ""
+    threads: int | None = None
+    hardware: str = ""
+    torch: str = ""
+    commit: str = ""
+    finished: str = ""
+    message: str = ""
+
+    @property
+    def structured(self) -> bool:
+        """Whether it started from prior knowledge of the string, which the paper's models do not have."""
+        return self.initialisation in ("physics", "averaging")
+
+
+COLUMNS = tuple(field.name for field in fields(Row))
+_HINTS = get_type_hints(Row)
+
+
+def read_results(path: Path) -> list[Row]:
+    """All rows of a results file, none where there is no file.
+
+    Raises:
+        SchemaError: it is not a results file, or a value is wrong; the message names the file, line and column.
+        OSError: it cannot be read.
+    """
+    if not path.exists():
+        return []
+    try:
+        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin anew") from error
+    if not lines or not set(lines[0]) <= set(COLUMNS) or "digest" not in lines[0]:
+        raise SchemaError(f"{path}: not a results file: its first line must name {', '.join(COLUMNS[:3])}, …")
+    columns, *rows = lines
+    return [_parse(dict(zip(columns, row, strict=False)), f"{path}: line {n}") for n, row in enumerate(rows, 2)]
+
+
+def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
+    """Adds rows to a results file, or makes it; of two rows of one run the one that finished later stays.
+
+    A run that is done is never replaced by a failure. Locked against other processes; whole or not at all.
+
+    Returns:
+        All rows of the file, in the order of their names.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(f"{path}.lock"):
+        found = {row.digest: row for row in read_results(path)}
+        for row in rows:
+            old = found.get(row.digest)
+            if old is None or _rank(row) >= _rank(old):
+                found[row.digest] = row
+        merged = sorted(found.values(), key=lambda row: (row.name, row.digest))
+        with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(COLUMNS)
+            writer.writerows([_text(getattr(row, name)) for name in COLUMNS] for row in merged)
+    return merged
+
+
+def _rank(row: Row) -> tuple[bool, str]:
+    return row.status == "done", row.finished
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.8g}" if isinstance(value, float) else str(value)
+
+
+def _parse(line: dict[str, str], where: str) -> Row:
+    values: dict[str, Any] = {}
+    for name, text in line.items():
+        hint = _HINTS[name]
+        if hint is str or hint is Status:
+            values[name] = text
+        elif text:
+            kind = float if hint == float | None else int
+            try:
+                values[name] = kind(text)
+            except ValueError:
+                raise SchemaError(f"{where}, column {name}: {text!r} is not a number") from None
+    return read(Row, values, where)
