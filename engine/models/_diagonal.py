@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models.base import Physics, StringModel
+from engine.models.inputs import InputKind
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
 SEGMENT = 64  # frames of the fine table of powers
@@ -98,10 +99,15 @@ def read_layer(layer: nn.Linear, readout: Tensor | None) -> tuple[Tensor, Tensor
     return readout.T @ layer.weight, layer.bias @ readout
 
 
-def linear_string_eigenvalues(size: int, physics: Physics, generator: torch.Generator) -> Tensor:
+def linear_string_eigenvalues(
+    size: int, physics: Physics, generator: torch.Generator, sharpest: float = 0.0
+) -> Tensor:
     """log λ, complex128 (size,), of the linear string's modes, repeated in order until `size` are there.
 
     The repetitions have decay rates up to three times lower or higher, so that no two latents are the same.
+
+    Args:
+        sharpest: how far the repetitions are spread above a mode's frequency, as a share of it.
 
     Raises:
         ValueError: fewer than one for each mode.
@@ -112,7 +118,25 @@ def linear_string_eigenvalues(size: int, physics: Physics, generator: torch.Gene
     linear = physics.string.eigenvalues(modes)[torch.arange(size) % modes] / physics.rate_hz
     stretch = 3.0 ** (2 * torch.rand(size, generator=generator, dtype=torch.float64) - 1)
     stretch[:modes] = 1
-    return torch.complex(linear.real * stretch, linear.imag)
+    repetition = torch.arange(size) // modes
+    raised = 1 + sharpest * repetition / max(1, int(repetition[-1]))
+    return torch.complex(linear.real * stretch, linear.imag * raised)
+
+
+def linear_string_encoder(kind: InputKind, analysis: Tensor, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor]:
+    """Real and imaginary rows, (n, inputs) each, of an encoder whose latents move as Re(λᵏ z₀) = the mode's q_k.
+
+    z₀ = q₀ + ib, where b follows from q̇₀ = Re(log λ · z₀), or from q₋₁ = Re(z₀ / λ). From the displacement alone
+    b = 0: with the damping of a string that is a string at rest, to about σ/ω.
+    """
+    none = torch.zeros_like(analysis)
+    if kind == "displacement":
+        return analysis, none
+    nu, theta = -log_eigenvalues.real[:, None], log_eigenvalues.imag[:, None]
+    real = torch.cat([analysis, none], dim=1)
+    if kind == "displacement_velocity":
+        return real, torch.cat([-nu / theta * analysis, -analysis / theta], dim=1)
+    return real, torch.cat([-analysis / theta.tan(), torch.exp(-nu) / theta.sin() * analysis], dim=1)
 
 
 def store_eigenvalues(nu_log: Tensor, theta_log: Tensor, log_eigenvalues: Tensor) -> None:

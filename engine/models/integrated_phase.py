@@ -11,6 +11,14 @@ The linear term is integrated in closed form, ∫ = Σ_m K_nm E_m(0) (1 - e^{-2�
 rule on nodes at fixed times, and between them by the cubic whose slope is the parabola through its samples. No
 recursion: any time can be had in any order, whole samples or not, so a model renders at any sample rate.
 
+Modulation. Averaging follows the mean tension; within a period it also swings, at twice the frequency of every mode,
+and high modes swing with it. What that does to first order is a product, and its inverse leads into the averaged
+coordinates (a near-identity transform):
+
+    û = decoder(z ⊙ exp(M_out z²)),     z(0) = y ⊙ exp(M_in y²),  y = encoder(u₀),
+
+with real matrices on [Re z², Im z²] that yield log gain (bounded as above) and phase.
+
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
 parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
 decay either way: the eigenvalue at time t is -σ_n + iω_n + Re f_n sech²(Re I_n / b) + i Im f_n, which is -σ + iω + f
@@ -47,6 +55,7 @@ from engine.sine_transform import analysis_matrix, synthesis_matrix
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
 SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
 MOST_PRODUCTS = 1024  # frames of a listening point's segment: rounding grows with their cube, to 1e-7
+MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
 LISTENING_POINTS = 8  # at most: more are better read off with matrix products
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
@@ -63,9 +72,13 @@ class IntegratedPhaseConfiguration:
         eigenvalue_widths: hidden widths of g.
         multiplier_widths: hidden widths of Koopman_var's multiplier, 1 + MLP(|z|²). Evaluated at every frame.
         decoder_widths: hidden widths of an MLP that is added to the linear decoder. Evaluated at every frame.
+        modulation: whether there are M_in and M_out. Evaluated at every frame.
         node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
         rate_unit: unit of K E and of g in radians and nepers a sample. A weight of 1 turns a phase by one radian in
             1/rate_unit samples, the order of a training horizon, so that an optimiser's usual steps suit.
+        physical_units: K, g and M are told the tension that each mode adds, as a share of the tension at rest, instead
+            of the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode, which
+            is what an optimiser and a network need. A start from the physics fills the units in.
         gain_limit_db: b, the largest change of level that Re f can add up to.
     """
 
@@ -76,8 +89,10 @@ class IntegratedPhaseConfiguration:
     eigenvalue_widths: tuple[int, ...] = (128, 128)
     multiplier_widths: tuple[int, ...] = ()
     decoder_widths: tuple[int, ...] = ()
+    modulation: bool = False
     node_spacing: int = 40
     rate_unit: float = 1e-3
+    physical_units: bool = False
     gain_limit_db: float = 6.0
 
     def __post_init__(self) -> None:
@@ -150,10 +165,17 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
+        self.energy_units: Tensor | None
+        self.rate_units: Tensor | None
+        ones = torch.ones(n, dtype=torch.float64)
+        self.register_buffer("energy_units", ones if c.physical_units else None)  # 1/(normalised displacement)²
+        self.register_buffer("rate_units", c.rate_unit * ones if c.physical_units else None)  # 1/samples
         self.g = _mlp(n, c.eigenvalue_widths, 2 * n, last_bias=False)  # g(0) is subtracted: it would cancel
         self.multiplier = _mlp(n, c.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, c.grid_points)
         self.decoder_residual = _mlp(2 * n, c.decoder_widths, c.grid_points)
+        self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None  # real parts first
+        self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None
 
     def encode(self, displacement: Tensor, second: Tensor | None = None) -> IntegratedPhaseState:
         """See the contract; `second` as in `engine.models.inputs.join_input`."""
@@ -161,6 +183,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         z = self.encoder(values)
         if self.encoder_residual is not None:
             z = z + self.encoder_residual(values)
+        if self.M_in is not None:
+            z = torch.cat(self._modulate(self.M_in, *z.chunk(2, dim=-1)), dim=-1)
         return _at_rest(pack(z))
 
     def advance(
@@ -214,7 +238,10 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     def _rates(self) -> _Rates:
         # below, σ is as good as none, and one of zero would be divided by; above, all is over within a sample
         sigma = self.nu_log.double().exp().clamp(1e-9, 1e3)
-        return _Rates(sigma, self.theta_log.double().exp(), self.K.double().T * self.configuration.rate_unit)
+        coupling = self.K.double().T
+        if self.energy_units is not None:
+            coupling = coupling * self.energy_units[:, None]
+        return _Rates(sigma, self.theta_log.double().exp(), coupling * self._rate_units)
 
     def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor) -> Tensor:
         """z at times (times,) after the state's, complex (batch, times, state_size)."""
@@ -236,8 +263,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         length = self._segment_length(SEGMENT, step)
         segments, later = self._segments(state, rates, count, step, length)
         alive = segments.alive
-        if self.multiplier is not None or self.decoder_residual is not None:
-            alive = torch.arange(len(rates.sigma), device=alive.device)  # their networks take every latent
+        if not self._has_linear_decoder:
+            alive = torch.arange(len(rates.sigma), device=alive.device)  # what comes before it takes every latent
         ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (_hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
@@ -249,8 +276,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     def _can_listen(self, state: IntegratedPhaseState, readout: Tensor) -> bool:
         """Whether `_listen` applies: a linear decoder at a few points, on a processor, and no gradients asked for."""
         return (
-            self.multiplier is None
-            and self.decoder_residual is None
+            self._has_linear_decoder
             and readout.shape[-1] <= LISTENING_POINTS
             and state.origin.device.type == "cpu"
             and not torch.is_grad_enabled()
@@ -364,11 +390,22 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         segments = max(1, math.ceil(float(times.max()) / spacing) - first, last - first)
         nodes = torch.arange(2 * segments + 1, device=times.device).double() * (spacing / 2) + first * spacing
         energies = energy * torch.exp(-2 * rates.sigma * nodes[:, None])
+        if self.energy_units is not None:
+            energies = energies * self.energy_units
         f = self.g(energies.to(dtype)) - self.g(energy.new_zeros(energy.shape[-1], dtype=dtype))
-        f = f.double() * self.configuration.rate_unit
+        f = f.double() * self._rate_units
         positions = torch.cat([times / spacing - first, times.new_tensor([float(last - first)])])
         integrals, slopes = integrate_parabolas(f, positions)
         return integrals[:, :-1] * spacing, slopes[:, :-1], integrals[:, -1] * spacing
+
+    @property
+    def _has_linear_decoder(self) -> bool:
+        return self.multiplier is None and self.decoder_residual is None and self.M_out is None
+
+    @property
+    def _rate_units(self) -> Tensor | float:
+        """Of f, in radians and nepers a sample: (2 state_size,), or one for all."""
+        return self.configuration.rate_unit if self.rate_units is None else self.rate_units.repeat(2)
 
     @property
     def _gain_limit(self) -> float:
@@ -377,6 +414,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
 
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
         """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
+        if self.M_out is not None:
+            real, imag = self._modulate(self.M_out, real, imag)
         if self.multiplier is not None:
             a, b = self.multiplier(real.square() + imag.square()).chunk(2, dim=-1)
             real, imag = real + a * real - b * imag, imag + a * imag + b * real
@@ -390,6 +429,19 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             found = found + nn.functional.linear(hidden(parts), *read_layer(last, readout))
         return found
 
+    @property
+    def _modulation_units(self) -> Tensor | float:
+        """Of M, in radians and nepers for squares of normalised displacement: (2 state_size,), or one for all."""
+        return MODULATION_UNIT if self.energy_units is None else self.energy_units.to(self.K.dtype).repeat(2)
+
+    def _modulate(self, matrix: Tensor, real: Tensor, imag: Tensor) -> tuple[Tensor, Tensor]:
+        """z ⊙ exp(M z²) on both parts of z."""
+        squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
+        growth, turn = nn.functional.linear(squares, matrix * self._modulation_units).chunk(2, dim=-1)
+        gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
+        cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
+        return real * cosine - imag * sine, real * sine + imag * cosine
+
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
 
@@ -398,7 +450,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             others repeat those frequencies with other decay rates and are not yet heard. K = 0.
         averaging: physics, and K of the tension-modulated string to first order in ΔT/T₀, by averaging over a
             period: f_n = i k_n/4ω_n Σ_m η_m² E_m (1 + ½δ_nm). A solution without learning: a trained model must
-            beat it to have learned more.
+            beat it to have learned more. M_out is what the same order adds within a period (`averaged_modulation`),
+            and M_in undoes it at rest.
 
         The last two are prior knowledge that the paper's models do not have: say so in a table.
         """
@@ -409,21 +462,41 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
                     _initialise_mlp(network, generator)
             for linear in (self.encoder, self.decoder):
                 initialise_orthogonal(linear, generator)
-            nn.init.zeros_(self.K)
+            for matrix in (self.K, self.M_in, self.M_out):
+                if matrix is not None:
+                    nn.init.zeros_(matrix)
             if how == "random":
                 store_ring(self.nu_log, self.theta_log, generator)
             else:
                 self._initialise_linear_string(physics, generator)
             if how == "averaging" and physics.tension_modulated:
-                n, modes = self.configuration.state_size, physics.modes
-                averaged = averaged_coupling(physics) / self.configuration.rate_unit
-                self.K[n:, :modes] = averaged[torch.arange(n) % modes].to(self.K)
+                self._initialise_averaging(physics)
+
+    def _initialise_averaging(self, physics: Physics) -> None:
+        n, modes = self.configuration.state_size, physics.modes
+        mode = torch.arange(n) % modes
+        averaged = torch.zeros(2 * n, n, dtype=torch.float64)
+        averaged[n:, :modes] = averaged_coupling(physics)[mode]
+        averaged = averaged.T / self._rate_units
+        energy_units = 1.0 if self.energy_units is None else self.energy_units[:, None]
+        self.K.copy_((averaged / energy_units).T)
+        if self.M_in is not None and self.M_out is not None:
+            gain, turn = (matrix[mode] for matrix in averaged_modulation(physics))
+            modulation = torch.zeros(2 * n, 2 * n, dtype=torch.float64)
+            modulation[:n, :modes], modulation[n:, n : n + modes] = gain, turn
+            self.M_out.copy_(modulation / self._modulation_units)
+            self.M_in[:n, :n] = -self.M_out[:n, :n]
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = analysis_matrix(points, modes).T[torch.arange(n) % modes]
+        mode = torch.arange(n) % modes
+        if self.energy_units is not None and self.rate_units is not None:
+            unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
+            self.energy_units.copy_(physics.string.relative_tension_rise(unit_m))
+            self.rate_units.copy_(physics.string.undamped_frequencies(modes)[mode] / physics.rate_hz)
+        analysis = analysis_matrix(points, modes).T[mode]
         first, second = _imaginary_parts(self.configuration.input, log_eigenvalues)
         self.encoder.weight.zero_()
         self.encoder.weight[:n, :points] = analysis.to(self.encoder.weight)
@@ -451,6 +524,25 @@ def averaged_coupling(physics: Physics) -> Tensor:
     share = string.tension_coupling(modes) / (4 * string.undamped_frequencies(modes))
     squares = string.wavenumbers(modes).square() * physics.scale_m**2
     return share[:, None] * squares * (1 + 0.5 * torch.eye(modes, dtype=torch.float64)) / physics.rate_hz
+
+
+def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
+    """What the swinging tension adds within a period, to first order: float64 (modes, modes) each.
+
+    -k_n q_n η_m² q_m² swings at ω_n ± 2ω_m, where mode n answers with α z_m² z_n + β z̄_m² z_n,
+    α = k_n η_m²/(16 ω_m (ω_n + ω_m)) and β = -k_n η_m²/(16 ω_m (ω_n - ω_m)); n = m has no β, its part is in K.
+
+    Returns:
+        α + β, nepers for Re z_m², and α - β, radians for Im z_m², of amplitudes in normalised units.
+    """
+    string, modes = physics.string, physics.modes
+    omega = string.undamped_frequencies(modes)
+    squares = string.wavenumbers(modes).square() * physics.scale_m**2
+    share = string.tension_coupling(modes)[:, None] * squares / (16 * omega)
+    difference = omega[:, None] - omega
+    alpha = share / (omega[:, None] + omega)
+    beta = torch.where(difference == 0, 0.0, -share / torch.where(difference == 0, 1.0, difference))
+    return alpha + beta, alpha - beta
 
 
 def integrate_parabolas(samples: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:

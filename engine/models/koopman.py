@@ -24,6 +24,7 @@ from engine.models._diagonal import (
     dense_layers,
     initialise_orthogonal,
     linear_string_eigenvalues,
+    linear_string_encoder,
     perceptron,
     read_layer,
     store_eigenvalues,
@@ -32,6 +33,13 @@ from engine.models._diagonal import (
 from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
+from engine.sine_transform import analysis_matrix, synthesis_matrix
+
+
+SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
+STRAIGHT = 4.0  # in the data's deviations: where "physics" holds the units, so that most plucks leave them straight
+SHARPEST = 0.05  # "physics": share by which the strongest plucks raise a mode's frequency
+UNHEARD = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
 
 
 @dataclass(frozen=True)
@@ -97,8 +105,10 @@ class Koopman(DiagonalModel):
         """See the contract.
 
         paper: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal layers.
-        physics: the same layers, and the eigenvalues of the linear string's modes, repeated with other decay rates.
-            Prior knowledge that the paper's model does not have: say so in a table.
+        physics: the linear string: its eigenvalues, and MLPs that are the sine transform and its inverse as long as
+            no unit leaves the straight part of SELU. The other latents repeat the modes with other decay rates and
+            frequencies up to `SHARPEST` higher, which a tension-modulated string passes through, and are not yet
+            heard. Prior knowledge that the paper's model does not have: say so in a table.
         """
         check_initialisation(self, how)
         with torch.no_grad():
@@ -107,5 +117,64 @@ class Koopman(DiagonalModel):
             if how == "paper":
                 store_ring(self.nu_log, self.theta_log, generator)
             else:
-                n = self.configuration.state_size
-                store_eigenvalues(self.nu_log, self.theta_log, linear_string_eigenvalues(n, physics, generator))
+                self._initialise_linear_string(physics, generator)
+
+    def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
+        c, modes = self.configuration, physics.modes
+        sharpest = SHARPEST if physics.tension_modulated else 0.0
+        log_eigenvalues = linear_string_eigenvalues(c.state_size, physics, generator, sharpest)
+        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        analysis = analysis_matrix(c.grid_points, modes).T[torch.arange(c.state_size) % modes]
+        encoder = dense_layers(self.encoder)
+        if c.mixing_layer:
+            nn.init.eye_(encoder.pop().weight)
+        _store_linear_map(encoder, torch.cat(linear_string_encoder(c.input, analysis, log_eigenvalues)), generator)
+        synthesis = torch.zeros(c.grid_points, 2 * c.state_size)
+        synthesis[:, :modes] = synthesis_matrix(c.grid_points, modes).T
+        _store_linear_map(dense_layers(self.decoder), synthesis, generator, UNHEARD)
+
+
+def _store_linear_map(
+    layers: list[nn.Linear], matrix: Tensor, generator: torch.Generator, others: float = 0.0
+) -> None:
+    """Makes dense layers with SELU between `matrix` (outputs, inputs), where no unit leaves SELU's straight part.
+
+    Biases hold every hidden unit at a positive value. The first layer's rows hold what `matrix` reads, in a random
+    rotation; the hidden layers after it stay as they were drawn, orthogonal; the last undoes them.
+
+    Args:
+        others: size of the last layer's random weights for what `matrix` does not read.
+
+    Raises:
+        ValueError: a hidden layer is too narrow.
+    """
+    *hidden, last = layers
+    matrix = matrix.double()
+    through = torch.eye(matrix.shape[1], dtype=torch.float64)
+    silent = torch.zeros(matrix.shape[1], dtype=torch.float64)  # what a layer is given where the input is zero
+    for layer in hidden:
+        weight = layer.weight.double() / SELU_SLOPE if layer is not hidden[0] else _reading(layer, matrix, generator)
+        layer.weight.copy_(weight)
+        layer.bias.copy_(STRAIGHT - weight @ silent)
+        through = SELU_SLOPE * weight @ through
+        silent = torch.full((len(weight),), SELU_SLOPE * STRAIGHT, dtype=torch.float64)
+    weight = matrix @ torch.linalg.pinv(through)
+    if not torch.allclose(weight @ through, matrix, atol=1e-6 * float(matrix.abs().max())):
+        narrow = min(layer.out_features for layer in hidden)
+        raise ValueError(
+            f"initialisation 'physics' needs hidden layers that can hold the string; the narrowest has {narrow} units"
+        )
+    weight = weight + others * torch.empty_like(weight).normal_(generator=generator)
+    last.weight.copy_(weight)
+    last.bias.copy_(-weight @ silent)
+
+
+def _reading(layer: nn.Linear, matrix: Tensor, generator: torch.Generator) -> Tensor:
+    """Orthonormal rows or columns (units, inputs), in which all that `matrix` reads is held first."""
+    _, values, rows = torch.linalg.svd(matrix, full_matrices=False)
+    rows = rows[values > 1e-9 * values[0]]
+    units, inputs = layer.weight.shape
+    others = torch.empty(inputs, inputs, dtype=torch.float64).normal_(generator=generator)
+    basis = torch.linalg.qr(torch.cat([rows, others]).T).Q[:, : min(units, inputs)].T
+    turn = nn.init.orthogonal_(torch.empty(units, len(basis), dtype=torch.float64), generator=generator)
+    return turn @ basis

@@ -30,6 +30,7 @@ from engine.models._diagonal import (
     energy,
     initialise_orthogonal,
     linear_string_eigenvalues,
+    linear_string_encoder,
     perceptron,
     read_layer,
     store_eigenvalues,
@@ -183,26 +184,10 @@ class KoopmanVar(DiagonalModel):
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         analysis = analysis_matrix(points, modes).T[torch.arange(n) % modes]
-        self.encoder.weight.copy_(torch.cat(_release(self.configuration.input, analysis, log_eigenvalues)))
+        self.encoder.weight.copy_(torch.cat(linear_string_encoder(self.configuration.input, analysis, log_eigenvalues)))
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
         self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T
         last = dense_layers(self.multiplier)[-1]
         last.weight.mul_(0.01)
         last.bias[:n] = 1
-
-
-def _release(kind: InputKind, analysis: Tensor, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor]:
-    """Real and imaginary rows, (n, inputs) each, of an encoder whose latents move as Re(λᵏ z₀) = the mode's q_k.
-
-    z₀ = q₀ + ib, where b follows from q̇₀ = Re(log λ · z₀), or from q₋₁ = Re(z₀ / λ). From the displacement alone
-    b = 0: with the damping of a string that is a string at rest, to about σ/ω.
-    """
-    none = torch.zeros_like(analysis)
-    if kind == "displacement":
-        return analysis, none
-    nu, theta = -log_eigenvalues.real[:, None], log_eigenvalues.imag[:, None]
-    real = torch.cat([analysis, none], dim=1)
-    if kind == "displacement_velocity":
-        return real, torch.cat([-nu / theta * analysis, -analysis / theta], dim=1)
-    return real, torch.cat([-analysis / theta.tan(), torch.exp(-nu) / theta.sin() * analysis], dim=1)

@@ -20,6 +20,8 @@ KINDS: tuple[dict, ...] = (
     {"encoder_widths": (), "eigenvalue_widths": ()},
     SMALL,
     SMALL | {"multiplier_widths": (8,), "decoder_widths": (8,), "node_spacing": 7},
+    {"encoder_widths": (), "eigenvalue_widths": (), "modulation": True},
+    SMALL | {"modulation": True, "physical_units": True},
 )
 
 
@@ -64,10 +66,11 @@ def test_agrees_with_a_plain_quadrature(sizes: dict) -> None:
         return z.abs().square() * torch.exp(-2 * sigma * times[:, None])
 
     def f(times: Tensor) -> Tensor:
-        found = energies(times) @ model.K.T
+        told = energies(times) * (1 if model.energy_units is None else model.energy_units)
+        found = told @ model.K.T
         if model.g is not None:
-            found = found + model.g(energies(times)) - model.g(torch.zeros(12).double())
-        return found * c.rate_unit
+            found = found + model.g(told) - model.g(torch.zeros(12).double())
+        return found * (c.rate_unit if model.rate_units is None else torch.cat([model.rate_units] * 2))
 
     fine = torch.arange(60 * 100 + 1, dtype=torch.float64) / 100
     integral = torch.cumulative_trapezoid(f(fine), fine, dim=0)[99::100]
@@ -230,6 +233,38 @@ def test_averaging_is_nearly_the_tension_modulated_string() -> None:
         errors[how] = float((difference.square().sum((1, 2)) / truth[:, 1:].square().sum((1, 2))).mean())
     assert errors["averaging"] < 2e-4
     assert errors["physics"] > 0.5
+
+
+@torch.no_grad()
+def test_physical_units_change_no_start_but_its_numbers() -> None:
+    model, scaled = (string_model(physical_units=units, modulation=True) for units in (False, True))
+    loud = 5 * initial()
+    assert relative(scaled(loud, 3000), model(loud, 3000)) < 1e-4
+    assert 0.1 < scaled.K.abs().max() < 2 and scaled.M_out is not None and 0.01 < scaled.M_out.abs().max() < 20
+    assert float(scaled.energy_units[0]) == pytest.approx(  # type: ignore[index]
+        float(StringParameters().relative_tension_rise(torch.tensor([1e-3, 0, 0]))), rel=1e-6
+    )
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("high", [3, 8])
+def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period(high: int) -> None:
+    """The error of averaging alone is of first order in ΔT/T₀, with modulation of second."""
+    string, rate_hz, steps = StringParameters(), 16_000, 60
+    errors: dict[bool, list[float]] = {False: [], True: []}
+    for strength in (1.0, 0.5):
+        amplitudes = torch.zeros(1, 10, dtype=torch.float64)
+        amplitudes[0, 0], amplitudes[0, high] = 8e-3 * strength, 1e-5
+        truth = SplittingSolver(string, 10, rate_hz, tension_modulated=True).solve(ModalState.at_rest(amplitudes), steps)
+        for modulation in errors:
+            sizes = IntegratedPhaseConfiguration(state_size=10, modulation=modulation)
+            model = KoopmanIntegrated(sizes).double()
+            model.initialise("averaging", Physics(string, 10, rate_hz, 1e-3), torch.Generator().manual_seed(0))
+            found = to_modes(model(to_grid(amplitudes / 1e-3, 101), steps), 10)[0, :, high] * 1e-3
+            errors[modulation].append(relative(found, truth[0, 1:, high]))
+    assert errors[True][0] < 0.2 * errors[False][0]
+    assert 3 < errors[False][0] / errors[False][1] < 5  # ΔT/T₀ goes with the square of the strength
+    assert 10 < errors[True][0] / errors[True][1] < 25
 
 
 def test_averaging_of_the_linear_string_is_the_linear_string() -> None:

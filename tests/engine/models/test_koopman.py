@@ -8,8 +8,9 @@ import pytest
 import torch
 
 from engine.models.base import Physics, count_parameters
-from engine.models.koopman import Koopman, KoopmanConfiguration
-from engine.sine_transform import listening_weights
+from engine.models.koopman import SHARPEST, Koopman, KoopmanConfiguration
+from engine.reference import ModalState, solve_linear
+from engine.sine_transform import listening_weights, to_grid
 from engine.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "koopman.npz"
@@ -131,9 +132,23 @@ def test_initialisations_lie_where_they_should() -> None:
     physical = small_model(how="physics")
     linear = StringParameters().eigenvalues(10) / 4_000
     torch.testing.assert_close(physical.nu_log.detach()[:10].exp().double(), -linear.real, rtol=1e-5, atol=0)
-    torch.testing.assert_close(physical.theta_log.detach().exp().double(), linear.imag.repeat(4)[:32])
+    raised = physical.theta_log.detach().exp().double() / linear.imag.repeat(4)[:32]
+    torch.testing.assert_close(raised, 1 + SHARPEST * (torch.arange(32) // 10).double() / 3, rtol=1e-5, atol=0)
     weight = physical.encoder[0].weight
     torch.testing.assert_close(weight @ weight.T, torch.eye(16), rtol=0, atol=1e-5)
+
+
+@torch.no_grad()
+def test_physics_starts_as_the_linear_string() -> None:
+    """As long as SELU is straight, which it is for the plucks of most of the data."""
+    model = Koopman(KoopmanConfiguration())
+    model.initialise("physics", PHYSICS, torch.Generator().manual_seed(0))
+    amplitudes = torch.randn(2, 10, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    times_s = torch.arange(401).double() / PHYSICS.rate_hz
+    truth = solve_linear(PHYSICS.string, ModalState.at_rest(0.3 * amplitudes), times_s)
+    found = model(to_grid(0.3 * amplitudes, 101).float(), 400)
+    wanted = to_grid(truth[:, 1:], 101)
+    assert float((found - wanted).square().sum() / wanted.square().sum()) < 1e-4
 
 
 def test_the_seed_decides_all() -> None:
@@ -163,3 +178,5 @@ def test_physics_initialisation_needs_a_state_for_each_mode() -> None:
         small_model(how="physics", state_size=5)
     with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
         small_model(how="guess")
+    with pytest.raises(ValueError, match="the narrowest has 9 units"):
+        small_model(how="physics", encoder_widths=(24, 9))
