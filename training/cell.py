@@ -98,7 +98,7 @@ class Cell:
             return cls(
                 found["model"],
                 found["kind"] == "nonlinear",
-                found["initial"],
+                "gaussian" if found["initial"] == "gaussian" else "noise",
                 1000 * int(found["rate"]),
                 int(found["horizon"] or HORIZON),
                 found["recipe"] or RECIPE,

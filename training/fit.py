@@ -58,7 +58,6 @@ class FitResult:
 
     model: StringModel[Any]
     validation: RelativeError
-    initialisation: str
     epochs: int
     best_epoch: int
     seconds: float
@@ -108,12 +107,19 @@ def fit(
     return run.result()
 
 
+def initialisation_of(configuration: TrainingConfiguration) -> str:
+    """How a run's model starts: the recipe's choice, or its source's own."""
+    if configuration.model == "dmd":
+        return LEAST_SQUARES
+    return configuration.recipe.initialisation or MODELS[configuration.model][0].initialisations[0]
+
+
 def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringModel[Any]:
     """The untrained model of a run, initialised from its seed; `scale_m` is its data set's."""
     data = configuration.data
     model = build_model(configuration.model, configuration.model_configuration)
     model.initialise(
-        configuration.recipe.initialisation or model.initialisations[0],
+        initialisation_of(configuration),
         Physics(data.string, data.modes, data.rate_hz, scale_m, data.tension_modulated),
         torch.Generator().manual_seed(configuration.recipe.seed),
     )
@@ -206,8 +212,7 @@ class _Run:
             raise Diverged("the validation error was never a number; lower peak_learning_rate")
         model = self._measured()
         model.load_state_dict(self._best_model)
-        how = self._recipe.initialisation or model.initialisations[0]
-        return FitResult(model.eval(), self._best, how, self.epoch, self._best_epoch, self.seconds)
+        return FitResult(model.eval(), self._best, self.epoch, self._best_epoch, self.seconds)
 
     def checkpoint(self) -> Checkpoint:
         facts = {
@@ -252,7 +257,7 @@ def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Cal
     error = evaluate_model(model, dataset, "validation", configuration.steps).total()
     seconds = time.monotonic() - started
     report(Progress(1, 1, configuration.steps, 0.0, error.rel_mse, error, seconds, 0.0))
-    return FitResult(model.eval(), error, LEAST_SQUARES, 1, 1, seconds)
+    return FitResult(model.eval(), error, 1, 1, seconds)
 
 
 def _optimiser(model: torch.nn.Module, recipe: Recipe) -> torch.optim.Optimizer:

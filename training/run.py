@@ -24,7 +24,7 @@ from training import provenance
 from training.configuration import TrainingConfiguration
 from training.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
-from training.fit import Diverged, FitResult, Progress, fit
+from training.fit import Diverged, FitResult, Progress, fit, initialisation_of
 from training.results import QUARTERS, SHORT_HORIZON, Row
 
 LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
@@ -55,7 +55,8 @@ def train(
 
     Args:
         dataset: of `configuration.data`.
-        report: called after every epoch, which is in `run_folder`/log.csv by then.
+        report: called after every epoch, which is in `run_folder`/log.csv by then; the run ends with a plot of it,
+            log.png.
 
     Raises:
         Diverged, ValueError: see `fit`.
@@ -71,14 +72,19 @@ def train(
         log.add(progress)
         report(progress)
 
-    result = fit(
-        configuration,
-        dataset,
-        run_folder,
-        device=device,
-        report=log_and_report,
-        checkpoint_every_s=checkpoint_every_s,
-    )
+    try:
+        result = fit(
+            configuration,
+            dataset,
+            run_folder,
+            device=device,
+            report=log_and_report,
+            checkpoint_every_s=checkpoint_every_s,
+        )
+    except Diverged:
+        _plot(log.path)
+        raise
+    _plot(log.path)
     result = replace(result, model=result.model.cpu())
     info = preset_info(configuration, dataset, result)
     save_preset(output, info, result.model)
@@ -131,6 +137,7 @@ def run_row(
         "horizon": configuration.steps,
         "recipe": recipe,
         "seed": configuration.recipe.seed,
+        "initialisation": initialisation_of(configuration),
         "device": torch.device(device).type,
         "threads": torch.get_num_threads(),
         "hardware": provenance.hardware(device),
@@ -160,7 +167,6 @@ def _figures(trained: TrainedPreset) -> dict[str, Any]:
     info, result, sums = trained.preset.info, trained.result, trained.validation
     spread = sums.spread()
     figures: dict[str, Any] = {
-        "initialisation": result.initialisation,
         "rel_mse": info.rel_mse,
         "rel_mae": info.rel_mae,
         "test_rel_mse": info.test_rel_mse,
@@ -185,7 +191,7 @@ def _read_row(file: Path) -> Row:
     try:
         return read(Row, json.loads(file.read_text(encoding="utf-8")), str(file))
     except ValueError as error:
-        raise ValueError(f"{error}; delete {file} to measure the run again") from error
+        raise ValueError(f"{file}: not a row ({error}); delete it to measure the run again") from error
 
 
 def default_runs() -> Path:
@@ -214,7 +220,7 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         horizon_steps=configuration.steps,
         scale_m=dataset.scale_m,
         trained_range=trained_range(data.initial),
-        initialisation=result.initialisation,
+        initialisation=initialisation_of(configuration),
         seed=recipe.seed,
         rel_mse=validation.rel_mse,
         rel_mae=validation.rel_mae,
@@ -240,24 +246,33 @@ class TrainingLog:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         self._trimmed = False
 
     def add(self, progress: Progress) -> None:
         if not self._trimmed:
             self._keep_before(progress.epoch)
             self._trimmed = True
-        with self._path.open("a", newline="", encoding="utf-8") as file:
+        with self.path.open("a", newline="", encoding="utf-8") as file:
             csv.writer(file).writerow(_row(progress))
 
     def _keep_before(self, epoch: int) -> None:
         kept = []
-        if self._path.exists():
-            with self._path.open(newline="", encoding="utf-8") as file:
+        if self.path.exists():
+            with self.path.open(newline="", encoding="utf-8") as file:
                 kept = [row for row in csv.reader(file) if _is_whole(row) and int(row[0]) < epoch]
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(self._path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(self.path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([LOG_FIELDS, *kept])
+
+
+def _plot(log: Path) -> None:
+    """A picture of the run beside its log; none where it ended before its first epoch."""
+    if not log.exists():
+        return
+    from training.run_plot import plot_run  # Matplotlib only where there is something to draw
+
+    plot_run(log, log.with_suffix(".png"))
 
 
 def _row(progress: Progress) -> list[str]:

@@ -1,13 +1,19 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from engine.metrics import RelativeError
+from engine.preset import load_preset
+from training.cell import Cell, configuration_of
+from training.configuration import TrainingConfiguration
+from training.dataset import load_dataset
+from training.evaluate import evaluate_model
 from training.fit import Progress
-from training.run import LOG_FIELDS, TrainingLog, trained_range
+from training.run import LOG_FIELDS, TrainingLog, run_row, trained_range
 
 
 def progress(epoch: int, loss: float = 1.0) -> Progress:
@@ -49,3 +55,61 @@ def test_the_trained_range_is_that_of_the_draws(kind: str) -> None:
     found = trained_range(kind)
     assert found.peak_m == (1e-3, 1e-2)
     assert (found.position is None, found.width is None) == (kind == "noise", kind == "noise")
+
+
+DATA = {"count": 20, "steps": 450, "modes": 5}
+QUICK = {"epochs": 2, "validate_every": 1, "batch_size": 8, "first_horizon": 20, "steps_per_batch": 16}
+CELL = Cell("koopman_var", True, "gaussian", 4000, 420)
+
+
+def configuration(**changes: object) -> TrainingConfiguration:
+    made = configuration_of(CELL, DATA, {**QUICK, **changes})
+    return replace(made, model_configuration={"state_size": 8, "multiplier_widths": [4]})
+
+
+def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
+    made = configuration()
+    row = run_row(CELL.name, "ours", made, tmp_path / "runs", cache=tmp_path / "cache")
+    preset = load_preset(tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors")
+    dataset = load_dataset(made.data, tmp_path / "cache")
+    sums = evaluate_model(preset.model, dataset, "validation", 420)
+    whole, short, quarters = sums.total(), sums.total(400), sums.windows(4000, [0.105 * q / 4 for q in range(5)])
+    found = [row.rel_mse, row.rel_mae, row.rel_mse_400, row.rel_mae_400, row.rel_mse_q1, row.rel_mae_q4]
+    assert found == pytest.approx(
+        [whole.rel_mse, whole.rel_mae, short.rel_mse, short.rel_mae, quarters[0].rel_mse, quarters[3].rel_mae], rel=1e-4
+    )
+    test = evaluate_model(preset.model, dataset, "test", 420).total()
+    assert (row.test_rel_mse, row.test_rel_mae) == pytest.approx((test.rel_mse, test.rel_mae), rel=1e-4)
+    assert (row.status, row.digest, row.epochs, row.string) == ("done", made.digest, 2, "nonlinear")
+    assert (row.initialisation, row.structured, row.horizon, row.parameters) == (
+        "physics",
+        True,
+        420,
+        preset.parameters,
+    )
+    assert preset.info.horizon_steps == 420
+    assert (tmp_path / "runs" / CELL.name / "log.png").stat().st_size > 10_000
+
+
+def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path: Path) -> None:
+    places = {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
+    row = run_row(CELL.name, "ours", configuration(), **places)
+
+    def trained(progress: Progress) -> None:
+        pytest.fail("trained again")
+
+    assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
+    with pytest.raises(ValueError, match="belongs to another configuration"):
+        run_row(CELL.name, "ours", configuration(epochs=3), **places)
+    file = tmp_path / "runs" / CELL.name / "row.json"
+    file.write_text("{")
+    with pytest.raises(ValueError, match=r"row.json: not a row .*delete it to measure the run again"):
+        run_row(CELL.name, "ours", configuration(), **places)
+
+
+def test_a_run_that_diverges_is_a_row_that_says_so(tmp_path: Path) -> None:
+    wild = configuration(peak_learning_rate=1e30, clip_norm=1e30, schedule="constant")
+    row = run_row(CELL.name, "ours", wild, tmp_path / "runs", cache=tmp_path / "cache")
+    assert row.status == "diverged" and "lower peak_learning_rate" in row.message
+    assert row.rel_mse is None and row.initialisation == "physics" and row.seed == 0
+    assert not (tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors").exists()

@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from engine.models import MODELS, build_model
+from engine.schema import SchemaError
+from training.cell import Case, Cell, configuration_of, recipe_names
+from training.configuration import load
+
+EVERY_CELL = [
+    Cell(model, nonlinear, initial, rate_hz, horizon, recipe, seed)
+    for model, nonlinear, initial, rate_hz, horizon, recipe, seed in itertools.product(
+        MODELS, (False, True), ("gaussian", "noise"), (4000, 16000), (400, 4000), ("ours", "paper"), (0, 3)
+    )
+]
+
+
+def test_a_name_is_its_cell() -> None:
+    assert len({cell.name for cell in EVERY_CELL}) == len(EVERY_CELL)
+    assert all(Cell.parse(cell.name) == cell for cell in EVERY_CELL)
+
+
+def test_every_cell_of_the_tables_can_be_built() -> None:
+    digests = set()
+    for cell in EVERY_CELL:
+        configuration = load(cell.name)
+        assert configuration.steps == cell.horizon
+        assert configuration.data.modes == {4000: 10, 16000: 25}[cell.rate_hz]
+        assert configuration.data.tension_modulated == cell.tension_modulated
+        assert configuration.recipe.seed == cell.seed
+        digests.add(configuration.digest)
+    assert len(digests) == len(EVERY_CELL)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("recipe", ["ours", "paper"])
+def test_a_recipe_starts_as_its_model_can(model: str, recipe: str) -> None:
+    configuration = configuration_of(Cell(model, True, "noise", 16000, recipe=recipe))
+    kind = build_model(model, configuration.model_configuration)
+    assert configuration.recipe.initialisation in ("", *kind.initialisations)
+
+
+def test_the_papers_recipe_is_the_papers() -> None:
+    koopman = configuration_of(Cell("koopman", True, "noise", 4000, 400, "paper")).recipe
+    assert (koopman.epochs, koopman.schedule, koopman.peak_learning_rate) == (2500, "constant", 0.003)
+    assert (koopman.prediction_weight, koopman.encoding_weight, koopman.consistency_weight) == (1, 1, 0.01)
+    assert (koopman.steps_per_batch, koopman.flip, koopman.initialisation) == (0, False, "")
+    assert koopman.patience > 0
+    fgru = configuration_of(Cell("fgru", True, "noise", 4000, 400, "paper")).recipe
+    assert (fgru.epochs, fgru.schedule, fgru.loss, fgru.batch_size) == (2000, "one_cycle", "log10_mse", 256)
+    assert (fgru.peak_learning_rate, fgru.peak_learning_rate * fgru.start_share) == pytest.approx((1e-3, 1e-4))
+
+
+def test_titles_do_not_enter_the_digest_but_the_seed_does() -> None:
+    one, other = (configuration_of(Cell("lru", True, "noise", 4000, seed=seed)) for seed in (0, 1))
+    assert one.digest != other.digest
+    same = configuration_of(Cell("lru", True, "noise", 4000), {"count": 1000})
+    assert same.digest == one.digest
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nylon_nonlinear_noise_16k_foo", "model 'foo' is not one of dmd, koopman"),
+        ("nylon_nonlinear_noise_8k_lru", "rate_hz must be one of 4000, 16000"),
+        ("nylon_nonlinear_noise_4k_lru_400_theirs", "recipe 'theirs' is not one of ours, paper"),
+        ("nylon_nonlinear_noise_4k_lru_0", "horizon must be at least 1"),
+        ("no_such_thing", "no training configuration 'no_such_thing'"),
+    ],
+)
+def test_a_name_that_is_no_cell_is_told(name: str, words: str) -> None:
+    with pytest.raises(SchemaError, match=words):
+        load(name)
+
+
+@pytest.mark.parametrize(
+    ("data", "recipe", "words"),
+    [
+        ({"counts": 3}, {}, "data: unknown field 'counts'"),
+        ({}, {"epoch": 3}, "unknown field 'epoch'"),
+        ({"steps": 100}, {}, r"horizon must lie in 1 … 100, the data's steps, not 4000"),
+    ],
+)
+def test_wrong_overrides_are_told(data: dict[str, int], recipe: dict[str, int], words: str) -> None:
+    with pytest.raises(SchemaError, match=words):
+        configuration_of(Cell("koopman", True, "noise", 4000), data, recipe)
+
+
+def test_a_case_matches_what_it_names() -> None:
+    cell = Cell("koopman", True, "noise", 4000)
+    assert Case().matches(cell)
+    assert Case(model=("lru", "koopman"), rate_hz=(4000,), tension_modulated=True).matches(cell)
+    assert not Case(horizon=(400,)).matches(cell)
+    assert not Case(tension_modulated=False).matches(cell)
+    with pytest.raises(ValueError, match="model 'koop' is not one of"):
+        Case(model=("koop",))
+    assert recipe_names() == ["ours", "paper"]

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from engine.reference import ModalState, SplittingSolver
+from training.configuration import DatasetConfiguration
+from training.dataset import START_EVERY, Dataset, dataset_folder, draw_initial, load_dataset, split_rows
+
+TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
+
+
+def test_amplitudes_and_velocities_are_the_solvers(small_dataset: Dataset) -> None:
+    c = small_dataset.configuration
+    solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=True)
+    state = ModalState.at_rest(draw_initial(c))
+    assert torch.equal(small_dataset.amplitudes, solver.solve(state, c.steps).float())
+    for start in range(small_dataset.velocities.shape[1]):
+        velocity = state.velocity if start == 0 else solver.advance(state, start * START_EVERY)[1].velocity
+        assert torch.equal(small_dataset.velocities[:, start], velocity.float())
+    assert small_dataset.velocities.shape == (20, 5, 5)
+    assert not small_dataset.velocities[:, 0].any()
+
+
+def test_splits_are_in_order_and_whole() -> None:
+    assert [split_rows(1000, name) for name in ("train", "validation", "test")] == [
+        slice(0, 800),
+        slice(800, 900),
+        slice(900, 1000),
+    ]
+    with pytest.raises(ValueError, match="split 'all' is not one of train, validation, test"):
+        split_rows(10, "all")
+
+
+def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path: Path) -> None:
+    load_dataset(TINY, tmp_path)
+    stamp = (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns
+    load_dataset(TINY, tmp_path, lambda done, total: pytest.fail("made again"))
+    assert (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns == stamp
+    assert dataset_folder(replace(TINY, seed=1), tmp_path) != dataset_folder(TINY, tmp_path)
+    assert not list((tmp_path / "datasets").glob("unfinished-*"))
+
+
+def damage(folder: Path, how: str) -> None:
+    facts = json.loads((folder / "dataset.json").read_text())
+    if how == "cut":
+        file = folder / "amplitudes.npy"
+        file.write_bytes(file.read_bytes()[:-100])
+    elif how == "missing":
+        (folder / "velocities.npy").unlink()
+    elif how == "type":
+        np.save(folder / "velocities.npy", np.zeros((10, 1, 4)))
+    elif how == "json":
+        (folder / "dataset.json").write_text("{")
+    elif how == "scale":
+        (folder / "dataset.json").write_text(json.dumps({**facts, "scale_m": float("nan")}))
+    else:
+        (folder / "dataset.json").write_text(json.dumps({**facts, "scale_m": [1]}))
+
+
+@pytest.mark.parametrize("how", ["cut", "missing", "type", "json", "scale", "list"])
+def test_a_damaged_cache_is_told_with_its_remedy(tmp_path: Path, how: str) -> None:
+    load_dataset(TINY, tmp_path)
+    folder = dataset_folder(TINY, tmp_path)
+    damage(folder, how)
+    with pytest.raises(ValueError, match=r"damaged data cache .*delete that folder") as told:
+        load_dataset(TINY, tmp_path)
+    assert str(folder) in str(told.value)

@@ -1,0 +1,161 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from engine.models import DMD
+from training import fit as module
+from training.cell import Cell, configuration_of
+from training.checkpoint import Checkpoint
+from training.configuration import Recipe, TrainingConfiguration
+from training.dataset import Dataset
+from training.evaluate import evaluate_model
+from training.fit import Diverged, Progress, fit, horizon_at, learning_rate_at
+from training.losses import Batch, training_loss
+
+DATA = {"count": 20, "steps": 450, "modes": 5}
+QUICK = {"epochs": 4, "validate_every": 1, "batch_size": 8, "first_horizon": 20, "steps_per_batch": 16}
+SMALL = {
+    "koopman": {"state_size": 16, "encoder_widths": [24], "decoder_widths": [24]},
+    "koopman_var": {"state_size": 16, "multiplier_widths": [8]},
+    "koopman_integrated": {"state_size": 5, "encoder_widths": [], "eigenvalue_widths": [8]},
+    "lru": {"state_size": 8, "layers": 1},
+    "s5": {"state_size": 16, "layers": 1, "hippo_blocks": 2},
+    "fgru": {"width": 4},
+    "frnn": {"width": 4},
+}
+
+
+def small(model: str, recipe: str = "ours", horizon: int = 40, **changes: Any) -> TrainingConfiguration:
+    cell = Cell(model, True, "gaussian", 4000, horizon, recipe)
+    configuration = configuration_of(cell, DATA, {**QUICK, **changes})
+    return replace(configuration, model_configuration=SMALL.get(model, {}))
+
+
+def weights(folder: Path) -> dict[str, torch.Tensor]:
+    return dict(Checkpoint.load(folder / "checkpoint.safetensors").model)
+
+
+@pytest.mark.parametrize("recipe", ["ours", "paper"])
+@pytest.mark.parametrize("model", SMALL)
+def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, model: str, recipe: str) -> None:
+    seen: list[Progress] = []
+    horizon = 40 if model not in ("fgru", "frnn") else 12  # they take every frame one after the other
+    found = fit(small(model, recipe, horizon, epochs=6, patience=0), small_dataset, runs, report=seen.append)
+    assert [p.epoch for p in seen] == [1, 2, 3, 4, 5, 6]
+    assert seen[-1].loss < seen[0].loss or seen[-1].horizon > seen[0].horizon
+    assert math.isfinite(found.validation.rel_mae)
+    assert found.validation.rel_mae == min(p.validation.rel_mae for p in seen if p.validation)
+    measured = evaluate_model(found.model, small_dataset, "validation", horizon).total()
+    assert measured.rel_mae == pytest.approx(found.validation.rel_mae, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"average_decay": 0.9}, {"schedule": "constant", "patience": 100}, {"loss": "log10_mse"}],
+    ids=["plain", "average", "constant", "log10"],
+)
+@pytest.mark.parametrize("model", ["koopman_var", "lru"])
+def test_a_run_that_is_cut_anywhere_is_the_whole_run(
+    small_dataset: Dataset, runs: Path, model: str, changes: dict[str, Any]
+) -> None:
+    configuration = small(model, **changes)
+    whole = fit(configuration, small_dataset, runs / "whole", checkpoint_every_s=-1)
+
+    def cut_after(epoch: int) -> Callable[[Progress], None]:
+        def report(progress: Progress) -> None:
+            if progress.epoch == epoch:
+                raise KeyboardInterrupt
+
+        return report
+
+    for epoch in (2, 3):  # the second cut goes on from the first one's checkpoint
+        with pytest.raises(KeyboardInterrupt):
+            fit(configuration, small_dataset, runs / "cut", report=cut_after(epoch), checkpoint_every_s=-1)
+    cut = fit(configuration, small_dataset, runs / "cut", checkpoint_every_s=-1)
+    assert cut.validation == whole.validation and cut.best_epoch == whole.best_epoch
+    pairs = [(weights(runs / "whole"), weights(runs / "cut")), (whole.model.state_dict(), cut.model.state_dict())]
+    assert all(torch.equal(left[name], right[name]) for left, right in pairs for name in left)
+
+
+def test_early_stopping_ends_when_nothing_gets_better(
+    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "learning_rate_at", lambda recipe, share: 0.0)
+    seen: list[Progress] = []
+    found = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
+    assert (found.best_epoch, found.epochs, len(seen)) == (1, 4, 4)
+    again = fit(small("koopman_var", epochs=50, patience=3), small_dataset, runs, report=seen.append)
+    assert len(seen) == 4 and again.epochs == 4  # a run that has ended stays ended
+
+
+def test_the_mean_of_the_weights_is_what_is_kept(small_dataset: Dataset, runs: Path) -> None:
+    found = fit(small("koopman_var", average_decay=0.99), small_dataset, runs)
+    assert not torch.equal(found.model.state_dict()["decoder.weight"], weights(runs)["decoder.weight"])
+
+
+def test_a_loss_that_is_no_number_is_a_divergence(small_dataset: Dataset, runs: Path) -> None:
+    with pytest.raises(Diverged, match=r"the loss is nan in epoch \d; lower peak_learning_rate"):
+        fit(small("frnn", peak_learning_rate=1e30, clip_norm=1e30), small_dataset, runs)
+
+
+def test_a_checkpoint_of_another_configuration_is_refused(small_dataset: Dataset, runs: Path) -> None:
+    fit(small("koopman_var"), small_dataset, runs)
+    with pytest.raises(ValueError, match="belongs to another configuration; delete it or choose another run folder"):
+        fit(small("koopman_var", epochs=5), small_dataset, runs)
+
+
+def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
+    seen: list[Progress] = []
+    found = fit(small("dmd"), small_dataset, runs, report=seen.append)
+    assert isinstance(found.model, DMD)
+    assert len(seen) == 1 and seen[0].validation == found.validation
+    assert found.validation.rel_mae < 0.3  # 10 ms of a string that is nearly linear
+
+
+def test_a_model_that_is_told_velocities_learns_from_moving_strings(small_dataset: Dataset, runs: Path) -> None:
+    sizes = {**SMALL["koopman_integrated"], "input": "displacement_velocity"}
+    configuration = small("koopman_integrated", random_start=True)
+    found = fit(replace(configuration, model_configuration=sizes), small_dataset, runs)
+    assert found.validation.rel_mae < 0.1  # measured from rest
+    with pytest.raises(ValueError, match="random_start needs a model of the input 'displacement_velocity'"):
+        fit(configuration, small_dataset, runs / "other")
+
+
+def test_learning_rates_follow_the_recipe() -> None:
+    cycle = Recipe(epochs=1, peak_learning_rate=1.0, start_share=0.1, warm_up=0.25)
+    assert [learning_rate_at(cycle, share) for share in (0, 0.125, 0.25, 0.625, 1)] == pytest.approx(
+        [0.1, 0.55, 1, 0.5, 0]
+    )
+    assert learning_rate_at(Recipe(epochs=1, schedule="constant", peak_learning_rate=3e-3), 0.9) == 3e-3
+
+
+def test_the_horizon_grows_geometrically() -> None:
+    recipe = Recipe(epochs=1, first_horizon=100, grow_until=0.5)
+    assert [horizon_at(recipe, share, 1600) for share in (0, 0.125, 0.25, 0.5, 0.9)] == [100, 200, 400, 1600, 1600]
+    assert horizon_at(recipe, 0, 40) == 40
+
+
+class _Shifted(torch.nn.Module):
+    """A "model" whose every frame is the initial one plus one."""
+
+    def encode(self, displacement: torch.Tensor, second: torch.Tensor | None = None) -> torch.Tensor:
+        return displacement
+
+    def advance(self, state: torch.Tensor, steps: int) -> tuple[torch.Tensor, torch.Tensor]:
+        return (state + 1)[:, None].expand(-1, steps, -1), state
+
+
+def test_the_loss_of_a_model_without_latents_is_its_prediction_alone() -> None:
+    batch = Batch(torch.zeros(2, 3), None, torch.tensor([1, 4]), torch.full((2, 2, 3), 3.0))
+    model: Any = _Shifted()
+    loss, error = training_loss(model, batch, Recipe(epochs=1, prediction_weight=2.0))
+    assert (float(loss), float(error)) == (8.0, 4.0)
+    loss, _ = training_loss(model, batch, Recipe(epochs=1, loss="log10_mse"))
+    assert float(loss) == pytest.approx(math.log10(4))
