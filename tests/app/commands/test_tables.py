@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.image import imread
+
+from training.results import Row, add_rows
+
+TINY = """
+title = "Tiny"
+model = "koopman_var"
+model_configuration = { state_size = 8, multiplier_widths = [4] }
+[data]
+initial = "gaussian"
+rate_hz = 4000
+modes = 5
+steps = 50
+count = 20
+[recipe]
+epochs = 1
+steps_per_batch = 8
+first_horizon = 10
+"""
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    path = tmp_path / "results.csv"
+    facts: dict[str, Any] = {"model": "s5", "string": "linear", "initial": "noise", "rate_hz": 4000, "horizon": 4000}
+    rows = [
+        Row(f"d{seed}", f"run_{seed}", "done", **facts, recipe="paper", seed=seed, rel_mse=0.001, rel_mae=0.01 * seed)
+        for seed in (1, 2)
+    ]
+    add_rows(path, rows)
+    return path
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A trained preset, which knows its data set."""
+    from app.cli import main
+
+    folder = tmp_path_factory.mktemp("tiny")
+    (folder / "tiny.toml").write_text(TINY, encoding="utf-8")
+    path = folder / "tiny.safetensors"
+    words = ["train", folder / "tiny.toml", "--output", path, "--runs", folder / "runs", "--cache", folder / "cache"]
+    assert main([str(word) for word in words]) == 0
+    return path
+
+
+def test_the_tables_are_printed_or_written(run, results: Path, folder: Path) -> None:
+    printed = run("table", "--results", results)
+    assert (printed.status, printed.err) == (0, "")
+    assert "0.015 (0.0071) **better**, 2 seeds" in printed.out
+    assert printed.out.count("### 400 frames") == 2
+    assert "## Runs" not in printed.out
+    path = folder / "tables.md"
+    assert run("table", "--results", results, "--output", path).out == f"{path}\n"
+    assert path.read_text(encoding="utf-8") == printed.out
+    assert list(folder.iterdir()) == [path]
+
+
+def test_rows_are_listed_and_recipes_chosen(run, results: Path) -> None:
+    assert "| run_1 " in run("table", "--results", results, "--rows").out
+    assert (
+        "2 of 2 rows of the results file are not shown" in run("table", "--results", results, "--recipe", "ours").out
+    )
+
+
+def test_csv_is_read_back(run, results: Path) -> None:
+    lines = list(csv.DictReader(io.StringIO(run("table", "--results", results, "--format", "csv").out)))
+    assert [entry["runs"] for entry in lines if entry["seeds"] == "2"] == ["run_1 run_2"]
+    assert "--rows" in run("table", "--results", results, "--format", "csv", "--rows").usage
+
+
+def test_no_results_are_told_and_the_papers_tables_are_there(run, folder: Path) -> None:
+    found = run("table", "--results", folder / "none.csv")
+    assert "none.csv has no rows" in found.err
+    assert "0.0113 (0.0061)" in found.out
+
+
+def test_a_file_that_is_no_results_file_is_told(run, folder: Path) -> None:
+    (folder / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    assert "not a results file" in run("table", "--results", folder / "other.csv").failure
+
+
+@pytest.mark.parametrize("kind", ["evolution", "extrapolation", "error", "eigenvalues"])
+def test_every_figure_is_drawn(run, tiny: Path, folder: Path, kind: str) -> None:
+    path = folder / "figure.png"
+    found = run("figure", kind, tiny, "--output", path)
+    assert (found.status, found.err, found.out) == (0, "", f"{path}\n")
+    height, width, _ = imread(path).shape
+    assert min(height, width) > 1000
+    assert list(folder.iterdir()) == [path]
+
+
+def test_a_figure_stands_here_by_default(run, tiny: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    assert run("figure", "eigenvalues", tiny, tiny).out == "eigenvalues.png\n"
+    assert (folder / "eigenvalues.png").exists()
+
+
+def test_bad_usage_of_figures_is_told(run, tiny: Path, small_preset: Path, folder: Path) -> None:
+    assert "suffixes" in run("figure", "error", tiny, "--output", folder / "figure.bmp").usage
+    assert "--seconds" in run("figure", "evolution", tiny, "--seconds", 1e6).usage
+    assert "--listen" in run("figure", "extrapolation", tiny, "--listen", 2).usage
+    path = folder / "figure.svg"
+    assert "there is no trajectory 9" in run("figure", "evolution", tiny, "--trajectory", 9, "--output", path).failure
+    assert "metadata.training" in run("figure", "error", small_preset, "--output", path).failure
+    assert "no preset 'nothing'" in run("figure", "error", "nothing", "--output", path).failure
+    assert "make the folder first" in run("figure", "eigenvalues", tiny, "--output", folder / "a" / "b.png").failure
+    assert not list(folder.iterdir())

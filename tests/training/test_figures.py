@@ -1,0 +1,376 @@
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from engine.metrics import ErrorSums
+from engine.models import build_model
+from engine.models.base import Physics
+from engine.preset import Preset, PresetError, PresetInfo, TrainedRange
+from engine.reference import ModalState, SplittingSolver
+from engine.schema import write
+from engine.sine_transform import listening_weights, to_grid
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.dataset import draw_initial
+from training.figures import evolution, extrapolation, motions, spectrum, style
+from training.figures.eigenvalues import eigenvalues, model_log_eigenvalues
+from training.figures.error import error, smoothed
+from training.run_plot import plot_run, read_log, run_figure
+
+HORIZON = 40
+SIZES: dict[str, dict[str, Any]] = {
+    "dmd": {"rank": 12},
+    "koopman": {"state_size": 6, "encoder_widths": [32], "decoder_widths": [32]},
+    "koopman_var": {"state_size": 8, "multiplier_widths": [4]},
+    "koopman_integrated": {"state_size": 5, "encoder_widths": [], "eigenvalue_widths": [4]},
+    "lru": {"state_size": 6, "layers": 1},
+    "s5": {"state_size": 12, "hippo_blocks": 2, "layers": 1},
+    "frnn": {},
+}
+
+
+def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, **data: Any) -> Preset:
+    """A preset that has not been trained, with what one says of its training."""
+    fields: dict[str, Any] = {"initial": "gaussian", "rate_hz": 4000, "modes": 5, "steps": 50, "count": 30} | data
+    c = DatasetConfiguration(**fields)
+    built = build_model(model, SIZES[model])
+    how = "physics" if "physics" in built.initialisations else built.initialisations[0]
+    built.initialise(how, Physics(c.string, c.modes, c.rate_hz, 1e-3), torch.Generator().manual_seed(0))
+    training = TrainingConfiguration("Tiny", model, c, Recipe(1), model_configuration=SIZES[model])
+    info = PresetInfo(
+        title="Tiny",
+        model=model,
+        model_configuration=write(built.configuration),
+        string=c.string,
+        tension_modulated=c.tension_modulated,
+        initial=c.initial,
+        rate_hz=c.rate_hz,
+        modes=c.modes,
+        grid_points=c.grid_points,
+        horizon_steps=horizon,
+        scale_m=1e-3,
+        trained_range=TrainedRange(None, None, (1e-3, 1e-2)),
+        initialisation=how,
+        seed=0,
+        training=write(training),
+    )
+    return Preset(name or f"tiny_{model}", Path(f"{name or model}.safetensors"), info, built.eval())
+
+
+def truth_and_model(one: Preset, rows: slice, steps: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Frames 0 … steps in m, by the solver and the model themselves."""
+    data = motions.data_of([one])
+    solver = SplittingSolver(data.string, data.modes, data.rate_hz, tension_modulated=data.tension_modulated)
+    truth = to_grid(solver.solve(ModalState.at_rest(draw_initial(data)[rows]), steps), data.grid_points)
+    with torch.no_grad():
+        model = one.model((truth[:, 0] / 1e-3).float(), steps).double() * 1e-3
+    return truth, torch.cat([truth[:, :1], model], dim=1)
+
+
+def line(axes: Axes, index: int) -> tuple[np.ndarray, np.ndarray]:
+    x, y = axes.lines[index].get_data()
+    return np.asarray(x), np.asarray(y)
+
+
+def titled(figure: Figure, words: str) -> Axes:
+    (found,) = (axes for axes in figure.axes if words in axes.get_title())
+    return found
+
+
+def image(axes: Axes) -> np.ndarray:
+    return np.asarray(axes.images[0].get_array())
+
+
+# ---- motions ----
+
+
+def test_the_truth_of_a_figure_is_that_of_the_validation_set() -> None:
+    one = preset()
+    data = motions.data_of([one])
+    starts = motions.validation_starts(data)
+    assert starts.shape == (3, 101)
+    truth, model = truth_and_model(one, slice(24, 27), 60)
+    blocks = list(motions.motions([one], starts, 60))
+    torch.testing.assert_close(torch.cat([b.truth for b in blocks], 1), truth[:, 1:])
+    torch.testing.assert_close(torch.cat([b.models[0] for b in blocks], 1), model[:, 1:], atol=1e-8, rtol=1e-4)
+
+
+def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = preset()
+    starts = motions.validation_starts(motions.data_of([one]))
+    whole = motions.errors([one], starts, 50)[0]
+    monkeypatch.setattr(motions, "FRAMES_AT_ONCE", 7)
+    monkeypatch.setattr(motions, "TRAJECTORIES_AT_ONCE", 2)
+    shares: list[float] = []
+    parts = motions.errors([one], starts, 50, shares.append)[0]
+    for a, b in zip(whole.per_frame(), parts.per_frame(), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-4)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+
+
+@pytest.mark.parametrize(
+    ("field", "other"),
+    [
+        ("tension_modulated", False),
+        ("initial", "noise"),
+        ("rate_hz", 8000),
+        ("modes", 4),
+        ("seed", 1),
+    ],
+)
+def test_presets_of_different_data_are_refused(field: str, other: Any) -> None:
+    pair = [preset(name="one"), preset(name="two", **{field: other})]
+    for draw in (evolution.evolution, extrapolation.extrapolation, error):
+        with pytest.raises(PresetError, match=f"one and two were trained on different data \\({field}: "):
+            draw(pair)  # type: ignore[operator]
+
+
+def test_what_a_figure_cannot_be_made_of_is_told() -> None:
+    with pytest.raises(PresetError, match="needs at least one"):
+        motions.data_of([])
+    with pytest.raises(ValueError, match="there is no trajectory 3: the validation set has 0 … 2"):
+        evolution.evolution([preset()], trajectory=3)
+    with pytest.raises(ValueError, match="choose at least 16"):
+        evolution.evolution([preset()], seconds=0.001)
+    silent = preset()
+    with pytest.raises(PresetError, match=r"metadata\.training: field 'title' is missing"):
+        error([replace(silent, info=replace(silent.info, training={}))])
+
+
+def test_labels_differ() -> None:
+    names = ("nylon_koopman_var", "nylon_koopman_var_paper_seed1", "nylon_lru")
+    found = [preset(name.split("_", 1)[1].removesuffix("_paper_seed1"), name) for name in names]
+    assert motions.labels(found) == ["Koopman_var", "Koopman_var (paper seed1)", "LRU"]
+    assert motions.labels([preset(name="a"), preset(name="b")]) == ["a", "b"]
+    assert motions.horizons(found) == [("end of training", 0.01)]
+    apart = motions.horizons([preset(), preset("lru", horizon=80)])
+    assert apart == [("end of training\nKoopman_var", 0.01), ("end of training\nLRU", 0.02)]
+
+
+# ---- figures ----
+
+
+def test_evolution_shows_truth_model_and_magnified_error() -> None:
+    one = preset()
+    figure = evolution.evolution([one], trajectory=1, seconds=0.03)
+    truth, model = (frames[0, 1:].numpy() for frames in truth_and_model(one, slice(25, 26), 120))
+    np.testing.assert_allclose(image(titled(figure, "truth")), 1000 * truth.T, atol=1e-9)
+    np.testing.assert_allclose(image(titled(figure, "Koopman_var")), 1000 * model.T, atol=1e-4)
+    below = titled(figure, "error")
+    shown = below.get_title()
+    factor = int(shown.partition("×")[2].split()[0]) if "×" in shown else 1
+    np.testing.assert_allclose(image(below), factor * 1000 * (model - truth).T, atol=1e-3)
+    limits = {axes.images[0].get_clim() for axes in figure.axes if axes.images}
+    assert len(limits) == 1  # one colour scale
+
+    weights = listening_weights(torch.tensor([0.37]), 101)[:, 0].numpy()
+    (spectra,) = (axes for axes in figure.axes if axes.get_legend() is not None)
+    for place, frames in ((0, truth), (1, model)):
+        khz, levels = line(spectra, place)
+        expected = spectrum.levels_db(frames @ weights, truth @ weights)[: len(levels)]
+        np.testing.assert_allclose(levels, expected, atol=0.05)
+        assert khz[1] == pytest.approx(4 / 120)
+
+
+@pytest.mark.parametrize(("largest", "factor"), [(2.0, 1), (0.21, 1), (0.19, 10), (0.002, 1000), (0.0, 1)])
+def test_an_error_is_magnified_by_powers_of_ten_within_the_scale(largest: float, factor: int) -> None:
+    assert evolution.magnification(largest, 2.0) == factor
+
+
+def test_a_spectrum_has_its_peak_where_the_tone_is() -> None:
+    time_s = np.arange(1000) / 4000
+    tone, weaker = np.sin(2 * np.pi * 500 * time_s), 0.1 * np.sin(2 * np.pi * 500 * time_s)
+    levels = spectrum.levels_db(weaker, tone)
+    assert spectrum.frequencies_hz(1000, 4000)[levels.argmax()] == 500
+    assert levels.max() == pytest.approx(-20)
+    assert spectrum.levels_db(np.zeros(64), np.zeros(64)).max() == spectrum.FLOOR_DB
+
+
+def test_error_curves_are_those_of_the_metrics() -> None:
+    one = preset()
+    figure = error([one, preset("lru")], seconds=0.015)
+    truth, model = truth_and_model(one, slice(24, 27), 60)
+    difference = (model - truth)[:, 1:]
+    mae = (difference.abs().sum((0, 2)) / truth[:, 1:].abs().sum((0, 2))).numpy()
+    mse = (difference.square().sum((0, 2)) / truth[:, 1:].square().sum((0, 2))).numpy()
+    for axes, expected in zip(figure.axes, (mae, mse), strict=True):
+        time_s, values = line(axes, 0)
+        np.testing.assert_allclose(values, expected, rtol=2e-3)
+        np.testing.assert_allclose(time_s, np.arange(1, 61) / 4000)
+        np.testing.assert_allclose(line(axes, 1)[1], smoothed(expected, 4000, 0.01), rtol=2e-3)
+        marks = [entry.get_xdata()[0] for entry in axes.lines if len(entry.get_xdata()) == 2]  # type: ignore[arg-type,index]
+        assert marks == [HORIZON / 4000]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Koopman_var", "LRU"]
+
+
+def test_smoothing_keeps_what_is_constant() -> None:
+    np.testing.assert_allclose(smoothed(np.full(9, 0.3), 1000, 0.005), 0.3)
+    np.testing.assert_allclose(smoothed(np.arange(9.0), 1000, 0.003)[1:-1], np.arange(1, 8))
+    np.testing.assert_allclose(smoothed(np.arange(3.0), 1000, 1.0)[1], 1)
+
+
+def test_extrapolation_goes_past_training() -> None:
+    one = preset()
+    figure = extrapolation.extrapolation([one], seconds=0.1, trajectory=2, trajectories=2)
+    truth, model = truth_and_model(one, slice(26, 27), 400)
+    weights = listening_weights(torch.tensor([0.37]), 101)
+    for words, first in (("the start", 0), ("the end", 320)):
+        (axes,) = (axes for axes in figure.axes if axes.get_title() == words)
+        for place, frames in ((0, truth), (1, model)):
+            time_ms, heard = line(axes, place)
+            np.testing.assert_allclose(time_ms, np.arange(first, first + 81) / 4)
+            np.testing.assert_allclose(heard, 1000 * (frames @ weights)[0, first : first + 81, 0], atol=2e-3)
+    axes = titled(figure, "error (bold: 2 trajectories, thin: trajectory 2")
+    time_s, alone = line(axes, 0)
+    sums = ErrorSums(400)
+    sums.add(model[:, 1:], truth[:, 1:])
+    expected = [w.rel_mae for w in sums.windows(4000, [0.01 * edge for edge in range(11)])]
+    np.testing.assert_allclose(alone, expected, rtol=2e-3)
+    np.testing.assert_allclose(time_s, np.arange(0.005, 0.1, 0.01))
+
+
+def test_extrapolation_over_less_than_a_look_is_drawn() -> None:
+    assert len(extrapolation.extrapolation([preset(), preset("lru")], seconds=0.016).axes) == 6
+
+
+def test_a_model_that_runs_away_is_drawn_as_far_as_it_is_finite() -> None:
+    one = preset("dmd")
+    with torch.no_grad():
+        one.model.magnitude_log.fill_(2.0)  # type: ignore[operator,union-attr]
+    for figure in (evolution.evolution([one], seconds=0.1), extrapolation.extrapolation([one]), error([one])):
+        figure.draw_without_rendering()
+        assert all(math.isfinite(limit) for axes in figure.axes for limit in (*axes.get_xlim(), *axes.get_ylim()))
+
+
+def test_eigenvalues_are_those_of_the_parameters() -> None:
+    one, lru = preset(), preset("lru")
+    figure = eigenvalues([one, lru])
+    circle, other, decay, _ = figure.axes
+    nu_log, theta_log = (getattr(one.model, name).detach().double().numpy() for name in ("nu_log", "theta_log"))
+    learned = np.exp(-np.exp(nu_log) + 1j * np.exp(theta_log))
+    x, y = line(circle, 1)
+    np.testing.assert_allclose(x + 1j * y, learned)
+    x, y = line(circle, 2)  # the linear string, both of each pair
+    linear = np.exp(one.info.string.eigenvalues(5).numpy() / 4000)
+    np.testing.assert_allclose(x + 1j * y, np.concatenate([linear, linear.conj()]))
+    khz, rates = line(decay, 1)
+    np.testing.assert_allclose(rates, one.info.string.decay_rates(5).numpy())
+    np.testing.assert_allclose(khz, one.info.string.eigenvalues(5).imag.numpy() / (2000 * np.pi))
+    assert len(other.lines) == 4  # circle, block, first layer, string
+    np.testing.assert_allclose(line(other, 2)[0], lru.model.first_layer.log_eigenvalues().exp().real.tolist())  # type: ignore[operator,union-attr]
+
+
+@pytest.mark.parametrize(
+    ("model", "layers"), [("dmd", 1), ("koopman", 1), ("koopman_integrated", 1), ("lru", 2), ("s5", 2)]
+)
+def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: int) -> None:
+    one = preset(model)
+    found = model_log_eigenvalues(one.model)
+    assert [log.dtype for log in found] == [torch.complex128] * layers
+    linear = one.info.string.eigenvalues(5) / 4000
+    nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)
+    assert float(nearest.max()) < 1e-5  # all of them started from the string's
+    assert eigenvalues([one]).axes
+
+
+def test_growing_modes_are_counted_where_they_cannot_be_drawn() -> None:
+    one = preset("dmd")
+    with torch.no_grad():
+        one.model.magnitude_log[:2] = 0.1  # type: ignore[operator,union-attr,index]
+    decay = eigenvalues([one]).axes[1]
+    assert [text.get_text() for text in decay.texts] == ["2 with |λ| ≥ 1: not shown here"]
+    assert len(line(decay, 0)[0]) == 8  # of 12, two are unused
+
+
+def test_a_model_without_eigenvalues_is_told() -> None:
+    with pytest.raises(PresetError, match=r"frnn\.safetensors: a frnn has no eigenvalues"):
+        eigenvalues([preset("frnn")])
+
+
+# ---- files ----
+
+
+def small() -> Figure:
+    figure = Figure(figsize=(3, 2))
+    figure.add_subplot().plot([1, 2], [3, 4])
+    return figure
+
+
+@pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".PDF", b"%PDF")])
+def test_files_are_of_their_format_and_repeat(tmp_path: Path, suffix: str, start: bytes) -> None:
+    path = tmp_path / f"figure{suffix}"
+    style.save_figure(small(), path)
+    assert path.read_bytes().startswith(start)
+    assert list(tmp_path.iterdir()) == [path]
+    assert style.figure_bytes(small(), suffix) == path.read_bytes()
+
+
+def test_a_picture_has_the_size_of_its_figure() -> None:
+    figure = error([preset()])
+    width, height = figure.get_size_inches()
+    found = imread(io.BytesIO(style.figure_bytes(figure, ".png")))
+    assert found.shape[:2] == (round(height * style.DPI), round(width * style.DPI))
+    assert len(np.unique(found)) > 10
+
+
+def test_an_unknown_format_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"is written as \.png, \.svg, \.pdf"):
+        style.save_figure(Figure(), tmp_path / "figure.bmp")
+    assert not list(tmp_path.iterdir())
+
+
+# ---- a run's plot ----
+
+HEAD = "epoch,horizon,learning_rate,loss,rel_mse,rel_mae,seconds\n"
+
+
+def log(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "run" / "log.csv"
+    path.parent.mkdir()
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_runs_plot_has_its_numbers(tmp_path: Path) -> None:
+    text = HEAD + "1,150,0.001,0.5,,,1\n2,200,0.003,0.25,0.1,0.3,2\n3,400,0.002,nan,0.05,0.2,3\n4,40"
+    path = log(tmp_path, text)
+    errors, rates, horizon = run_figure(path).axes
+    drawn = {entry.get_label(): tuple(map(list, entry.get_data())) for entry in errors.lines}
+    assert drawn == {
+        "loss": ([1, 2], [0.5, 0.25]),
+        "validation rel. MSE": ([2, 3], [0.1, 0.05]),
+        "validation rel. MAE": ([2, 3], [0.3, 0.2]),
+    }
+    assert list(line(rates, 0)[1]) == [0.001, 0.003, 0.002]
+    assert list(line(horizon, 0)[1]) == [150, 200, 400]
+    assert errors.get_yscale() == "log"
+    plot_run(path, path.with_suffix(".png"))
+    assert imread(path.with_suffix(".png")).shape[:2] == (1300, 2000)
+    assert sorted(entry.name for entry in path.parent.iterdir()) == ["log.csv", "log.png"]
+
+
+@pytest.mark.parametrize("lines", ["", "1,150,0.001,0.5,,,1\n", "1,150,0.001,-2.5,,,1\n2,150,0.001,-3,,,1\n"])
+def test_a_log_may_be_short_without_validation_or_negative(tmp_path: Path, lines: str) -> None:
+    path = log(tmp_path, HEAD + lines)
+    plot_run(path, path.with_suffix(".svg"))
+    assert path.with_suffix(".svg").exists()
+    assert len(read_log(path)["epoch"]) == lines.count("\n")
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n1,2\n"])
+def test_what_is_no_log_is_told(tmp_path: Path, text: str) -> None:
+    path = log(tmp_path, text)
+    with pytest.raises(ValueError, match=r"log\.csv: not a training log"):
+        plot_run(path, path.with_suffix(".png"))
+    assert not path.with_suffix(".png").exists()

@@ -1,0 +1,258 @@
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import pytest
+
+from training.cell import Cell, configuration_of
+from training.results import Row
+from training.tables import (
+    COLUMNS,
+    METRICS,
+    MODEL_ORDER,
+    PRINTED,
+    Column,
+    Figure,
+    as_csv,
+    as_markdown,
+    factor,
+    mark,
+    paper_figures,
+    sections,
+)
+
+G4 = Column("gaussian", 4000)
+
+
+def row(cell: Cell | None = None, mse: float | None = 0.01, mae: float | None = 0.1, **changes: Any) -> Row:
+    """A row as a run of the cell makes it."""
+    cell = cell or Cell("lru", True, "gaussian", 4000)
+    facts: dict[str, Any] = {
+        "digest": configuration_of(cell).digest,
+        "name": cell.name,
+        "status": "done",
+        "model": cell.model,
+        "string": cell.string_kind,
+        "initial": cell.initial,
+        "rate_hz": cell.rate_hz,
+        "horizon": cell.horizon,
+        "recipe": cell.recipe,
+        "seed": cell.seed,
+        "initialisation": "paper",
+        "rel_mse": mse,
+        "rel_mae": mae,
+    }
+    return Row(**(facts | changes))
+
+
+def seeds(count: int, **fields: Any) -> list[Cell]:
+    fields = {"model": "lru", "tension_modulated": True, "initial": "gaussian", "rate_hz": 4000} | fields
+    return [Cell(seed=seed, **fields) for seed in range(count)]
+
+
+def table(markdown: str, string: str, horizon: int) -> list[list[str]]:
+    """The cells of one table, its head first."""
+    _, _, text = markdown.partition(f"## {string}")
+    _, _, text = text.partition(f"### {horizon} frames\n\n")
+    lines = text.partition("\n\n")[0].splitlines()
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in (lines[0], *lines[2:])]
+
+
+def line(cells: list[list[str]], model: str, run: str) -> list[str]:
+    """What follows the model and the run of the only line that has them."""
+    found = [entry[2:] for entry in cells if entry[:2] == [model, run]]
+    assert len(found) == 1, found
+    return found[0]
+
+
+def records(text: str, **wanted: str) -> list[dict[str, str]]:
+    lines = list(csv.DictReader(io.StringIO(text)))
+    return [entry for entry in lines if all(entry[name] == value for name, value in wanted.items())]
+
+
+def test_the_papers_figures_are_all_there() -> None:
+    figures = paper_figures()
+    assert len(figures) == 2 * 12 * 4  # strings, rows, data sets
+    assert sum(len(entry.figure(metric) or ()) for entry in figures.values() for metric in METRICS) == 384
+    for string in ("linear", "nonlinear"):
+        for horizon, models in ((4000, MODEL_ORDER[:5]), (400, MODEL_ORDER[:7])):
+            assert {key[2] for key in figures if key[:2] == (string, horizon)} == set(models)
+
+
+@pytest.mark.parametrize(
+    ("string", "horizon", "model", "column", "mse", "mae"),
+    [
+        ("nonlinear", 4000, "dmd", ("noise", 16000), (1.8313, 0.2467), (1.0953, 0.087)),
+        ("nonlinear", 4000, "koopman_var", ("gaussian", 4000), (0.0113, 0.0061), (0.0977, 0.0284)),
+        ("nonlinear", 400, "koopman_var", ("gaussian", 16000), (0.0003, 0.0), (0.0201, 0.0006)),
+        ("nonlinear", 400, "frnn", ("noise", 4000), (0.7289, 0.0653), (0.8553, 0.0495)),
+        ("linear", 4000, "koopman_var", ("noise", 16000), (0.0495, 0.0973), (0.1125, 0.1785)),
+        ("linear", 4000, "dmd", ("gaussian", 4000), (0.0, 0.0), (0.006, 0.0007)),
+        ("linear", 400, "fgru", ("gaussian", 16000), (0.0378, 0.0162), (0.214, 0.0551)),
+        ("linear", 400, "frnn", ("noise", 16000), (0.4730, 0.3205), (0.6347, 0.2836)),
+    ],
+)
+def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any, mse: Any, mae: Any) -> None:
+    entry = paper_figures()[string, horizon, model, Column(*column)]
+    assert (entry.rel_mse, entry.rel_mae) == (mse, mae)
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "expected"),
+    [
+        ((0.08, None), (0.1, 0.02), "equal"),  # on the boundary, which floats miss
+        ((0.12, None), (0.1, 0.02), "equal"),
+        ((0.0799, None), (0.1, 0.02), "better"),
+        ((0.1201, None), (0.1, 0.02), "worse"),
+        ((0.05, 0.06), (0.1, 0.02), "equal"),  # ours is the larger deviation
+        ((5e-6, 1e-7), (0.0, 0.0), "equal"),  # the paper's may be anything below its last decimal
+        ((PRINTED, None), (0.0, 0.0), "equal"),
+        ((6e-5, None), (0.0, 0.0), "worse"),
+        ((5e-6, None), (0.0001, 0.0), "better"),
+        ((float("inf"), None), (0.1, 0.02), "worse"),
+    ],
+)
+def test_marks(ours: Any, paper: Any, expected: str) -> None:
+    assert mark(Figure(*ours), Figure(*paper)) == expected
+
+
+def test_factors() -> None:
+    assert factor(Figure(5.65e-6), Figure(0.0113)) == "×0.0005"
+    assert factor(Figure(1.0), Figure(0.004)) == "×250"
+    assert factor(Figure(5e-6), Figure(0.0)) == "> ×0.1"
+
+
+def test_a_cell_is_the_mean_over_its_seeds_beside_the_paper() -> None:
+    first, second = seeds(2)
+    found = as_markdown([row(first, 0.010, 0.10), row(second, 0.012, 0.16)])
+    cells = table(found, "Non-linear", 4000)
+    assert cells[0][2:4] == ["Gaussian 4 kHz MSE", "Gaussian 4 kHz MAE"]
+    assert line(cells, "LRU", "**the paper**")[:2] == ["0.0260 (0.0067)", "0.1571 (0.0240)"]
+    ours = line(cells, "LRU", "our recipe")
+    assert ours[0] == "0.011 (0.0014) **better**, 2 seeds"
+    assert ours[1] == "0.13 (0.042) **equal**, 2 seeds"
+    assert ours[2:] == ["not run"] * 6
+
+
+def test_one_seed_has_no_deviation_and_small_errors_keep_their_digits() -> None:
+    cells = table(as_markdown([row(mse=5.123e-6, mae=1.5)]), "Non-linear", 4000)
+    assert line(cells, "LRU", "our recipe")[:2] == ["5.12e-06 **better**, 1 seed", "1.5 **worse**, 1 seed"]
+
+
+def test_what_was_not_run_is_said_to_be_so() -> None:
+    found = as_markdown([])
+    for string, horizon, lines in (("Linear", 4000, 6), ("Non-linear", 400, 8)):
+        cells = table(found, string, horizon)
+        own = [entry for entry in cells if entry[1] == "not run"]
+        assert len(own) == lines
+        assert all(entry[2:] == ["not run"] * 8 for entry in own)
+    assert "FGRU" not in [entry[0] for entry in table(found, "Linear", 4000)]  # as in the paper
+
+
+def test_diverged_and_failed_runs_are_told() -> None:
+    a, b, c, d = seeds(4)
+    gone = {"mse": None, "mae": None}
+    rows = [row(a), row(b, **gone, status="diverged"), row(c, **gone, status="diverged")]
+    rows.append(row(d, **gone, status="failed"))
+    ours = line(table(as_markdown(rows), "Non-linear", 4000), "LRU", "our recipe")
+    assert ours[0] == "0.01 **better**, 1 seed; diverged (2 of 4 seeds); failed (1 of 4 seeds)"
+    alone = line(table(as_markdown(rows[1:3]), "Non-linear", 4000), "LRU", "our recipe")
+    assert alone[0] == "diverged (2 of 2 seeds)"
+
+
+def test_prior_knowledge_and_recipes_have_lines_of_their_own() -> None:
+    cell, paper = (
+        Cell("koopman_var", True, "gaussian", 4000),
+        Cell("koopman_var", True, "gaussian", 4000, recipe="paper"),
+    )
+    phase = Cell("koopman_integrated", True, "gaussian", 4000)
+    rows = [
+        row(cell, 0.006, initialisation="physics"),
+        row(paper, 0.020),
+        row(phase, 1.13e-5, initialisation="averaging"),
+    ]
+    cells = table(as_markdown(rows), "Non-linear", 4000)
+    assert line(cells, "Koopman_var", "our recipe, prior knowledge (physics)")[0].startswith("0.006 **equal**")
+    assert line(cells, "Koopman_var", "paper recipe")[0].startswith("0.02 **worse**")
+    assert line(cells, "integrated phase", "our recipe, prior knowledge (averaging)")[0] == "1.13e-05, 1 seed"
+    assert line(cells, "**paper's best**", "")[0] == "0.0113 Koopman_var"
+    assert line(cells, "**our best**", "black box")[0] == "**×1.8** Koopman_var (paper recipe)"
+    assert line(cells, "**our best**", "prior knowledge")[0] == "**×0.001** integrated phase"
+
+    for recipe, runs in (("ours", {"our recipe, prior knowledge (physics)"}), ("paper", {"paper recipe"})):
+        cells = table(as_markdown(rows, recipe), "Non-linear", 4000)  # type: ignore[arg-type]
+        assert {entry[1] for entry in cells if entry[0] == "Koopman_var"} == {"**the paper**"} | runs
+
+
+def test_a_run_that_diverged_before_it_told_its_initialisation_stands_with_the_others() -> None:
+    cells = [Cell("koopman_var", True, "gaussian", 4000, seed=seed) for seed in (0, 1)]
+    gone = row(cells[1], None, None, status="diverged", initialisation="")
+    found = as_markdown([row(cells[0], initialisation="physics"), gone])
+    ours = line(table(found, "Non-linear", 4000), "Koopman_var", "our recipe, prior knowledge (physics)")
+    assert ours[0] == "0.01 **equal**, 1 seed; diverged (1 of 2 seeds)"
+
+
+def test_dmd_deviates_over_trajectories_and_is_no_prior_knowledge() -> None:
+    cell = Cell("dmd", True, "gaussian", 4000)
+    rows = [row(cell, 1.0, 0.8, initialisation="physics", rel_mse_spread=0.25, rel_mae_spread=0.07)]
+    cells = table(as_markdown(rows), "Non-linear", 4000)
+    assert line(cells, "DMD", "our recipe")[:2] == ["1 (0.25) **equal**, 1 seed", "0.8 (0.07) **equal**, 1 seed"]
+    assert line(cells, "**our best**", "black box")[0] == "not run"  # fitted, not learned
+
+
+def test_long_runs_measured_over_400_frames_are_told_from_short_ones() -> None:
+    long, short = Cell("lru", True, "gaussian", 4000), Cell("lru", True, "gaussian", 4000, 400)
+    rows = [row(long, rel_mse_400=0.0002, rel_mae_400=0.01), row(short, 0.0008, 0.02)]
+    cells = table(as_markdown(rows), "Non-linear", 400)
+    assert line(cells, "LRU", "our recipe")[0] == "0.0008 **equal**, 1 seed"
+    from_long = line(cells, "LRU", "our recipe, trained on 4000 frames ‡")
+    assert from_long[:2] == ["0.0002 **better**, 1 seed", "0.01 **better**, 1 seed"]
+    unmeasured = table(as_markdown([row(long)]), "Non-linear", 400)
+    assert line(unmeasured, "LRU", "not run") == ["not run"] * 8
+
+
+def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_out() -> None:
+    other = Cell("lru", True, "gaussian", 4000, 1000)
+    rows = [
+        row(mse=0.3, finished="2025-02-01T00:00:00Z"),
+        row(mse=0.4, finished="2025-01-01T00:00:00Z", digest="older"),
+        row(other),
+    ]
+    (section,) = (s for s in sections(rows) if s.place == ("nonlinear", 4000))
+    assert [entry[G4].rel_mse for entry in section.lines.values()] == [Figure(0.3)]
+    assert "2 of 3 rows of the results file are not shown" in as_markdown(rows)
+
+
+def test_the_listing_traces_every_run() -> None:
+    known = row(seconds=61.4, commit="abc1234", hardware="a processor", mse=0.0123456)
+    stale = row(Cell("s5", False, "noise", 16000), digest="another")
+    cells = as_markdown([known, stale], listing=True).partition("## Runs\n\n")[2].splitlines()
+    (told,) = (entry for entry in cells if f"| {known.name} " in entry)
+    for fact in ("0.0123456", known.digest, "abc1234", "a processor", "61", f"`learned-strings train {known.name}`"):
+        assert f" {fact} " in told
+    (changed,) = (entry for entry in cells if f"| {stale.name} " in entry)
+    assert "another configuration by now" in changed
+    assert "## Runs" not in as_markdown([known])
+
+
+def test_csv_has_every_cell_and_exact_figures() -> None:
+    a, b = seeds(2)
+    text = as_csv([row(a, 0.010, 0.10), row(b, 0.012, 0.16)])
+    lines = records(text)
+    assert len(lines) == len(COLUMNS) * 2 * (6 + 8)  # models with the integrated phase
+    (ours,) = records(text, string="nonlinear", horizon="4000", model="lru", initial="gaussian", rate_hz="4000")
+    assert float(ours["rel_mse"]) == pytest.approx(0.011)
+    assert float(ours["rel_mse_std"]) == pytest.approx(0.002 / 2**0.5)
+    assert (ours["seeds"], ours["mse_mark"], ours["mae_mark"], ours["trained"]) == ("2", "better", "equal", "4000")
+    assert (ours["paper_rel_mse"], ours["paper_rel_mae_std"]) == ("0.026", "0.024")
+    assert ours["runs"].split() == [a.name, b.name]
+    (empty,) = records(text, string="linear", horizon="400", model="frnn", initial="noise", rate_hz="16000")
+    assert (empty["seeds"], empty["rel_mse"], empty["mse_mark"]) == ("0", "", "not run")
+
+
+def test_csv_tells_diverged_runs_without_a_mark() -> None:
+    text = as_csv([row(mse=None, mae=None, status="diverged")])
+    (found,) = records(text, diverged="1")
+    assert (found["seeds"], found["rel_mse"], found["mse_mark"]) == ("0", "", "")
