@@ -99,9 +99,8 @@ class ErrorSums:
 
     def spread(self) -> RelativeError:
         """The population's standard deviation of the trajectories' own errors; infinite where one of them is."""
-        return RelativeError(
-            *(float(own.std()) if len(own) and np.isfinite(own).all() else math.inf for own in self.per_trajectory())
-        )
+        spreads = [float(torch.from_numpy(own).std(correction=0)) for own in self.per_trajectory()]
+        return RelativeError(*(spread if math.isfinite(spread) else math.inf for spread in spreads))
 
     def _relative(self, frames: slice) -> tuple[float, float]:
         mse, mae = _ratios(self._frames[:, frames].sum(1, keepdim=True))

@@ -1,31 +1,229 @@
-"""The errors of a model on a split of a data set, as in the paper's tables."""
+"""The errors of a model on a split of a data set: as in the paper's tables, past the horizon, and mode by mode.
+
+Every motion is streamed, some trajectories and some frames at a time: ten seconds of a split would not fit in memory.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from engine.metrics import ErrorSums
 from engine.models import StringModel
-from engine.sine_transform import synthesis_matrix
-from training.dataset import Dataset
+from engine.partials import (
+    PartialErrors,
+    PartialTrack,
+    partial_errors,
+    phasors,
+    segment_frames,
+    track_partials,
+)
+from engine.pluck import DEFAULT_LISTEN
+from engine.reference import ModalState, SplittingSolver
+from engine.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
+from engine.spectra import spectral_distances
+from training.configuration import DatasetConfiguration
+from training.dataset import Dataset, draw_initial, split_rows
 
 TRAJECTORIES_AT_ONCE = 10
+FRAMES_AT_ONCE = 1000
+OVERSAMPLING = 4  # of the truth whose phasors are wanted
+
+Windows = Sequence[tuple[float, float]]  # (start, stop) of each, in s
+
+
+def _silent(done: float) -> None:
+    pass
 
 
 @torch.no_grad()
 def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps: int | None = None) -> ErrorSums:
-    """Error sums per frame of frames 1 … steps (default: all) over every trajectory of the split."""
+    """Error sums of frames 1 … steps (default: all) over every trajectory of the split."""
     c = dataset.configuration
     steps = steps or c.steps
     device = next(model.parameters()).device
     synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float().to(device)
     sums = ErrorSums(steps)
+    with _in_evaluation(model):
+        for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
+            truth = amplitudes[:, : steps + 1].to(device) @ synthesis
+            sums.add(model(truth[:, 0], steps), truth[:, 1:])
+    return sums
+
+
+@dataclass(frozen=True)
+class MotionErrors:
+    """The errors of a split's motions, an infinite one where the model's output is not finite.
+
+    Attributes:
+        string: over the whole string, as in the tables.
+        sound: at the listening point; its `null_depth_db` is what subtraction leaves of the sound.
+        spectra: of the sound, one for each window that was asked for.
+    """
+
+    string: ErrorSums
+    sound: ErrorSums
+    spectra: list[SpectralDistance]
+
+
+@dataclass(frozen=True)
+class SpectralDistance:
+    """See `engine.spectra`; means over the trajectories."""
+
+    convergence: float
+    log_db: float
+
+
+@torch.inference_mode()
+def evaluate_past_horizon(
+    model: StringModel[Any],
+    dataset: Dataset,
+    split: str,
+    seconds: float,
+    *,
+    horizon: int | None = None,
+    windows_s: Windows = (),
+    trajectories: int | None = None,
+    frames_at_once: int = FRAMES_AT_ONCE,
+    report: Callable[[float], None] = _silent,
+) -> MotionErrors:
+    """The errors of the frames 1 … horizon and of `seconds` more.
+
+    The truth is the data set's where that reaches so far; else it is simulated from the same initial displacements.
+
+    Args:
+        horizon: in frames; None is all of the data's.
+        windows_s: of the spectral distances; none may be empty.
+        trajectories: only so many, the split's first ones.
+        frames_at_once: of a block; the result does not depend on it.
+        report: is told the share that is done.
+    """
+    c = dataset.configuration
+    steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
+    device = next(model.parameters()).device
+    synthesis = synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m
+    ear = listening_weights(torch.tensor([DEFAULT_LISTEN]), c.grid_points).float()
+    spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
+    string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
+    parts = _parts(c, split, trajectories)
+    with _in_evaluation(model):
+        for part, rows in enumerate(parts):
+            sounds = torch.empty(2, rows.stop - rows.start, steps)
+            initial, blocks = _true_motion(dataset, rows, steps, frames_at_once)
+            state, first = model.release((initial @ synthesis).float().to(device)), 0
+            for amplitudes in blocks:
+                last = first + amplitudes.shape[1]
+                predicted, state = model.advance(state, last - first)
+                predicted, truth = predicted.cpu(), (amplitudes @ synthesis).float()
+                string.add(predicted, truth, first)
+                heard = torch.stack([predicted @ ear, truth @ ear])
+                sound.add(heard[0], heard[1], first)
+                sounds[..., first:last] = heard[..., 0]
+                first = last
+                report((part + first / steps) / len(parts))
+            distances.append([spectral_distances(*sounds[..., span]) for span in spans])
+    return MotionErrors(string, sound, [_mean_distance(of_window) for of_window in zip(*distances, strict=True)])
+
+
+@torch.inference_mode()
+def evaluate_partials(
+    model: StringModel[Any],
+    dataset: Dataset,
+    split: str,
+    windows_s: Windows,
+    *,
+    trajectories: int | None = None,
+    frames_at_once: int = FRAMES_AT_ONCE,
+    report: Callable[[float], None] = _silent,
+) -> PartialErrors:
+    """The errors of the partials in windows of time, which may lie past the horizon; the other arguments as above.
+
+    Raises:
+        ValueError: there are no windows.
+    """
+    if not windows_s:
+        raise ValueError("windows_s must hold at least one window")
+    c = dataset.configuration
+    device = next(model.parameters()).device
+    synthesis = synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m
+    analysis = analysis_matrix(c.grid_points, c.modes).float().to(device)
+    linear_hz = (c.string.eigenvalues(c.modes).imag / (2 * math.pi)).tolist()
+    length = segment_frames(c.rate_hz, linear_hz[0])
+    block = max(1, frames_at_once // length) * length
+    steps = max(round(stop_s * c.rate_hz) for _, stop_s in windows_s)
+    initial, found = draw_initial(c), []
+    parts = _parts(c, split, trajectories)
+    with _in_evaluation(model):
+        for part, rows in enumerate(parts):
+            state, tracks = model.release((initial[rows] @ synthesis).float().to(device)), []
+            for first, truth in zip(
+                range(0, steps, block), _true_phasors(c, initial[rows], steps, block), strict=True
+            ):
+                predicted, state = model.advance(state, truth.shape[1], analysis)
+                tracks.append(track_partials(predicted.cpu() * dataset.scale_m, truth, length))
+                report((part + (first + truth.shape[1]) / steps) / len(parts))
+            found.append(partial_errors(PartialTrack.join(tracks), c.rate_hz, linear_hz, windows_s))
+    return PartialErrors.join(found)
+
+
+@contextmanager
+def _in_evaluation(model: StringModel[Any]) -> Iterator[None]:
     was_training = model.training
     model.eval()
-    for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
-        truth = amplitudes[:, : steps + 1].to(device) @ synthesis
-        sums.add(model(truth[:, 0], steps), truth[:, 1:])
-    model.train(was_training)
-    return sums
+    try:
+        yield
+    finally:
+        model.train(was_training)
+
+
+def _parts(c: DatasetConfiguration, split: str, trajectories: int | None) -> list[slice]:
+    """The rows of a split's trajectories, some at a time."""
+    rows = split_rows(c.count, split)
+    stop = rows.stop if trajectories is None else min(rows.stop, rows.start + trajectories)
+    firsts = range(rows.start, stop, TRAJECTORIES_AT_ONCE)
+    return [slice(first, min(first + TRAJECTORIES_AT_ONCE, stop)) for first in firsts]
+
+
+def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple[Tensor, Iterator[Tensor]]:
+    """Modal amplitudes in m, float64: of frame 0, and of blocks of the frames after it."""
+    c = dataset.configuration
+    if steps <= c.steps:
+        stored = dataset.amplitudes[rows, : steps + 1]
+        return stored[:, 0].double(), (frames.double() for frames in stored[:, 1:].split(block, dim=1))
+    initial = draw_initial(c)[rows]
+    return initial, _simulated(_solver(c), initial, steps, block)
+
+
+def _simulated(solver: SplittingSolver, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
+    state = ModalState.at_rest(initial)
+    for first in range(0, steps, block):
+        frames, state = solver.advance(state, min(block, steps - first))
+        yield frames
+
+
+def _true_phasors(c: DatasetConfiguration, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
+    """Phasors of frames 1 … steps, complex128 (batch, up to `block`, modes)."""
+    solver, state = _solver(c, OVERSAMPLING), ModalState.at_rest(initial)
+    for first in range(0, steps, block):
+        samples, state = solver.advance(state, OVERSAMPLING * min(block, steps - first))
+        beyond, _ = solver.advance(state, 1)
+        before, now, after = (
+            torch.cat([samples, beyond], dim=1)[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1)
+        )
+        count = now.shape[1]
+        yield phasors(before[:, :count], now, after, 1 / solver.rate_hz, c.string, c.tension_modulated)
+
+
+def _solver(c: DatasetConfiguration, oversampling: int = 1) -> SplittingSolver:
+    return SplittingSolver(c.string, c.modes, c.rate_hz * oversampling, tension_modulated=c.tension_modulated)
+
+
+def _mean_distance(of_parts: Sequence[tuple[Tensor, Tensor]]) -> SpectralDistance:
+    convergence, log_db = (float(torch.cat(values).mean()) for values in zip(*of_parts, strict=True))
+    return SpectralDistance(convergence, log_db)

@@ -1,9 +1,12 @@
 """Relative errors by hand."""
 
+import math
+
+import numpy as np
 import pytest
 import torch
 
-from engine.metrics import ErrorSums, relative_error
+from engine.metrics import NULL_FLOOR_DB, ErrorSums, RelativeError, relative_error
 
 
 def test_by_hand() -> None:
@@ -43,3 +46,74 @@ def test_silent_truth() -> None:
 def test_shapes_must_agree() -> None:
     with pytest.raises(ValueError, match="differ in shape"):
         relative_error(torch.zeros(1, 4, 2), torch.zeros(1, 4, 3))
+
+
+def motions(*shape: int) -> tuple[torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(1)
+    truth, predicted = (torch.randn(*shape, generator=generator, dtype=torch.float64) for _ in range(2))
+    return predicted, truth
+
+
+def test_the_first_frames_alone() -> None:
+    predicted, truth = motions(4, 50, 3)
+    sums = ErrorSums(50)
+    sums.add(predicted, truth)
+    assert sums.total(20).rel_mae == pytest.approx(relative_error(predicted[:, :20], truth[:, :20]).rel_mae)
+    assert sums.total(50) == sums.total()
+    for steps in (0, 51):
+        with pytest.raises(ValueError, match=f"steps must lie in 1 … 50, not {steps}"):
+            sums.total(steps)
+
+
+def test_per_frame_and_per_trajectory() -> None:
+    predicted, truth = motions(4, 6, 3)
+    truth[:, 2], predicted[:, 2] = 0, 0
+    sums = ErrorSums(6)
+    sums.add(predicted, truth)
+    frames, trajectories = sums.per_frame(), sums.per_trajectory()
+    assert frames[0].dtype == np.float64
+    assert (frames[0].shape, trajectories[0].shape) == ((6,), (4,))
+    assert frames[0][2] == 0
+    for index, found in enumerate(zip(*frames, strict=True)):
+        frame = relative_error(predicted[:, index : index + 1], truth[:, index : index + 1])
+        assert found == pytest.approx((frame.rel_mse, frame.rel_mae))
+    alone = [relative_error(predicted[row : row + 1], truth[row : row + 1]) for row in range(4)]
+    assert trajectories[0] == pytest.approx([error.rel_mse for error in alone])
+    assert sums.spread().rel_mse == pytest.approx(np.std([error.rel_mse for error in alone]))
+    assert sums.spread().rel_mae == pytest.approx(np.std([error.rel_mae for error in alone]))
+
+
+def test_trajectories_are_known_again_in_blocks() -> None:
+    predicted, truth = motions(5, 30, 3)
+    whole, rows_first, frames_first = ErrorSums(30), ErrorSums(30), ErrorSums(30)
+    whole.add(predicted, truth)
+    parts, blocks = (slice(0, 2), slice(2, 5)), (slice(0, 7), slice(7, 20), slice(20, 30))
+    for rows in parts:
+        for frames in blocks:
+            rows_first.add(predicted[rows, frames], truth[rows, frames], frames.start)
+    for frames in blocks:
+        for rows in parts:
+            frames_first.add(predicted[rows, frames], truth[rows, frames], frames.start, rows.start)
+    for sums in (rows_first, frames_first):
+        assert sums.per_trajectory()[0] == pytest.approx(whole.per_trajectory()[0])
+        assert sums.spread().rel_mae == pytest.approx(whole.spread().rel_mae)
+        assert sums.total().rel_mse == pytest.approx(whole.total().rel_mse)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e200])
+def test_what_is_no_number_is_an_infinite_error_from_then_on(value: float) -> None:
+    predicted, truth = motions(3, 10, 2)
+    predicted[1, 5:] = value
+    sums = ErrorSums(10)
+    sums.add(predicted, truth)
+    assert sums.total().rel_mse == math.inf
+    assert math.isfinite(sums.total(5).rel_mse)
+    assert np.isinf(sums.per_frame()[0]).tolist() == [False] * 5 + [True] * 5
+    assert np.isinf(sums.per_trajectory()[0]).tolist() == [False, True, False]
+    assert sums.spread().rel_mse == math.inf
+
+
+def test_null_depth() -> None:
+    assert RelativeError(1e-3, 0.1).null_depth_db == pytest.approx(-30)
+    assert RelativeError(0, 0).null_depth_db == RelativeError(1e-30, 0).null_depth_db == NULL_FLOOR_DB
+    assert RelativeError(math.inf, math.inf).null_depth_db == math.inf

@@ -73,13 +73,6 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
     assert info.trained_range.position == (0.3, 0.7)
     assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
 
-    again = json.loads(run("evaluate", path, "--json", "--split", "both", *place.cache).out)
-    assert again["rel_mae"] == pytest.approx(info.rel_mae, rel=1e-5)
-    assert again["validation"]["rel_mse"] == pytest.approx(again["validation"]["stored_rel_mse"], rel=1e-5)
-    assert again["test"]["rel_mse"] == pytest.approx(info.test_rel_mse, rel=1e-5)
-    assert [w["stop_s"] for w in again["test"]["windows"]] == pytest.approx([0.003125, 0.00625, 0.009375, 0.0125])
-    assert "stored in the preset" in run("evaluate", path, *place.cache).out
-
 
 def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("training.fit.CHECKPOINT_EVERY_S", -1)
@@ -148,7 +141,3 @@ def test_a_wrong_field_is_told(run, place: Place) -> None:
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
 def test_a_device_that_is_not_there_is_told(run, place: Place) -> None:
     assert "no CUDA device can be used here" in run(*place.train("a"), "--device", "cuda").failure
-
-
-def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: Path) -> None:
-    assert "metadata.training: field 'title' is missing" in run("evaluate", small_preset).failure

@@ -1,0 +1,287 @@
+"""evaluate: the errors of a preset on its data set, over the horizon that it was trained on and past it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from app.commands.arguments import Cache, Json, PresetName, check_range, open_preset
+from app.commands.console import Failure, number, print_json, print_table, progress
+from app.commands.training import load_data
+from engine.pluck import DEFAULT_LISTEN
+
+if TYPE_CHECKING:
+    from app.commands.console import Report
+    from engine.preset import Preset
+    from training.configuration import DatasetConfiguration
+    from training.dataset import Dataset
+
+Split = Literal["validation", "test", "both"]
+LARGEST_DATASET_BYTES = 16 * 2**30
+WINDOWS = 4  # of the horizon
+LONGEST_PAST_S = 60.0
+CSV_COLUMNS = ("preset", "split", "start_s", "stop_s", "past_horizon", "mode", "quantity", "value")
+
+
+def evaluate(
+    preset: PresetName,
+    split: Annotated[Split, typer.Option(help="The tables of the paper are of validation.")] = "validation",
+    past: Annotated[float, typer.Option(metavar="S", help="Go on so many s past the training horizon.")] = 0.0,
+    partials: Annotated[
+        bool, typer.Option("--partials", help="Level, phase, frequency and decay of each mode, too.")
+    ] = False,
+    trajectories: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Only the first N of a split; default all.")
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write every figure to a table, one a row.")
+    ] = None,
+    cache: Cache = None,
+    json: Json = False,
+) -> None:
+    """Measure a preset's errors on the data set that it was trained with, beside those stored in it."""
+    check_range("--past", past, 0, LONGEST_PAST_S, "s")
+    loaded = open_preset(preset)
+    info = loaded.info
+    if 0 < past * info.rate_hz < 1:
+        raise typer.BadParameter(f"must hold a sample of {info.rate_hz} Hz, not {past:g} s", param_hint="--past")
+    configuration = _data_of(loaded)
+    splits = ("validation", "test") if split == "both" else (split,)
+    _check_trajectories(trajectories, configuration, splits)
+    from app.whole_file import whole_file
+
+    with nullcontext() if table is None else whole_file(table) as file:
+        data = replace(load_data(configuration, cache), scale_m=info.scale_m)
+        with progress("evaluate") as report:
+            shares = _Shares(report, len(splits) * (2 if partials else 1))
+            measurement = _Measurement(loaded, data, past, partials, trajectories, shares)
+            measured = {name: measurement.of(name) for name in splits}
+        if file is not None:
+            file.write(_csv(loaded.name, measured).encode())
+    if json:
+        first = measured[splits[0]]
+        facts = {
+            "preset": loaded.name,
+            "file": str(loaded.path),
+            "split": split,
+            "rate_hz": info.rate_hz,
+            "horizon_s": info.horizon_s,
+            "past_s": past,
+            "listen": DEFAULT_LISTEN,
+        }
+        print_json({**facts, "rel_mse": first["rel_mse"], "rel_mae": first["rel_mae"], **measured})
+        return
+    for name, errors in measured.items():
+        _print_errors(name, errors, info.horizon_s)
+        for found in errors.get("partials", [])[: 2 if past else 1]:  # the whole horizon, and all past it
+            _print_partials(name, found)
+
+
+class _Shares:
+    """Progress of several pieces of work, one after the other."""
+
+    def __init__(self, report: Report, pieces: int) -> None:
+        self._report, self._pieces, self._done = report, pieces, 0
+
+    def __call__(self, share: float) -> None:
+        self._report((self._done + share) / self._pieces)
+
+    def next(self) -> None:
+        self._done += 1
+
+
+@dataclass(frozen=True)
+class _Measurement:
+    """What is asked of a preset."""
+
+    preset: Preset
+    data: Dataset
+    past_s: float
+    partials: bool
+    trajectories: int | None
+    report: _Shares
+
+    def of(self, split: str) -> dict[str, Any]:
+        """Every figure of a split."""
+        from training.evaluate import evaluate_past_horizon
+        from training.results import SHORT_HORIZON
+
+        info = self.preset.info
+        windows = self._windows()
+        motion = evaluate_past_horizon(
+            self.preset.model,
+            self.data,
+            split,
+            self.past_s,
+            horizon=info.horizon_steps,
+            windows_s=[(0.0, info.horizon_s), *windows],
+            trajectories=self.trajectories,
+            report=self.report,
+        )
+        self.report.next()
+        whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
+        validation = split == "validation"
+        found: dict[str, Any] = {
+            "trajectories": len(motion.string.per_trajectory()[0]),
+            "rel_mse": whole.rel_mse,
+            "rel_mae": whole.rel_mae,
+            "stored_rel_mse": info.rel_mse if validation else info.test_rel_mse,
+            "stored_rel_mae": info.rel_mae if validation else info.test_rel_mae,
+            "null_depth_db": sound.null_depth_db,
+            "spectral_convergence": motion.spectra[0].convergence,
+            "log_spectrum_db": motion.spectra[0].log_db,
+        }
+        if not self.past_s:  # a trajectory's own error is over all that was measured
+            spread = motion.string.spread()
+            found |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
+        if info.horizon_steps > SHORT_HORIZON:
+            short = motion.string.total(SHORT_HORIZON)
+            found |= {f"rel_mse_{SHORT_HORIZON}": short.rel_mse, f"rel_mae_{SHORT_HORIZON}": short.rel_mae}
+        edges = [0.0, *(stop_s for _, stop_s in windows)]
+        sums = (motion.string.windows(info.rate_hz, edges), motion.sound.windows(info.rate_hz, edges))
+        found["windows"] = [
+            {
+                **self._label(window.start_s, window.stop_s),
+                "rel_mse": window.rel_mse,
+                "rel_mae": window.rel_mae,
+                "null_depth_db": heard.null_depth_db,
+                "spectral_convergence": spectrum.convergence,
+                "log_spectrum_db": spectrum.log_db,
+            }
+            for window, heard, spectrum in zip(*sums, motion.spectra[1:], strict=True)
+        ]
+        if self.partials:
+            found["partials"] = self._partials(split, windows)
+            self.report.next()
+        return found
+
+    def _partials(self, split: str, windows: list[tuple[float, float]]) -> list[dict[str, Any]]:
+        """The whole horizon, all past it, then every window."""
+        from training.evaluate import evaluate_partials
+
+        horizon_s, end_s = self.preset.info.horizon_s, windows[-1][1]
+        windows = [(0.0, horizon_s), *([(horizon_s, end_s)] if self.past_s else []), *windows]
+        errors = evaluate_partials(
+            self.preset.model, self.data, split, windows, trajectories=self.trajectories, report=self.report
+        )
+        return [
+            {
+                **self._label(*window),
+                "modes": [asdict(mode) for mode in errors.by_mode(place)],
+                "weighted": asdict(errors.weighted(place)),
+            }
+            for place, window in enumerate(windows)
+        ]
+
+    def _windows(self) -> list[tuple[float, float]]:
+        """Parts of the horizon, then every second past it; edges lie on frames, and none is empty."""
+        info = self.preset.info
+        last = info.horizon_steps + round(self.past_s * info.rate_hz)
+        inside = {round(info.horizon_steps * part / WINDOWS) for part in range(WINDOWS + 1)}
+        edges = sorted(inside | {*range(info.horizon_steps, last, info.rate_hz), last})
+        return list(pairwise(edge / info.rate_hz for edge in edges))
+
+    def _label(self, start_s: float, stop_s: float) -> dict[str, Any]:
+        past = start_s >= self.preset.info.horizon_s
+        return {"start_s": start_s, "stop_s": stop_s, "past_horizon": past}
+
+
+def _data_of(preset: Preset) -> DatasetConfiguration:
+    """The data set that a preset names."""
+    from engine.schema import SchemaError, read
+    from training.configuration import TrainingConfiguration
+
+    info = preset.info
+    try:
+        data = read(TrainingConfiguration, info.training, f"{preset.path}: metadata.training").data
+    except SchemaError as error:
+        raise Failure(f"{error}; without it the preset's data set cannot be made") from error
+    size = 4 * data.count * (data.steps + 1) * data.modes
+    if size > LARGEST_DATASET_BYTES:
+        raise Failure(f"{preset.path}: its data set would take {size / 2**30:.0f} GiB; get the preset again")
+    for name in ("grid_points", "rate_hz", "modes"):
+        if getattr(data, name) != getattr(info, name):
+            raise Failure(
+                f"{preset.path}: metadata.training.data.{name} is {getattr(data, name)}, the model's is "
+                f"{getattr(info, name)}; get the preset again"
+            )
+    return data
+
+
+def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: tuple[str, ...]) -> None:
+    from training.dataset import split_rows
+
+    for split in splits:
+        rows = split_rows(data.count, split)
+        if wanted is not None:
+            check_range("--trajectories", wanted, 1, rows.stop - rows.start)
+
+
+def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
+    print(f"{split}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
+    print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
+    for key, text in (("spread", "spread over the trajectories"), ("400", "first 400 frames")):
+        if f"rel_mse_{key}" in errors:
+            print(f"{text}: {number(errors[f'rel_mse_{key}'])}, {number(errors[f'rel_mae_{key}'])}")
+    print(
+        f"{errors['trajectories']} trajectories, trained to {horizon_s:g} s; "
+        f"sound at {DEFAULT_LISTEN:g} of the length: null depth {errors['null_depth_db']:.1f} dB, "
+        f"spectral convergence {number(errors['spectral_convergence'])}, "
+        f"spectra {number(errors['log_spectrum_db'])} dB apart"
+    )
+    columns = ("from s", "to s", "rel. MSE", "rel. MAE", "null dB", "convergence", "spectra dB", "")
+    keys = ("start_s", "stop_s", "rel_mse", "rel_mae", "null_depth_db", "spectral_convergence", "log_spectrum_db")
+    print_table(
+        columns,
+        [
+            [*(w[key] for key in keys), "past the training horizon" if w["past_horizon"] else ""]
+            for w in errors["windows"]
+        ],
+    )
+
+
+def _print_partials(split: str, found: dict[str, Any]) -> None:
+    past = ", past the training horizon" if found["past_horizon"] else ""
+    print(f"{split}, partials of {found['start_s']:g} … {found['stop_s']:g} s{past}: medians of the magnitudes")
+    columns = ("mode", "trajectories", "Hz", "level dB", "phase cycles", "cents", "T60 s", "T60 error %")
+    rows = [list(mode.values()) for mode in found["modes"]]
+    w = found["weighted"]
+    mean = ["all, by energy", "", "", w["level_db"], w["phase_cycles"], w["cents"], "", ""]
+    print_table(columns, [*rows, mean])
+
+
+def _csv(preset: str, measured: dict[str, dict[str, Any]]) -> str:
+    """One figure a row; `mode` is empty for the whole string, and for the mean over modes "all"."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    for split, errors in measured.items():
+        stop_s = max(w["stop_s"] for w in errors["windows"] if not w["past_horizon"])
+        writer.writerows((preset, split, *row) for row in _figures(errors, (0.0, stop_s, False), ""))
+        for window in errors["windows"]:
+            writer.writerows((preset, split, *row) for row in _figures(window, _label(window), ""))
+        for window in errors.get("partials", ()):
+            for mode in window["modes"]:
+                writer.writerows((preset, split, *row) for row in _figures(mode, _label(window), mode["mode"]))
+            writer.writerows((preset, split, *row) for row in _figures(window["weighted"], _label(window), "all"))
+    return text.getvalue()
+
+
+def _label(window: dict[str, Any]) -> tuple[float, float, bool]:
+    return window["start_s"], window["stop_s"], window["past_horizon"]
+
+
+def _figures(facts: dict[str, Any], label: tuple[float, float, bool], mode: object) -> Iterator[tuple[object, ...]]:
+    for quantity, value in facts.items():
+        if quantity in ("start_s", "stop_s", "past_horizon", "mode") or not isinstance(value, int | float):
+            continue
+        yield *label, mode, quantity, value if math.isfinite(value) else "inf"

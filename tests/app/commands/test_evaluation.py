@@ -1,0 +1,196 @@
+"""evaluate: a preset that is nearly the linear string, on the data of the linear string."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from engine.models import build_model
+from engine.models.base import Physics
+from engine.preset import load_preset, save_preset
+from engine.schema import write
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+
+DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, tension_modulated=False, steps=600, count=20)
+HORIZON = 500  # frames
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    return ["--cache", tmp_path_factory.mktemp("cache")]
+
+
+@pytest.fixture
+def preset(small_preset: Path, tmp_path: Path) -> Path:
+    """The linear string in closed form, its decay rates too high by a tenth."""
+    model = build_model("koopman_integrated")
+    physics = Physics(DATA.string, DATA.modes, DATA.rate_hz, 1e-3, tension_modulated=False)
+    model.initialise("physics", physics, torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        model.get_parameter("nu_log").add_(math.log(1.1))
+    run = TrainingConfiguration("Tiny", "koopman_integrated", DATA, Recipe(epochs=1), horizon=HORIZON)
+    info = replace(
+        load_preset(small_preset).info,
+        model="koopman_integrated",
+        model_configuration={},
+        tension_modulated=False,
+        horizon_steps=HORIZON,
+        training=write(run),
+        test_rel_mse=0.75,
+    )
+    path = tmp_path / "tiny.safetensors"
+    save_preset(path, info, model)
+    return path
+
+
+def test_the_horizon_and_what_is_stored(run, preset: Path, cache: list[Any]) -> None:
+    told = run("evaluate", preset, "--split", "both", *cache)
+    assert (told.status, told.err) == (0, "")
+    assert "validation: rel. MSE" in told.out
+    assert "stored in the preset: 0.5, 0.25" in told.out
+    assert "stored in the preset: 0.75, -" in told.out
+    assert "2 trajectories, trained to 0.125 s" in told.out
+    assert "past the training horizon" not in told.out
+
+    found = json.loads(run("evaluate", preset, "--split", "both", "--json", *cache).out)
+    validation, test = found["validation"], found["test"]
+    assert found["rel_mse"] == validation["rel_mse"]
+    assert (found["horizon_s"], found["past_s"]) == (0.125, 0)
+    assert (validation["stored_rel_mse"], test["stored_rel_mse"], test["stored_rel_mae"]) == (0.5, 0.75, None)
+    assert validation["rel_mse"] != test["rel_mse"]
+    assert 0 < validation["rel_mse_spread"] < validation["rel_mse"]
+    assert validation["rel_mse_400"] < validation["rel_mse"]  # too much decay shows with time
+    assert [w["stop_s"] for w in test["windows"]] == [0.03125, 0.0625, 0.09375, 0.125]
+    assert not any(w["past_horizon"] for w in test["windows"])
+    # the sound's null depth is about that of the whole string
+    assert test["null_depth_db"] == pytest.approx(10 * math.log10(test["rel_mse"]), abs=6)
+    assert test["spectral_convergence"] > 0
+
+
+def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) -> None:
+    words = ["evaluate", preset, "--past", "2.5", *cache]
+    told = run(*words)
+    assert told.status == 0
+    assert told.out.count("past the training horizon") == 3
+    found = json.loads(run(*words, "--json").out)["validation"]
+    late = [w for w in found["windows"] if w["past_horizon"]]
+    assert [(w["start_s"], w["stop_s"]) for w in late] == [(0.125, 1.125), (1.125, 2.125), (2.125, 2.625)]
+    # the first mode is left, and exp(-0.1 σt) of it: so much is known of the error
+    sigma, middle_s = float(DATA.string.decay_rates(1)), 2.375
+    assert late[2]["rel_mse"] == pytest.approx((1 - math.exp(-0.1 * sigma * middle_s)) ** 2, rel=0.1)
+    at_horizon = json.loads(run("evaluate", preset, "--json", *cache).out)
+    assert found["rel_mse"] == pytest.approx(at_horizon["rel_mse"], rel=1e-4)
+
+
+def test_partials(run, preset: Path, cache: list[Any]) -> None:
+    words = ["evaluate", preset, "--past", "1", "--partials", *cache]
+    told = run(*words)
+    assert "validation, partials of 0 … 0.125 s: medians of the magnitudes" in told.out
+    assert "validation, partials of 0.125 … 1.125 s, past the training horizon" in told.out
+    assert told.out.count("all, by energy") == 2
+    found = json.loads(run(*words, "--json").out)["validation"]["partials"]
+    horizon, past, *windows = found
+    assert [(w["start_s"], w["stop_s"]) for w in (horizon, past)] == [(0, 0.125), (0.125, 1.125)]
+    assert len(windows) == 5
+    assert [mode["mode"] for mode in horizon["modes"]] == list(range(1, 11))
+    third = past["modes"][2]
+    assert third["frequency_hz"] == pytest.approx(741.9, abs=0.1)
+    assert third["t60_s"] == pytest.approx(3 * math.log(10) / float(DATA.string.decay_rates(3)[2]), rel=1e-5)
+    assert third["t60_error_percent"] == pytest.approx(100 - 100 / 1.1, rel=1e-3)
+    assert horizon["modes"][7]["level_db"] is None  # not resolved: at half the rate
+    assert horizon["weighted"]["cents"] < 0.01
+
+
+def test_every_figure_as_a_table(run, preset: Path, cache: list[Any], folder: Path) -> None:
+    path = folder / "errors.csv"
+    words = ["evaluate", preset, "--past", "1", "--partials", "--split", "both", "--csv", path, *cache]
+    assert run(*words).status == 0
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["preset"] for row in rows} == {"tiny"}
+    assert {row["split"] for row in rows} == {"validation", "test"}
+    values = {
+        (row["split"], row["start_s"], row["stop_s"], row["mode"], row["quantity"]): float(row["value"])
+        for row in rows
+    }
+    found = json.loads(run(*words[:-4], *cache, "--json").out)
+    assert values["validation", "0.0", "0.125", "", "rel_mae"] == pytest.approx(found["rel_mae"])
+    late = found["test"]["windows"][-1]
+    assert values["test", "0.125", "1.125", "", "null_depth_db"] == pytest.approx(late["null_depth_db"])
+    mode = found["test"]["partials"][1]["modes"][0]
+    assert values["test", "0.125", "1.125", "1", "level_db"] == pytest.approx(mode["level_db"])
+    assert ("test", "0.125", "1.125", "all", "phase_cycles") in values
+    assert {row["past_horizon"] for row in rows if row["start_s"] == "0.125"} == {"True"}
+
+
+def test_some_trajectories(run, preset: Path, cache: list[Any]) -> None:
+    found = json.loads(run("evaluate", preset, "--trajectories", "1", "--json", *cache).out)["validation"]
+    assert (found["trajectories"], found["rel_mse_spread"]) == (1, 0)
+    told = run("evaluate", preset, "--trajectories", "3", *cache)
+    assert "--trajectories: must lie in 1 … 2, not 3" in told.usage.replace("'", "")
+
+
+def test_a_model_that_grows_is_shown_as_infinite(run, preset: Path, cache: list[Any], folder: Path) -> None:
+    loaded = load_preset(preset)
+    weights = loaded.model.get_parameter("decoder.weight")
+    with torch.no_grad():
+        weights.fill_(3e38)
+    path = folder / "grown.safetensors"
+    save_preset(path, loaded.info, loaded.model)
+    told = run("evaluate", path, "--partials", "--csv", folder / "grown.csv", *cache)
+    assert told.status == 0
+    assert "rel. MSE inf, rel. MAE inf" in told.out
+    assert "null depth inf dB" in told.out
+    assert "rel_mse,inf" in (folder / "grown.csv").read_text(encoding="utf-8")
+    assert json.loads(run("evaluate", path, "--json", *cache).out)["rel_mse"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--past", "-1"], "must lie in 0 … 60 s, not -1"),
+        (["--past", "61"], "must lie in 0 … 60 s, not 61"),
+        (["--past", "1e-5"], "must hold a sample of 4000 Hz"),
+        (["--past", "nan"], "must lie in 0 … 60 s, not nan"),
+        (["--split", "train"], "is not one of"),
+        (["--trajectories", "0"], "--trajectories"),
+    ],
+)
+def test_bad_usage(run, preset: Path, words: list[str], message: str) -> None:
+    assert message in run("evaluate", preset, *words).usage
+
+
+def test_a_table_that_cannot_be_written_is_told_before_the_work(run, preset: Path, folder: Path) -> None:
+    path = folder / "nowhere" / "errors.csv"
+    failure = run("evaluate", preset, "--csv", path, "--cache", folder / "cache").failure
+    assert f"{path}: cannot be written" in failure
+    assert not (folder / "cache").exists()
+
+
+def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: Path) -> None:
+    assert "metadata.training: field 'title' is missing" in run("evaluate", small_preset).failure
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"count": 10_000_000}, "its data set would take"),
+        ({"rate_hz": 8000}, "metadata.training.data.rate_hz is 8000, the model's is 4000"),
+        ({"grid_points": 51}, "metadata.training.data.grid_points is 51, the model's is 101"),
+    ],
+)
+def test_a_data_set_that_is_not_the_models_is_told(
+    run, preset: Path, folder: Path, changes: dict[str, Any], message: str
+) -> None:
+    loaded = load_preset(preset)
+    training = {**loaded.info.training, "data": {**loaded.info.training["data"], **changes}}
+    path = folder / "other.safetensors"
+    save_preset(path, replace(loaded.info, training=training), loaded.model)
+    assert message in run("evaluate", path).failure

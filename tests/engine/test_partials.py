@@ -1,0 +1,200 @@
+"""Partials of decaying sinusoids whose errors are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from engine.partials import PartialErrors, PartialTrack, partial_errors, phasors, segment_frames, track_partials
+from engine.reference import ModalState, SplittingSolver
+from engine.string import StringParameters
+
+RATE_HZ = 4000.0
+STRING = StringParameters()
+LINEAR_HZ = (STRING.eigenvalues(10).imag / (2 * math.pi)).tolist()  # modes 9 and 10 lie above half the rate
+RESOLVED = [0, 1, 2, 3, 4, 5, 6, 8, 9]  # mode 8 is at 1994 Hz
+
+
+def times(seconds: float) -> Tensor:
+    return torch.arange(1, round(seconds * RATE_HZ) + 1, dtype=torch.float64)[:, None] / RATE_HZ
+
+
+def partial(time_s: Tensor, hz: Tensor, sigma: Tensor, level: float = 1.0, cycles: float = 0.1) -> Tensor:
+    """Phasors (1, frames, modes)."""
+    return (level * torch.exp(torch.complex(-sigma * time_s, 2 * math.pi * (hz * time_s + cycles))))[None]
+
+
+def errors(predicted: Tensor, truth: Tensor, *windows_s: tuple[float, float]) -> PartialErrors:
+    track = track_partials(predicted, truth, segment_frames(RATE_HZ, LINEAR_HZ[0]))
+    return partial_errors(track, RATE_HZ, LINEAR_HZ, windows_s)
+
+
+def ten_modes(seconds: float = 2.0) -> tuple[Tensor, Tensor, Tensor]:
+    """Times, frequencies, and decay rates so low that every mode is there throughout."""
+    return times(seconds), torch.tensor(LINEAR_HZ, dtype=torch.float64), torch.linspace(1, 3, 10, dtype=torch.float64)
+
+
+def test_detuning_level_and_decay_are_what_they_were_made() -> None:
+    time_s, hz, sigma = ten_modes()
+    cents, level_db = 2.0, 1.5
+    detuned = hz * 2 ** (cents / 1200)
+    predicted = partial(time_s, detuned, 0.9 * sigma, 10 ** (level_db / 20)).real
+    found = errors(predicted, partial(time_s, hz, sigma), (0, 0.02), (0, 1), (1, 2), (0, 2))
+    assert np.isnan(found.cents[0, :, 7]).all()  # not resolved
+    whole = {name: getattr(found, name)[0, 3, RESOLVED] for name in ("frequency_hz", "cents", "t60_s")}
+    assert whole["frequency_hz"] == pytest.approx(hz[RESOLVED].numpy(), rel=1e-6)
+    assert whole["cents"] == pytest.approx(cents, abs=0.002)
+    assert whole["t60_s"] == pytest.approx(3 * math.log(10) / sigma[RESOLVED].numpy(), rel=1e-6)
+    assert found.t60_error_percent[0, 3, RESOLVED] == pytest.approx(100 / 0.9 - 100, abs=0.05)
+    # at the start the level is what it was made; it rises by 0.1σ · 8.69 dB a second
+    assert found.level_db[0, 0, RESOLVED] == pytest.approx(level_db, abs=0.05)
+    # the phase runs ahead by the detuning in Hz each second: the mean is that of the middle
+    for window, middle_s in ((1, 0.5), (2, 1.5), (3, 1.0)):
+        expected = (detuned - hz)[RESOLVED].numpy() * middle_s
+        assert found.phase_cycles[0, window, RESOLVED] == pytest.approx(expected, rel=2e-3)
+    # a row of the summary holds magnitudes
+    (row, *_) = found.by_mode(3)
+    assert (row.mode, row.trajectories, row.cents) == (1, 1, pytest.approx(cents, abs=0.002))
+    assert found.weighted(3).cents == pytest.approx(cents, abs=0.002)
+
+
+def test_the_level_alone_is_exact() -> None:
+    time_s, hz, sigma = ten_modes(1)
+    truth = partial(time_s, hz, sigma)
+    found = errors(0.5 * truth.real, truth, (0, 0.5), (0.5, 1))
+    assert found.level_db[..., RESOLVED] == pytest.approx(20 * math.log10(0.5), abs=1e-9)
+    assert found.phase_cycles[..., RESOLVED] == pytest.approx(0, abs=1e-9)
+    assert found.t60_error_percent[..., RESOLVED] == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("cycles", [-0.4, -0.25, 0.125, 0.45])
+def test_a_phase_is_told_with_its_sign_below_and_above_half_the_rate(cycles: float) -> None:
+    time_s, hz, sigma = ten_modes(0.5)
+    truth = partial(time_s, hz, sigma)
+    found = errors(partial(time_s, hz, sigma, cycles=0.1 + cycles).real, truth, (0, 0.5))
+    assert found.phase_cycles[0, 0, RESOLVED] == pytest.approx(cycles, abs=1e-9)
+    assert found.cents[0, 0, RESOLVED] == pytest.approx(0, abs=1e-6)
+
+
+def test_a_flat_partial_above_half_the_rate_has_negative_cents() -> None:
+    time_s, hz, sigma = ten_modes(1)
+    predicted = partial(time_s, hz * 2 ** (-3 / 1200), sigma).real
+    found = errors(predicted, partial(time_s, hz, sigma), (0, 1))
+    assert found.cents[0, 0, RESOLVED] == pytest.approx(-3, abs=0.005)  # although its alias is sharp
+    assert (found.phase_cycles[0, 0, RESOLVED] < 0).all()
+
+
+def test_what_lies_below_the_floor_is_absent() -> None:
+    time_s, hz, sigma = ten_modes(1)
+    levels = torch.ones(10, dtype=torch.float64)
+    levels[2], levels[3], levels[4] = 0, 0.9e-3, 1.1e-3
+    sigma = torch.full_like(sigma, 1.0)
+    truth = partial(time_s, hz, sigma) * levels
+    found = errors(truth.real, truth, (0, 1))
+    assert np.isnan(found.level_db[0, 0]).tolist() == [n in (2, 3, 7) for n in range(10)]
+    assert found.energy[0, 0, 2:4].tolist() == [0, 0]
+    assert found.by_mode(0)[2].level_db is None
+    assert found.by_mode(0)[2].trajectories == 0
+
+
+def test_a_mode_is_told_of_while_it_is_there() -> None:
+    time_s, hz, sigma = ten_modes(2)
+    sigma[5] = 30.0  # 60 dB below the others, which lose 3 dB or so, after a quarter of a second
+    truth = partial(time_s, hz, sigma)
+    found = errors(truth.real + 1e-9, truth, (0, 1), (1, 2))
+    assert found.t60_s[0, 0, 5] == pytest.approx(3 * math.log(10) / 30, rel=1e-6)
+    assert found.level_db[0, 0, 5] == pytest.approx(0, abs=1e-4)
+    assert np.isnan(found.t60_s[0, 1, 5])
+    assert not np.isnan(found.t60_s[0, 1, 4])
+
+
+def test_a_t60_needs_a_decay() -> None:
+    time_s, hz, sigma = ten_modes(1)
+    sigma[0], sigma[1] = 0.1, 0.3  # 0.9 and 2.6 dB a second
+    truth = partial(time_s, hz, sigma)
+    growing = partial(time_s, hz, -sigma).real
+    found = errors(growing, truth, (0, 1))
+    assert np.isnan(found.t60_s[0, 0, 0])
+    assert found.t60_s[0, 0, 1] == pytest.approx(3 * math.log(10) / 0.3)
+    assert np.isnan(found.t60_error_percent[0, 0, 0])
+    assert found.t60_error_percent[0, 0, 1] == math.inf
+    assert found.by_mode(0)[1].t60_error_percent == math.inf
+
+
+def test_predictions_that_are_silent_weak_or_not_numbers() -> None:
+    time_s, hz, sigma = ten_modes(1)
+    truth = partial(time_s, hz, sigma)
+    broken = truth.real.clone()
+    broken[:, :, 0], broken[:, :, 1], broken[:, 2000:, 2] = 0, 0.01 * truth.real[:, :, 1], math.nan
+    broken[:, :, 3] = math.inf
+    found = errors(broken, truth, (0, 0.4), (0.6, 1))
+    assert found.level_db[0, :, 0].tolist() == [-math.inf, -math.inf]
+    assert found.level_db[0, :, 1] == pytest.approx(-40)
+    assert found.level_db[0, 0, 2] == pytest.approx(0, abs=1e-9)
+    assert found.level_db[0, 1, 2] == math.inf
+    assert found.level_db[0, :, 3].tolist() == [math.inf, math.inf]
+    assert np.isnan(found.phase_cycles[0, 1, :4]).all()
+    assert np.isnan(found.cents[0, 0, [0, 1, 3]]).all()
+    assert found.weighted(1).level_db == math.inf
+
+
+def test_silence_has_no_partials() -> None:
+    silence = torch.zeros(2, 400, 10, dtype=torch.float64)
+    found = errors(silence, torch.complex(silence, silence), (0, 0.1))
+    assert np.isnan(found.level_db).all()
+    assert found.weighted(0).level_db is None
+
+
+def test_blocks_join_to_the_whole() -> None:
+    time_s, hz, sigma = ten_modes(1)
+    truth = partial(time_s, hz, sigma)
+    predicted = partial(time_s, 1.001 * hz, sigma).real
+    length = segment_frames(RATE_HZ, LINEAR_HZ[0])
+    blocks = [
+        track_partials(predicted[:, first : first + 7 * length], truth[:, first : first + 7 * length], length)
+        for first in range(0, 4000, 7 * length)
+    ]
+    whole = track_partials(predicted, truth, length)
+    joined = PartialTrack.join(blocks)
+    assert torch.equal(whole.match, joined.match)
+    assert torch.equal(whole.turn, joined.turn)
+    trajectories = PartialErrors.join([errors(predicted, truth, (0, 1))] * 2)
+    assert trajectories.cents.shape == (2, 1, 10)
+
+
+def test_too_short_for_a_segment() -> None:
+    truth = partial(*ten_modes(0.004))
+    assert np.isnan(errors(truth.real, truth, (0, 1)).level_db).all()
+
+
+def test_the_phasors_of_the_linear_string_are_exact() -> None:
+    eigenvalues = STRING.eigenvalues(10)
+    amplitude = torch.linspace(1, 2, 10, dtype=torch.float64)
+    spacing_s = 1 / 16_000
+    expected = amplitude * torch.exp(eigenvalues * torch.linspace(0, 0.1, 50, dtype=torch.float64)[:, None])
+    around = [(expected * torch.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
+    found = phasors(*around, spacing_s, STRING, tension_modulated=False)
+    assert torch.allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_the_phasors_of_a_tense_string_are_circles() -> None:
+    """One mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest."""
+    state = ModalState.at_rest(torch.tensor([[0.0137]]))
+    assert STRING.relative_tension_rise(state.amplitude) == pytest.approx(0.05, abs=0.01)
+    samples = SplittingSolver(STRING, 1, 16_000, tension_modulated=True).solve(state, 4000)
+    around = (samples[:, :-2], samples[:, 1:-1], samples[:, 2:])
+    roundness = []
+    for modulated in (True, False):
+        z = phasors(*around, 1 / 16_000, STRING, tension_modulated=modulated)
+        roundness.append(float(z.imag.norm() / z.real.norm()))
+    assert roundness[0] == pytest.approx(1, abs=0.002)
+    assert roundness[1] > 1.01
+
+
+def test_shapes_must_agree() -> None:
+    with pytest.raises(ValueError, match="differ in shape"):
+        track_partials(torch.zeros(1, 40, 2), torch.zeros(1, 40, 3, dtype=torch.complex128), 20)

@@ -1,0 +1,170 @@
+"""Errors past the horizon of models whose errors are known: the truth itself, the linear string in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor, nn
+
+from engine.models import build_model
+from engine.models.base import Physics, StringModel
+from engine.reference import ModalState, SplittingSolver
+from engine.sine_transform import to_grid, to_modes
+from training.configuration import DatasetConfiguration
+from training.dataset import Dataset, load_dataset
+from training.evaluate import evaluate_model, evaluate_partials, evaluate_past_horizon
+
+DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, count=20, steps=100)
+HORIZON_S = 0.025
+
+
+class Truth(StringModel[tuple[ModalState, int]]):
+    """The solver as a model, louder by `gain`; from the frame `broken` on it is not a number."""
+
+    initialisations: ClassVar = ()
+
+    def __init__(self, data: Dataset, gain: float = 1.0, broken: float = math.inf) -> None:
+        super().__init__()
+        c = data.configuration
+        self.grid_points = c.grid_points
+        self.configuration = SimpleNamespace(input="displacement")
+        self.gain = nn.Parameter(torch.tensor(gain))
+        self._broken, self._scale_m = broken, data.scale_m
+        self._solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated)
+
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        raise NotImplementedError
+
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> tuple[ModalState, int]:
+        assert not self.training
+        modes = to_modes(displacement.double() * self._scale_m, self._solver.modes)
+        return ModalState.at_rest(modes), 0
+
+    def advance(
+        self, state: tuple[ModalState, int], steps: int, readout: Tensor | None = None
+    ) -> tuple[Tensor, tuple[ModalState, int]]:
+        amplitudes, later = self._solver.advance(state[0], steps)
+        frames = to_grid(amplitudes, self.grid_points) / self._scale_m
+        frames = frames if readout is None else frames @ readout.double()
+        frame = state[1] + steps
+        frames[:, max(0, min(steps, int(min(self._broken, 1e9)) - 1 - state[1])) :] = math.nan
+        return (frames * self.gain).float(), (later, frame)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    return load_dataset(DATA, tmp_path_factory.mktemp("cache"))
+
+
+def test_the_truth_has_no_error_to_any_time(data: Dataset) -> None:
+    model = Truth(data)
+    found = evaluate_past_horizon(model, data, "test", 0.5, windows_s=[(0, HORIZON_S), (HORIZON_S, 0.525)])
+    for sums in (found.string, found.sound):
+        assert len(sums.per_frame()[0]) == 2100
+        assert len(sums.per_trajectory()[0]) == 2
+        assert sums.total().rel_mse < 1e-11  # the model is told float32
+    assert found.sound.total().null_depth_db < -110
+    assert all(spectrum.convergence < 1e-5 for spectrum in found.spectra)
+    partials = evaluate_partials(model, data, "test", [(0, HORIZON_S), (HORIZON_S, 0.525)])
+    for errors, most in ((partials.level_db, 1e-3), (partials.phase_cycles, 1e-4), (partials.cents, 1e-2)):
+        assert np.nanmax(np.abs(errors)) < most
+    assert [row.trajectories for row in partials.by_mode(0)] != [0] * 10
+    assert model.training
+
+
+def test_a_gain_is_told(data: Dataset) -> None:
+    model = Truth(data, gain=0.9)
+    found = evaluate_past_horizon(model, data, "validation", 0.1)
+    assert found.string.total().rel_mse == pytest.approx(0.01, rel=1e-4)
+    assert found.string.spread().rel_mse == pytest.approx(0, abs=1e-6)
+    assert found.sound.total().null_depth_db == pytest.approx(-20, abs=1e-3)
+    level_db = evaluate_partials(model, data, "validation", [(0, 0.1)]).level_db
+    assert level_db[~np.isnan(level_db)] == pytest.approx(20 * math.log10(0.9), abs=1e-3)
+
+
+def test_over_the_horizon_it_is_the_figure_of_the_tables(data: Dataset) -> None:
+    model = Truth(data, gain=0.97)
+    table = evaluate_model(model, data, "validation", 60)
+    for seconds in (0.0, 0.1):  # the stored truth, and the simulated one
+        found = evaluate_past_horizon(model, data, "validation", seconds, horizon=60).string
+        assert found.total(60).rel_mse == pytest.approx(table.total().rel_mse, rel=1e-4)
+        assert found.total(60).rel_mae == pytest.approx(table.total().rel_mae, rel=1e-4)
+        assert found.per_frame()[0][:60] == pytest.approx(table.per_frame()[0], rel=1e-4)
+
+
+def test_any_splitting_into_blocks_gives_the_same_errors(data: Dataset) -> None:
+    model = Truth(replace(data, scale_m=1.01 * data.scale_m), gain=0.99)
+    windows_s = [(0, HORIZON_S), (HORIZON_S, 0.1)]
+    whole, parts = (
+        evaluate_past_horizon(model, data, "test", 0.1, windows_s=windows_s, frames_at_once=frames)
+        for frames in (10_000, 37)
+    )
+    for a, b in ((whole.string, parts.string), (whole.sound, parts.sound)):
+        assert b.per_frame()[0] == pytest.approx(a.per_frame()[0], rel=1e-4)
+        assert b.per_trajectory()[1] == pytest.approx(a.per_trajectory()[1], rel=1e-6)
+    assert [s.log_db for s in parts.spectra] == pytest.approx([s.log_db for s in whole.spectra], rel=1e-5)
+    at_once, in_blocks = (
+        evaluate_partials(model, data, "test", windows_s, frames_at_once=frames) for frames in (10_000, 37)
+    )
+    assert np.allclose(at_once.level_db, in_blocks.level_db, rtol=1e-5, equal_nan=True)
+    assert np.allclose(at_once.t60_s, in_blocks.t60_s, rtol=1e-9, equal_nan=True)
+
+
+def test_some_trajectories_and_the_progress(data: Dataset) -> None:
+    told: list[float] = []
+    found = evaluate_past_horizon(Truth(data), data, "validation", 0.05, trajectories=1, report=told.append)
+    assert len(found.string.per_trajectory()[0]) == 1
+    partials = evaluate_partials(Truth(data), data, "validation", [(0, 0.05)], trajectories=1, report=told.append)
+    assert partials.energy.shape == (1, 1, 10)
+    assert told.count(1.0) == 2
+    assert max(told) == 1
+
+
+def test_an_output_that_is_no_number_is_an_infinite_error(data: Dataset) -> None:
+    model = Truth(data, broken=200)
+    windows_s = [(0, HORIZON_S), (0.06, 0.1)]
+    found = evaluate_past_horizon(model, data, "test", 0.1, windows_s=windows_s)
+    assert found.string.total(199).rel_mse < 1e-11
+    assert found.string.total().rel_mse == math.inf
+    assert [math.isfinite(s.convergence) for s in found.spectra] == [True, False]
+    partials = evaluate_partials(model, data, "test", windows_s)
+    assert np.nanmax(np.abs(partials.level_db[:, 0])) < 1e-3
+    assert np.nanmin(partials.level_db[:, 1]) == math.inf
+
+
+def test_windows_are_asked_for(data: Dataset) -> None:
+    with pytest.raises(ValueError, match="at least one window"):
+        evaluate_partials(Truth(data), data, "test", [])
+
+
+def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) -> None:
+    c = replace(DATA, tension_modulated=False)
+    data = load_dataset(c, tmp_path)
+    model = build_model("koopman_integrated")
+    physics = Physics(c.string, c.modes, c.rate_hz, data.scale_m, tension_modulated=False)
+    model.initialise("physics", physics, torch.Generator().manual_seed(0))
+    found = evaluate_past_horizon(model, data, "validation", 10, windows_s=[(0, HORIZON_S), (9, 10)])
+    first, last = found.string.windows(c.rate_hz, [0, HORIZON_S, 9, 10])[::2]
+    assert first.rel_mse < 1e-11
+    assert last.rel_mse < 1e-6  # frequencies are float32: 250 Hz are known to a thousandth of a cycle in 10 s
+    assert found.spectra[1].convergence < 1e-5
+    partials = evaluate_partials(model, data, "validation", [(0, 1), (9, 10)])
+    for errors, most in (
+        (partials.level_db, 1e-4),
+        (partials.phase_cycles, 1e-3),
+        (partials.cents, 1e-3),
+        (partials.t60_error_percent, 0.01),
+    ):
+        assert np.nanmax(np.abs(errors)) < most
+    sigma = c.string.decay_rates(c.modes).numpy()
+    there = ~np.isnan(partials.t60_s[:, 0])
+    expected = np.broadcast_to(3 * math.log(10) / sigma, there.shape)
+    assert there.sum() > 10
+    assert partials.t60_s[:, 0][there] == pytest.approx(expected[there], rel=1e-6)
