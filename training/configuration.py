@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -103,10 +103,23 @@ class TrainingConfiguration:
 
     @property
     def digest(self) -> str:
-        """Of all that determines the run's result; what it is called does not."""
-        plain = {**write(self), "horizon": self.steps}
-        del plain["title"], plain["description"]
+        """Of all that determines the run's result; what it is called does not.
+
+        Fields that have their default are left out, so that one which comes later leaves earlier runs their digest.
+        """
+        plain = {
+            "model": self.model,
+            "model_configuration": write(self.model_configuration),
+            "data": _unlike_default(self.data),
+            "recipe": _unlike_default(self.recipe),
+            "horizon": self.steps,
+        }
         return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
+    defaults = {f.name: f.default for f in fields(value)}
+    return {name: entry for name, entry in write(value).items() if getattr(value, name) != defaults[name]}
 
 
 def load(name_or_path: str) -> TrainingConfiguration:
