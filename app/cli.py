@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import bench, listing, motion, render, training
+from app.commands import bench, evaluation, listing, motion, render, sweep, tables, training
 from app.commands.console import say
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
@@ -60,9 +60,13 @@ for command in (
     motion.compare,
     training.dataset,
     training.train,
-    training.evaluate,
+    sweep.sweep,
+    evaluation.evaluate,
+    tables.table,
 ):
     cli.command()(command)
+cli.add_typer(tables.figure, name="figure")
+cli.add_typer(sweep.results, name="results")
 cli.add_typer(bench.bench, name="bench")
 
 

@@ -157,7 +157,8 @@ def load_preset(path: Path) -> Preset:
             raise PresetError(f"{path}: tensor {unknown[0]!r} is unknown to a {info.model}; get the preset again")
         for name, tensor in expected.items():
             _check_form(path, name, tensor, file.get_slice(name))
-        tensors = {name: file.get_tensor(name) for name in expected}
+        # copies: in the mapped file their alignment follows the header's length, and sums with it by a rounding
+        tensors = {name: file.get_tensor(name).clone() for name in expected}
     for name, tensor in tensors.items():
         _check_finite(path, name, tensor)
     model.load_state_dict(tensors, assign=True)

@@ -7,6 +7,7 @@ bool, int, float, str, Literal, None unions, tuples of one type, string-keyed ma
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import types
 from collections.abc import Mapping
@@ -31,7 +32,7 @@ def read(kind: type[T], data: object, where: str) -> T:
     unknown = sorted(set(data) - set(fields))
     if unknown:
         raise SchemaError(f"{where}: unknown field {unknown[0]!r}; known are {', '.join(fields)}")
-    hints = get_type_hints(kind)
+    hints = _type_hints(kind)
     values = {}
     for name, field in fields.items():
         if name in data:
@@ -44,6 +45,11 @@ def read(kind: type[T], data: object, where: str) -> T:
         raise
     except (ValueError, TypeError) as error:
         raise SchemaError(f"{where}: {error}") from error
+
+
+@functools.cache
+def _type_hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)
 
 
 def write(value: Any) -> Any:

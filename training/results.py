@@ -108,7 +108,7 @@ def read_results(path: Path) -> list[Row]:
     if not lines or not set(lines[0]) <= set(COLUMNS) or "digest" not in lines[0]:
         raise SchemaError(f"{path}: not a results file: its first line must name {', '.join(COLUMNS[:3])}, …")
     columns, *rows = lines
-    return [_parse(dict(zip(columns, row, strict=False)), f"{path}: line {n}") for n, row in enumerate(rows, 2)]
+    return [_parse(columns, row, f"{path}: line {n}") for n, row in enumerate(rows, 2)]
 
 
 def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
@@ -144,9 +144,11 @@ def _text(value: object) -> str:
     return f"{value:.8g}" if isinstance(value, float) else str(value)
 
 
-def _parse(line: dict[str, str], where: str) -> Row:
+def _parse(columns: list[str], line: list[str], where: str) -> Row:
+    if len(line) != len(columns):
+        raise SchemaError(f"{where}: holds {len(line)} values for {len(columns)} columns; restore the file")
     values: dict[str, Any] = {}
-    for name, text in line.items():
+    for name, text in zip(columns, line, strict=True):
         hint = _HINTS[name]
         if hint is str or hint is Status:
             values[name] = text

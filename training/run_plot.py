@@ -31,7 +31,8 @@ def run_figure(log: Path) -> Figure:
     """The figure of `plot_run`."""
     series = read_log(log)
     with style.styled():
-        figure = Figure(figsize=(10, 6.5), layout="constrained")
+        figure = Figure(figsize=(10, 6.5))
+        figure.subplots_adjust(left=0.08, right=0.91, bottom=0.09, top=0.93, hspace=0.08)  # at once, unlike a layout
         errors, rates = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         for place, (name, label) in enumerate(
             (("loss", "loss"), ("rel_mse", "validation rel. MSE"), ("rel_mae", "validation rel. MAE"))
@@ -44,6 +45,7 @@ def run_figure(log: Path) -> Figure:
             errors.legend(loc="upper right")
         _curve(rates, series, "learning_rate", **style.colour(3))
         rates.set_ylim(bottom=0)
+        rates.ticklabel_format(axis="y", style="sci", scilimits=(0, 0))
         rates.set_ylabel("learning rate", color=style.COLOURS[3])
         rates.set_xlabel("epoch")
         horizon = rates.twinx()

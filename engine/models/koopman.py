@@ -35,7 +35,6 @@ from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 from engine.sine_transform import analysis_matrix, synthesis_matrix
 
-
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
 STRAIGHT = 4.0  # in the data's deviations: where "physics" holds the units, so that most plucks leave them straight
 SHARPEST = 0.05  # "physics": share by which the strongest plucks raise a mode's frequency

@@ -184,7 +184,9 @@ class KoopmanVar(DiagonalModel):
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         analysis = analysis_matrix(points, modes).T[torch.arange(n) % modes]
-        self.encoder.weight.copy_(torch.cat(linear_string_encoder(self.configuration.input, analysis, log_eigenvalues)))
+        self.encoder.weight.copy_(
+            torch.cat(linear_string_encoder(self.configuration.input, analysis, log_eigenvalues))
+        )
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
         self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T

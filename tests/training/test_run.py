@@ -76,7 +76,8 @@ def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
     whole, short, quarters = sums.total(), sums.total(400), sums.windows(4000, [0.105 * q / 4 for q in range(5)])
     found = [row.rel_mse, row.rel_mae, row.rel_mse_400, row.rel_mae_400, row.rel_mse_q1, row.rel_mae_q4]
     assert found == pytest.approx(
-        [whole.rel_mse, whole.rel_mae, short.rel_mse, short.rel_mae, quarters[0].rel_mse, quarters[3].rel_mae], rel=1e-4
+        [whole.rel_mse, whole.rel_mae, short.rel_mse, short.rel_mae, quarters[0].rel_mse, quarters[3].rel_mae],
+        rel=1e-4,
     )
     test = evaluate_model(preset.model, dataset, "test", 420).total()
     assert (row.test_rel_mse, row.test_rel_mae) == pytest.approx((test.rel_mse, test.rel_mae), rel=1e-4)

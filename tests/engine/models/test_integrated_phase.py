@@ -255,7 +255,9 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
     for strength in (1.0, 0.5):
         amplitudes = torch.zeros(1, 10, dtype=torch.float64)
         amplitudes[0, 0], amplitudes[0, high] = 8e-3 * strength, 1e-5
-        truth = SplittingSolver(string, 10, rate_hz, tension_modulated=True).solve(ModalState.at_rest(amplitudes), steps)
+        truth = SplittingSolver(string, 10, rate_hz, tension_modulated=True).solve(
+            ModalState.at_rest(amplitudes), steps
+        )
         for modulation in errors:
             sizes = IntegratedPhaseConfiguration(state_size=10, modulation=modulation)
             model = KoopmanIntegrated(sizes).double()

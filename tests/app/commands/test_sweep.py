@@ -1,0 +1,244 @@
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from app.commands import sweep as command
+from app.commands.sweep import Board
+from engine.metrics import RelativeError
+from training.fit import Progress
+from training.plan import load_plan
+from training.results import Row, add_rows, read_results
+from training.workers import Ended, Event, Layout, Noted, Progressed, Task
+
+PLAN = """
+description = "Two runs."
+[data]
+count = 10
+steps = 60
+[[block]]
+models = ["koopman_var", "koopman"]
+strings = ["linear"]
+initials = ["noise"]
+rates_hz = [4000]
+horizons = [60]
+"""
+NAMES = ["nylon_linear_noise_4k_koopman_var_60", "nylon_linear_noise_4k_koopman_60"]
+
+
+def row_of(name: str, digest: str = "", **changes: Any) -> Row:
+    fields = {"status": "done", "model": "koopman", "string": "linear", "initial": "noise", "rate_hz": 4000}
+    fields |= {"horizon": 60, "recipe": "ours", "seed": 0, "rel_mae": 0.5, "seconds": 8.0}
+    return Row(digest or name, name, **({**fields, "finished": "2026-01-01T00:00:00Z"} | changes))
+
+
+def progress_of(
+    name: str, seconds: float, seconds_left: float, validation: RelativeError | None = None
+) -> Progressed:
+    return Progressed(name, Progress(1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left), "here", 1)
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    path = tmp_path / "trial.toml"
+    path.write_text(PLAN, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def words(plan: Path, tmp_path: Path) -> list[Any]:
+    return ["sweep", plan, "--runs", tmp_path / "runs", "--device", "cpu"]
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Layout]]:
+    """Makes workers that train nothing: a task ends as a function of its name says."""
+
+    def make(outcome: Callable[[str], Row | str]) -> list[Layout]:
+        layouts: list[Layout] = []
+
+        class Script:
+            description = "a script"
+
+            def __init__(self) -> None:
+                self.events: list[Event] = []
+
+            def capacity(self) -> int:
+                return 1
+
+            def start(self, task: Task) -> None:
+                found = outcome(task.name)
+                self.events += [Noted(task.name, "waits"), progress_of(task.name, 1, 3)]
+                if isinstance(found, str):
+                    self.events.append(Ended(task.name, None, found))
+                else:
+                    self.events.append(Ended(task.name, replace(found, digest=task.digest)))
+
+            def next(self, timeout_s: float) -> Event | None:
+                return self.events.pop(0)
+
+        @contextmanager
+        def local_workers(layout: Layout) -> Iterator[Script]:
+            layouts.append(layout)
+            yield Script()
+
+        monkeypatch.setattr("training.workers.local_workers", local_workers)
+        return layouts
+
+    return make
+
+
+def test_a_sweep_ends_with_its_rows(run, words: list[Any], tmp_path: Path, script) -> None:
+    layouts = script(row_of)
+    found = run(*words, "--workers", "3", "--threads", "2")
+    assert found.status == 0
+    assert (len(layouts[0].environments), layouts[0].threads) == (2, 2)  # not more than runs
+    file = tmp_path / "runs" / "trial" / "results.csv"  # a trial's own
+    assert [row.name for row in read_results(file)] == sorted(NAMES)
+    lines = found.err.splitlines()
+    assert lines[0] == f"learned-strings: trial: 2 of 2 runs to do; rows go to {file}"
+    assert lines[1] == "learned-strings: on a script"
+    assert lines[2] == f"learned-strings: {NAMES[0]}: waits"
+    assert f"{NAMES[0]}: done, rel. MAE 0.5, 8.0 s (1 done, 0 running, 1 waiting; about 8.0 s left)" in lines[3]
+    assert [name in found.out for name in NAMES] == [True, True]
+
+    again = run(*words, "--json")
+    assert [row["name"] for row in json.loads(again.out)] == sorted(NAMES)
+    assert again.err == f"learned-strings: trial: 0 of 2 runs to do; rows go to {file}\n"
+
+
+def test_failed_runs_are_the_commands_failure_after_all_else_is_done(run, words: list[Any], script) -> None:
+    script(lambda name: "OSError: no space" if name == NAMES[0] else row_of(name))
+    found = run(*words, "--retries", "0")
+    assert found.status == 1
+    assert found.err.splitlines()[-1] == (
+        f"learned-strings: 1 of 2 runs failed: {NAMES[0]}; their rows say why, and the same command tries them again"
+    )
+    assert f"{NAMES[0]}: failed, OSError: no space" in found.err
+    assert "done" in found.out
+
+
+def test_an_interrupted_sweep_goes_on(run, words: list[Any], tmp_path: Path, script) -> None:
+    def interrupted(name: str) -> Row:
+        if name == NAMES[1]:
+            raise KeyboardInterrupt
+        return row_of(name)
+
+    script(interrupted)
+    found = run(*words)
+    assert found.status == 130
+    assert "stopped; the same command goes on" in found.err
+    begun = []
+    script(lambda name: begun.append(name) or row_of(name))
+    assert run(*words).status == 0
+    assert begun == NAMES[1:]
+
+
+def test_a_dry_run_lists_the_order_and_what_is_finished(run, words: list[Any], tmp_path: Path, plan: Path) -> None:
+    file = tmp_path / "results.csv"
+    add_rows(file, [row_of(NAMES[1], load_plan(str(plan)).runs[1].digest)])
+    before = sorted(tmp_path.rglob("*"))
+    found = run(*words, "--dry-run", "--results", file)
+    assert found.status == 0
+    assert found.out.index(NAMES[0]) < found.out.index(NAMES[1])
+    assert "1 of 2 runs were never done" in found.out
+    facts = json.loads(run(*words, "--dry-run", "--results", file, "--json").out)
+    assert facts == [
+        {"name": NAMES[0], "status": "", "rel_mae": None},
+        {"name": NAMES[1], "status": "done", "rel_mae": 0.5},
+    ]
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_plan_that_is_not_there_is_told(run) -> None:
+    assert "no plan 'nothing'; give a .toml file or one of: tables, tiny" in run("sweep", "nothing").failure
+
+
+def test_an_unknown_name_in_a_plan_is_told(run, words: list[Any], plan: Path) -> None:
+    plan.write_text(PLAN.replace('"koopman"', '"koopmann"'), encoding="utf-8")
+    assert f"{plan}.block[0]: model 'koopmann' is not one of" in run(*words).failure
+
+
+def test_a_results_file_that_is_none_is_told(run, words: list[Any], plan: Path) -> None:
+    assert "not a results file" in run(*words, "--results", plan).failure
+
+
+def test_a_scheduler_that_is_not_there_is_told(run, words: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("training.workers.CONNECT_S", 0.2)
+    found = run(*words, "--scheduler", "tcp://127.0.0.1:9")
+    assert found.status == 1
+    assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in found.err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("option", ["--workers", "--threads", "--per-device"])
+def test_no_workers_are_bad_usage(run, words: list[Any], option: str) -> None:
+    assert option in run(*words, option, "0").usage
+
+
+def test_files_of_other_machines_are_merged(run, tmp_path: Path) -> None:
+    here, there, elsewhere = (tmp_path / f"{name}.csv" for name in ("here", "there", "elsewhere"))
+    add_rows(here, [row_of("a")])
+    add_rows(there, [row_of("a", rel_mae=0.25, finished="2026-01-02T00:00:00Z"), row_of("b")])
+    add_rows(elsewhere, [row_of("a", status="failed", rel_mae=None, finished="2026-01-03T00:00:00Z"), row_of("c")])
+    found = run("results", "merge", there, elsewhere, "--results", here)
+    assert (found.status, found.out) == (0, f"{here}: 3 rows, 2 of them new\n")
+    assert [(row.name, row.rel_mae) for row in read_results(here)] == [("a", 0.25), ("b", 0.5), ("c", 0.5)]
+
+    before = here.read_bytes()
+    there.write_text("something else\n", encoding="utf-8")
+    assert f"{there}: not a results file" in run("results", "merge", elsewhere, there, "--results", here).failure
+    assert "does not exist" in run("results", "merge", tmp_path / "no.csv", "--results", here).usage
+    assert here.read_bytes() == before
+
+
+def test_the_time_left_follows_what_is_known() -> None:
+    board = Board(5)
+    assert board.summary(2) == "0 done, 0 running, 5 waiting"
+    for name in ("a", "b"):
+        board.started(SimpleNamespace(name=name))
+    assert board.seconds_left(2) is None
+    board.progressed(progress_of("a", 10, 30))
+    assert board.seconds_left(2) == (30 + 4 * 40) / 2
+    board.finished(row_of("a", seconds=20.0))
+    assert board.seconds_left(2) == 4 * 20 / 2
+    board.finished(row_of("b", status="diverged", seconds=None))
+    assert board.summary(2) == "1 done, 1 diverged, 0 running, 3 waiting; about 30.0 s left"
+    board.progressed(progress_of("a", 1, 1))  # that came late
+    assert board.running == {}
+
+
+def test_the_picture_shows_what_runs() -> None:
+    from rich.console import Console
+
+    watch = command._Live(Board(3), 2)
+    for name in ("a", "b"):
+        watch.started(SimpleNamespace(name=name))
+    watch.progressed(progress_of("b", 10, 30, RelativeError(0.25, 0.125)))
+    watch.progressed(progress_of("b", 20, 20))
+    shown = io.StringIO()
+    Console(width=100, file=shown).print(watch.picture())
+    lines = [line.split() for line in shown.getvalue().splitlines()]
+    assert [line for line in lines if line and line[0] in "ab"] == [
+        ["a", "-", "-", "-", "-", "-"],
+        ["b", "1/4", "60", "0.5", "0.125", "20.0", "s"],
+    ]
+    assert "2 running, 1 waiting" in shown.getvalue()
+
+
+def test_a_log_tells_of_a_long_run_now_and_then(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    watch = command._Lines(Board(1), 1)
+    watch.started(SimpleNamespace(name="a"))
+    watch.progressed(progress_of("a", 1, 3))
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(command, "LINE_EVERY_S", 0)
+    watch.progressed(progress_of("a", 1, 3, RelativeError(0.25, 0.125)))
+    told = "learned-strings: a: epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125, 3.0 s left\n"
+    assert capsys.readouterr().err == told

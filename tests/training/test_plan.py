@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from engine.models import MODELS
+from engine.schema import SchemaError
+from training.plan import load_plan, plan_names
+
+PLAN = """
+description = "Two blocks."
+
+[[block]]
+models = ["koopman_var", "dmd"]
+strings = ["linear", "nonlinear"]
+initials = ["noise"]
+rates_hz = [4000]
+horizons = [4000, 400]
+seeds = [0, 1]
+
+[[block]]
+models = ["lru", "dmd"]
+strings = ["nonlinear"]
+initials = ["noise", "gaussian"]
+rates_hz = [4000]
+horizons = [400]
+recipe = "ours"
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "plan.toml"
+    file.write_text(PLAN, encoding="utf-8")
+    return file
+
+
+def change(path: Path, old: str, new: str) -> str:
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return str(path)
+
+
+def test_the_order_is_of_value(path: Path) -> None:
+    """Block, seed, the non-linear string first, the short horizon first, then as named; each run once."""
+    plan = load_plan(str(path))
+    assert [run.name.removeprefix("nylon_") for run in plan.runs] == [
+        "nonlinear_noise_4k_koopman_var_400",
+        "nonlinear_noise_4k_dmd_400",
+        "nonlinear_noise_4k_koopman_var",
+        "nonlinear_noise_4k_dmd",
+        "linear_noise_4k_koopman_var_400",
+        "linear_noise_4k_dmd_400",
+        "linear_noise_4k_koopman_var",
+        "linear_noise_4k_dmd",
+        "nonlinear_noise_4k_koopman_var_400_seed1",
+        "nonlinear_noise_4k_dmd_400_seed1",
+        "nonlinear_noise_4k_koopman_var_seed1",
+        "nonlinear_noise_4k_dmd_seed1",
+        "linear_noise_4k_koopman_var_400_seed1",
+        "linear_noise_4k_dmd_400_seed1",
+        "linear_noise_4k_koopman_var_seed1",
+        "linear_noise_4k_dmd_seed1",
+        "nonlinear_noise_4k_lru_400",
+        "nonlinear_gaussian_4k_lru_400",
+        "nonlinear_gaussian_4k_dmd_400",  # dmd on noise is there already
+    ]
+    assert (plan.name, plan.trial) == ("plan", False)
+    assert plan.runs[0].configuration.horizon == 400
+    assert plan.runs[8].configuration.recipe.seed == 1
+
+
+def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> None:
+    real = load_plan(str(path))
+    trial = load_plan(change(path, "[[block]]", "[data]\ncount = 20\n[recipe_fields]\nepochs = 3\n\n[[block]]"))
+    assert trial.trial
+    assert [run.name for run in trial.runs] == [run.name for run in real.runs]
+    assert not {run.digest for run in trial.runs} & {run.digest for run in real.runs}
+    assert {(run.configuration.data.count, run.configuration.recipe.epochs) for run in trial.runs} == {(20, 3)}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"koopman_var"', '"koopmann"', "block[0]: model 'koopmann' is not one of dmd, koopman"),
+        ('"noise"', '"plucked"', "block[0].initials[0]: 'plucked' is not one of 'gaussian', 'noise'"),
+        ('"linear"', '"curved"', "block[0].strings[0]: 'curved' is not one of 'linear', 'nonlinear'"),
+        ("[4000]", "[8000]", "block[0]: rate_hz must be one of 4000, 16000"),
+        ("4000, 400]", "0]", "block[0]: horizon must be at least 1 frame"),
+        ("4000, 400]", "400_000]", "horizon must lie in 1 … 4000"),
+        ("[0, 1]", "[-1]", "block[0]: seed must be at least 0"),
+        ("[0, 1]", "[]", "block[0]: seeds is empty"),
+        ('recipe = "ours"', 'recipe = "theirs"', "block[1]: recipe 'theirs' is not one of ours, paper"),
+        ("seeds", "seed", "block[0]: unknown field 'seed'; known are models"),
+        ("models =", "model =", "block[0]: unknown field 'model'"),
+        ("[[block]]", "[data]\ncuont = 1\n[[block]]", "data: unknown field 'cuont'"),
+        ("[[block]]", "[recipe_fields]\nepoch = 1\n[[block]]", "unknown field 'epoch'"),
+        ("[[block]]", "[recipe_fields]\nseed = 1\n[[block]]", "recipe_fields cannot set the seed"),
+        ("description", "title", "unknown field 'title'"),
+        ("[[block]]", "[block", "not valid TOML"),
+    ],
+)
+def test_what_cannot_be_is_told_with_its_place(path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(SchemaError) as error:
+        load_plan(change(path, old, new))
+    assert str(error.value).startswith(str(path))
+    assert message in str(error.value)
+
+
+def test_a_plan_without_blocks_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "empty.toml"
+    path.write_text('description = "Nothing."\nblock = []\n', encoding="utf-8")
+    with pytest.raises(SchemaError, match=r"there is no \[\[block\]\]"):
+        load_plan(str(path))
+
+
+@pytest.mark.parametrize("name", ["nothing", "nothing.toml"])
+def test_a_plan_that_is_not_there_is_told_with_those_that_are(name: str) -> None:
+    with pytest.raises(SchemaError, match=f"no plan '{name}'; give a .toml file or one of: tables, tiny"):
+        load_plan(name)
+
+
+def test_committed_plans_are_whole() -> None:
+    assert plan_names() == ["tables", "tiny"]
+    assert load_plan("tiny").trial
+    tables = load_plan("tables")
+    assert not tables.trial
+    # the paper's: eight data sets, two horizons, five seeds; the Fourier models over 400 frames alone, one DMD
+    counts = Counter((run.cell.model, run.cell.recipe) for run in tables.runs)
+    fourier = dict.fromkeys(["fgru", "frnn"], 8 * 5)
+    paper = dict.fromkeys(["koopman", "koopman_var", "lru", "s5"], 8 * 2 * 5) | fourier
+    ours = paper | {"dmd": 8 * 2, "koopman_integrated": 8 * 2 * 5}
+    assert ours.keys() == MODELS.keys()
+    assert counts == Counter(
+        {(model, "ours"): n for model, n in ours.items()} | {(model, "paper"): n for model, n in paper.items()}
+    )
+    # one seed of ours everywhere before two anywhere
+    seeds = [run.cell.seed for run in tables.runs if run.cell.recipe == "ours"]
+    assert seeds.index(1) == seeds.count(0)

@@ -1,0 +1,180 @@
+from __future__ import annotations
+
+import errno
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from filelock import FileLock
+
+from engine.schema import SchemaError
+from training.results import COLUMNS, Row, add_rows, read_results
+
+
+def row(digest: str = "a", **changes: Any) -> Row:
+    fields: dict[str, Any] = {
+        "digest": digest,
+        "name": f"run_{digest}",
+        "status": "done",
+        "model": "koopman",
+        "string": "linear",
+        "initial": "noise",
+        "rate_hz": 4000,
+        "horizon": 400,
+        "recipe": "ours",
+        "seed": 0,
+        "rel_mae": 0.125,
+        "finished": "2026-01-01T00:00:00Z",
+    }
+    return Row(**(fields | changes))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "folder" / "results.csv"
+
+
+def test_rows_come_back_as_they_were(path: Path) -> None:
+    rows = [
+        row("a", epochs=3, seconds=1.5, rel_mse_q4=1e-12),
+        row("b", status="diverged", rel_mae=None, message='the loss is nan, "too big"'),
+        row("c", status="failed", rel_mae=None, message="größer, 2 lines\nand a comma"),
+    ]
+    assert read_results(path) == []
+    assert add_rows(path, rows) == rows
+    assert read_results(path) == rows
+    assert path.read_text(encoding="utf-8").splitlines()[0] == ",".join(COLUMNS)
+
+
+def test_a_float_keeps_eight_digits(path: Path) -> None:
+    add_rows(path, [row(rel_mae=1 / 3, rel_mse=1.23456789e-7)])
+    assert read_results(path) == [row(rel_mae=0.33333333, rel_mse=1.2345679e-7)]
+
+
+def test_the_order_of_adding_does_not_matter(tmp_path: Path) -> None:
+    rows = [row(digest, finished=f"2026-01-0{day}T00:00:00Z") for day, digest in enumerate("abcab", 1)]
+    for number, order in enumerate([rows, rows[::-1], rows[2:] + rows[:2]]):
+        for each in order:
+            add_rows(tmp_path / f"{number}.csv", [each])
+    texts = {(tmp_path / f"{number}.csv").read_bytes() for number in range(3)}
+    assert len(texts) == 1
+    found = read_results(tmp_path / "0.csv")
+    assert [(r.digest, r.finished[:10]) for r in found] == [
+        ("a", "2026-01-04"),
+        ("b", "2026-01-05"),
+        ("c", "2026-01-03"),
+    ]
+
+
+def test_what_is_done_is_replaced_by_no_failure(path: Path) -> None:
+    done = row()
+    failed = replace(done, status="failed", rel_mae=None, message="no memory", finished="2027-01-01T00:00:00Z")
+    assert add_rows(path, [failed]) == [failed]
+    assert add_rows(path, [done]) == [done]
+    assert add_rows(path, [failed]) == [done]
+
+
+def test_nothing_added_changes_nothing(path: Path) -> None:
+    add_rows(path, [row("b"), row("a")])
+    before = path.read_bytes()
+    add_rows(path, [])
+    add_rows(path, [row("a")])
+    assert path.read_bytes() == before
+
+
+def test_many_writers_lose_no_row(path: Path) -> None:
+    def write(part: int) -> None:
+        for number in range(5):
+            add_rows(path, [row(f"{part}{number}")])
+
+    threads = [threading.Thread(target=write, args=[part]) for part in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {r.digest for r in read_results(path)} == {f"{part}{number}" for part in range(4) for number in range(5)}
+
+
+def test_a_file_that_another_holds_is_waited_for(path: Path) -> None:
+    add_rows(path, [row("a")])
+    writer = threading.Thread(target=add_rows, args=[path, [row("b")]])
+    with FileLock(f"{path}.lock"):
+        writer.start()
+        writer.join(timeout=0.2)
+        assert writer.is_alive()
+        assert [r.digest for r in read_results(path)] == ["a"]
+    writer.join()
+    assert [r.digest for r in read_results(path)] == ["a", "b"]
+
+
+def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    add_rows(path, [row("a")])
+    before = path.read_bytes()
+
+    class FullDisk:
+        def __init__(self, file: Any, **options: Any) -> None:
+            self._file = file
+
+        def writerow(self, line: Any) -> None:
+            self._file.write("digest")
+
+        def writerows(self, lines: Any) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    with monkeypatch.context() as patched:
+        patched.setattr("training.results.csv.writer", FullDisk)
+        with pytest.raises(OSError, match="No space left"):
+            add_rows(path, [row("b")])
+    assert path.read_bytes() == before
+    assert {file.name for file in path.parent.iterdir()} <= {path.name, f"{path.name}.lock"}
+    add_rows(path, [row("b")])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not a results file"),
+        ("a,b\n1,2\n", "not a results file"),
+        ("name,status\nx,done\n", "not a results file"),
+        ("digest,name,colour\nx,y,red\n", "not a results file"),  # of a later version
+        ("digest,name\nx,y\n", "line 2: field 'status' is missing"),
+        (b"\xff\xfe\x00", "not a CSV file"),
+    ],
+)
+def test_what_is_no_results_file_is_refused_and_left_alone(path: Path, text: str | bytes, message: str) -> None:
+    path.parent.mkdir()
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    before = path.read_bytes()
+    for act in (lambda: read_results(path), lambda: add_rows(path, [row()])):
+        with pytest.raises(SchemaError, match=message) as error:
+            act()
+        assert str(path) in str(error.value)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0.125", "0.1.25", "line 3, column rel_mae: '0.1.25' is not a number"),
+        ("0.125", "nan", "line 3.rel_mae: must be a finite number"),
+        (",done,", ",perhaps,", "line 3.status: 'perhaps' is not one of 'done', 'diverged', 'failed'"),
+        (",4000,", ",4 kHz,", "line 3, column rate_hz: '4 kHz' is not a number"),
+    ],
+)
+def test_a_wrong_value_is_told_with_its_line_and_column(path: Path, old: str, new: str, message: str) -> None:
+    add_rows(path, [row("a", rel_mae=0.5), row("b")])
+    first, second, third = path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join([first, second, third.replace(old, new)]), encoding="utf-8")
+    with pytest.raises(SchemaError) as error:
+        read_results(path)
+    assert f"{path}: {message}" in str(error.value)
+
+
+def test_a_file_of_an_earlier_version_lacks_columns(path: Path) -> None:
+    add_rows(path, [row(rel_mae=None)])
+    lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    kept = [place for place, name in enumerate(COLUMNS) if name not in ("rel_mae", "hardware")]
+    path.write_text("\n".join(",".join(line[place] for place in kept) for line in lines), encoding="utf-8")
+    assert read_results(path) == [row(rel_mae=None)]

@@ -1,0 +1,123 @@
+"""What a sweep runs, as committed data: `training/plans/NAME.toml`.
+
+Blocks stand in the order of their value. Within one the seeds come first, so that every cell is there once before any
+is there twice; then the non-linear string before the linear one, and the short horizon before the long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from engine.schema import SchemaError, read
+from training.cell import RECIPE, Cell, Initial, configuration_of
+from training.configuration import TrainingConfiguration, read_toml
+
+PLANS = Path(__file__).parent / "plans"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cells: the product of what is listed.
+
+    Attributes:
+        horizons: frames.
+    """
+
+    models: tuple[str, ...]
+    strings: tuple[Literal["linear", "nonlinear"], ...]
+    initials: tuple[Initial, ...]
+    rates_hz: tuple[int, ...]
+    horizons: tuple[int, ...]
+    seeds: tuple[int, ...] = (0,)
+    recipe: str = RECIPE
+
+    def __post_init__(self) -> None:
+        for name in ("models", "strings", "initials", "rates_hz", "horizons", "seeds"):
+            if not getattr(self, name):
+                raise ValueError(f"{name} is empty; name at least one, or remove the block")
+        list(self.cells())  # a cell that cannot be is told here
+
+    def cells(self) -> Iterator[Cell]:
+        """In order of value; see the module."""
+        for seed in self.seeds:
+            for string in sorted(self.strings, reverse=True):  # non-linear, linear
+                for horizon in sorted(self.horizons):
+                    for model in self.models:
+                        for initial in self.initials:
+                            for rate_hz in self.rates_hz:
+                                yield Cell(model, string == "nonlinear", initial, rate_hz, horizon, self.recipe, seed)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A cell and the configuration that fills it."""
+
+    cell: Cell
+    configuration: TrainingConfiguration
+
+    @property
+    def name(self) -> str:
+        return self.cell.name
+
+    @property
+    def digest(self) -> str:
+        return self.configuration.digest
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Runs in order of value, each once.
+
+    Attributes:
+        name: the file's.
+        trial: whether data or recipe differ from what the cells' names promise; its runs and rows are kept apart.
+    """
+
+    name: str
+    description: str
+    runs: tuple[Run, ...]
+    trial: bool
+
+
+@dataclass(frozen=True)
+class _File:
+    description: str
+    block: tuple[Block, ...]
+    data: dict[str, Any] = field(default_factory=dict)  # fields of the data that differ from the protocol
+    recipe_fields: dict[str, Any] = field(default_factory=dict)  # … and from the recipe
+
+    def __post_init__(self) -> None:
+        if not self.block:
+            raise ValueError("there is no [[block]]; a plan needs at least one")
+        if "seed" in self.recipe_fields:
+            raise ValueError("recipe_fields cannot set the seed; a block's seeds do")
+
+
+def load_plan(name_or_path: str) -> Plan:
+    """A committed plan by its file's name, or any TOML file by path.
+
+    Raises:
+        SchemaError: not found, not TOML, or a field is wrong; the message names the file and the field.
+        OSError: it cannot be read.
+    """
+    path = Path(name_or_path)
+    if not path.suffix:
+        path = PLANS / f"{name_or_path}.toml"
+    if not path.is_file():
+        raise SchemaError(f"no plan {name_or_path!r}; give a .toml file or one of: {', '.join(plan_names())}")
+    file = read(_File, read_toml(path), str(path))
+    runs: dict[str, Run] = {}
+    for cell in (cell for block in file.block for cell in block.cells()):
+        try:
+            run = Run(cell, configuration_of(cell, file.data, file.recipe_fields))
+        except SchemaError as error:
+            raise SchemaError(f"{path}: {error}") from error
+        runs.setdefault(run.digest, run)
+    return Plan(path.stem, file.description, tuple(runs.values()), bool(file.data or file.recipe_fields))
+
+
+def plan_names() -> list[str]:
+    return sorted(path.stem for path in PLANS.glob("*.toml"))

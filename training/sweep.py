@@ -1,0 +1,161 @@
+"""A sweep: the runs of a plan on workers, their rows in the results file.
+
+Only this process writes the file, a row as soon as its run has ended. The same call goes on after an interruption:
+finished runs are skipped, failed ones tried again, unfinished ones continued from their checkpoints.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from engine.schema import write
+from training.plan import Plan, Run
+from training.provenance import now
+from training.results import RESULTS, Row, add_rows
+from training.run import default_runs
+from training.workers import Ended, Noted, Progressed, Task, Workers
+
+POLL_S = 1.0  # for workers that came or went
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a plan is run.
+
+    Attributes:
+        results: the file; None: the plan's own, see `results_of`.
+        runs, cache: folders, as the workers see them; None: their defaults.
+        retries: further tries after a run has failed.
+    """
+
+    results: Path | None = None
+    runs: Path | None = None
+    cache: Path | None = None
+    device: str = "cpu"
+    threads: int | None = None
+    retries: int = 1
+    checkpoint_every_s: float | None = None
+
+    def task(self, plan: Plan, run: Run) -> Task:
+        return Task(
+            name=run.name,
+            recipe=run.cell.recipe,
+            configuration=write(run.configuration),
+            digest=run.digest,
+            runs=str(self.runs.absolute()) if self.runs else None,
+            group=group_of(plan),
+            cache=str(self.cache.absolute()) if self.cache else None,
+            device=self.device,
+            threads=self.threads,
+            checkpoint_every_s=self.checkpoint_every_s,
+        )
+
+
+class Watch(Protocol):
+    """Is told what happens in a sweep."""
+
+    def started(self, run: Run) -> None:
+        """A run was handed to the workers."""
+
+    def progressed(self, event: Progressed) -> None:
+        """An epoch is over."""
+
+    def noted(self, event: Noted) -> None:
+        """Something worth a line."""
+
+    def finished(self, row: Row) -> None:
+        """A run has ended, and its row is in the results file."""
+
+
+class Unwatched:
+    """A `Watch` that says nothing."""
+
+    def started(self, run: Run) -> None: ...
+    def progressed(self, event: Progressed) -> None: ...
+    def noted(self, event: Noted) -> None: ...
+    def finished(self, row: Row) -> None: ...
+
+
+def group_of(plan: Plan) -> str:
+    """A trial's runs have cells' names and are other runs: they lie in a folder of their own."""
+    return plan.name if plan.trial else ""
+
+
+def results_of(plan: Plan, runs: Path | None = None) -> Path:
+    """The file that a plan's rows go to: the committed one, for a trial one beside its runs."""
+    return (runs or default_runs()) / group_of(plan) / RESULTS.name if plan.trial else RESULTS
+
+
+def is_finished(row: Row | None) -> bool:
+    """Whether a run needs no further work. One that diverged would do so again."""
+    return row is not None and row.status in ("done", "diverged")
+
+
+def unfinished(plan: Plan, rows: Iterable[Row]) -> list[Run]:
+    """The runs that are still to be done, in the plan's order."""
+    known = {row.digest: row for row in rows}
+    return [run for run in plan.runs if not is_finished(known.get(run.digest))]
+
+
+def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = None) -> list[Row]:
+    """Does what is unfinished of a plan, the most valuable first.
+
+    Returns:
+        The rows of the plan's runs, in its order.
+
+    Raises:
+        SchemaError, OSError: the results file cannot be read or written. No run is lost for that: rows lie in the
+            runs' folders too.
+        WorkersError: the workers are gone.
+    """
+    watch = watch or Unwatched()
+    file = options.results or results_of(plan, options.runs)
+    rows = {row.digest: row for row in add_rows(file, ())}  # a file that cannot be written is told before the work
+    waiting = deque(unfinished(plan, rows.values()))
+    running: dict[str, Run] = {}
+    failures: Counter[str] = Counter()
+    while waiting or running:
+        while waiting and len(running) < workers.capacity():
+            run = waiting.popleft()
+            if not is_finished(rows.get(run.digest)):  # another machine's row may have come in meanwhile
+                running[run.name] = run
+                workers.start(options.task(plan, run))
+                watch.started(run)
+        event = workers.next(POLL_S) if running else None
+        if isinstance(event, Progressed):
+            watch.progressed(event)
+        elif isinstance(event, Noted):
+            watch.noted(event)
+        elif isinstance(event, Ended):
+            run = running.pop(event.name)
+            failures[run.name] += event.row is None
+            if event.row is None and not event.final and failures[run.name] <= options.retries:
+                watch.noted(Noted(run.name, f"failed and is tried again ({event.error})"))
+                waiting.appendleft(run)
+                continue
+            row = event.row or _failed(run, event.error)
+            rows.update((other.digest, other) for other in add_rows(file, [row]))
+            watch.finished(row)
+    return [rows[run.digest] for run in plan.runs]
+
+
+def _failed(run: Run, error: str) -> Row:
+    configuration = run.configuration
+    return Row(
+        digest=run.digest,
+        name=run.name,
+        status="failed",
+        model=run.cell.model,
+        string=run.cell.string_kind,
+        initial=run.cell.initial,
+        rate_hz=run.cell.rate_hz,
+        horizon=configuration.steps,
+        recipe=run.cell.recipe,
+        seed=run.cell.seed,
+        finished=now(),
+        message=error,
+    )
