@@ -32,7 +32,7 @@ def read(kind: type[T], data: object, where: str) -> T:
     unknown = sorted(set(data) - set(fields))
     if unknown:
         raise SchemaError(f"{where}: unknown field {unknown[0]!r}; known are {', '.join(fields)}")
-    hints = _type_hints(kind)
+    hints = _type_hints(kind)  # type: ignore[arg-type]
     values = {}
     for name, field in fields.items():
         if name in data:
