@@ -1,10 +1,12 @@
 """Initial displacements: the paper's protocol (Gaussian, noise) and a musician's plucks.
 
 All of them are at rest (zero velocity). Positions and widths are in units of the string's length,
-displacement in metres. The two random draws follow §4.1 of the paper and its authors' ranges.
+displacement in metres. The random Gaussians and the noise follow §4.1 of the paper and its authors' ranges.
 """
 
 from __future__ import annotations
+
+import math
 
 import torch
 from torch import Tensor
@@ -14,6 +16,9 @@ from engine.sine_transform import grid_positions
 CENTRE_RANGE = (0.3, 0.7)  # of a random Gaussian, in lengths
 WIDTH_RANGE = (0.02, 0.1)  # of a random Gaussian, in lengths
 PEAK_RANGE_M = (1e-3, 1e-2)  # of both random kinds
+PLUCK_POSITION_RANGE = (0.05, 0.95)  # of a random pluck, which may have any shape
+PLUCK_WIDTH_RANGE = (0.03, 0.3)
+PLUCK_PEAK_RANGE_M = (5e-4, 1e-2)
 
 
 def gaussian(position: float, width: float, peak_m: float, grid_points: int) -> Tensor:
@@ -53,7 +58,29 @@ def draw_noise(count: int, grid_points: int, generator: torch.Generator) -> Tens
     return raw / raw.amax(dim=1, keepdim=True) * peak
 
 
-DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise}
+def draw_plucks(count: int, grid_points: int, generator: torch.Generator) -> Tensor:
+    """`count` plucks of a musician: Gaussian, triangular and raised-cosine in turn, float64 (count, grid_points).
+
+    Positions are uniform; widths and peaks are so on a logarithmic scale, because narrow and soft ones count as much.
+    """
+    position = _uniform(count, *PLUCK_POSITION_RANGE, generator)[:, 0].tolist()
+    width, peak_m = (
+        _uniform(count, math.log(low), math.log(high), generator)[:, 0].exp().tolist()
+        for low, high in (PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
+    )
+    drawn = []
+    for number, (at, wide, peak) in enumerate(zip(position, width, peak_m, strict=True)):
+        shape = number % 3
+        if shape == 0:
+            drawn.append(gaussian(at, wide, peak, grid_points))
+        elif shape == 1:
+            drawn.append(triangular(at, peak, grid_points))
+        else:
+            drawn.append(raised_cosine(at, wide, peak, grid_points))
+    return torch.stack(drawn)
+
+
+DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise, "pluck": draw_plucks}
 
 
 def _uniform(count: int, low: float, high: float, generator: torch.Generator) -> Tensor:

@@ -59,7 +59,7 @@ class PresetInfo:
     model_configuration: dict[str, Any]
     string: StringParameters
     tension_modulated: bool
-    initial: Literal["gaussian", "noise"]
+    initial: Literal["gaussian", "noise", "pluck"]
     rate_hz: int
     modes: int
     grid_points: int
@@ -180,8 +180,10 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
     """How a pluck differs from what the preset was trained on, in plain words; empty where it does not."""
     if info.initial == "noise":
         found = [f"a {pluck.shape.replace('_', ' ')} pluck is not the noise that this preset was trained on"]
-    elif pluck.shape != "gaussian":
+    elif info.initial == "gaussian" and pluck.shape != "gaussian":
         found = [f"shape {pluck.shape.replace('_', ' ')} is not the trained gaussian"]
+    elif pluck.shape == "triangular":
+        found = []  # it has no width
     else:
         found = _beyond("width", pluck.width, info.trained_range.width)
     peak_mm = (1000 * info.trained_range.peak_m[0], 1000 * info.trained_range.peak_m[1])

@@ -33,7 +33,8 @@ class TrainingData:
         if kind == "two_frames":
             raise ValueError("a model of the input 'two_frames' cannot be trained; choose 'displacement_velocity'")
         self._kind = kind
-        self._steps = steps
+        self._stride = c.stride
+        self._kept = steps // c.stride
         self._amplitudes = dataset.split("train").to(device)
         count = len(self._amplitudes)
         # displacement a sample, as an encoder wants it; the training split comes first
@@ -46,11 +47,12 @@ class TrainingData:
         """A batch of the trajectories `rows`, over at most `horizon` frames."""
         device = self._amplitudes.device
         generator = torch.Generator().manual_seed((recipe.seed + 1) * 1_000_003 + iteration)
-        frames = _frames(recipe, horizon, generator)
+        kept = max(1, horizon // self._stride)
+        frames = _frames(recipe, kept, generator)
         rows, wanted = rows.to(device), torch.cat([torch.zeros(1, dtype=torch.long), frames]).to(device)
         starts = torch.zeros(len(rows), dtype=torch.long, device=device)
         if recipe.random_start:
-            last = (self._steps - horizon) // START_EVERY  # the whole horizon lies before the last frame
+            last = (self._kept - kept) // START_EVERY  # the whole horizon lies before the last frame
             starts = torch.randint(0, last + 1, (len(rows),), generator=generator).to(device)
         amplitudes = self._amplitudes[rows[:, None], START_EVERY * starts[:, None] + wanted]
         velocities = self._velocities[rows, starts.clamp(max=self._velocities.shape[1] - 1)][:, None]
@@ -60,7 +62,7 @@ class TrainingData:
             amplitudes, velocities = amplitudes * turn, velocities * turn
         displacement = amplitudes @ self._synthesis
         second = None if self._kind == "displacement" else (velocities @ self._synthesis)[:, 0]
-        return Batch(displacement[:, 0], second, wanted[1:], displacement[:, 1:])
+        return Batch(displacement[:, 0], second, self._stride * wanted[1:], displacement[:, 1:])
 
 
 def batches(recipe: Recipe, count: int, epoch: int) -> Iterator[Tensor]:
@@ -70,7 +72,7 @@ def batches(recipe: Recipe, count: int, epoch: int) -> Iterator[Tensor]:
 
 
 def _frames(recipe: Recipe, horizon: int, generator: torch.Generator) -> Tensor:
-    """Frames 1 … horizon, all or a random choice, ascending."""
+    """Kept frames 1 … horizon, all or a random choice, ascending."""
     if not recipe.steps_per_batch or recipe.steps_per_batch >= horizon:
         return torch.arange(1, horizon + 1)
     count = recipe.steps_per_batch

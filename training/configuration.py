@@ -20,11 +20,13 @@ CONFIGURATIONS = Path(__file__).parent / "configurations"
 class DatasetConfiguration:
     """A set of simulated trajectories; the defaults are the paper's protocol (§4.1)."""
 
-    initial: Literal["gaussian", "noise"]
+    initial: Literal["gaussian", "noise", "pluck"]
     rate_hz: int
     modes: int
     tension_modulated: bool = True
     steps: int = 4000  # frames after the initial one
+    stride: int = 1  # only every so many frames are kept, which is enough for a model that knows any frame at once
+    substeps: int | None = None  # of the solver in a frame; None: its default, exact to 1e-7
     count: int = 1000  # split 80/10/10 in order
     grid_points: int = 101
     seed: int = 0
@@ -33,9 +35,11 @@ class DatasetConfiguration:
     def __post_init__(self) -> None:
         if self.count < 10:
             raise ValueError(f"count must be at least 10 for a split 80/10/10, not {self.count}")
-        for name in ("rate_hz", "modes", "steps"):
+        for name in ("rate_hz", "modes", "steps", "stride"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
+        if self.steps % self.stride:
+            raise ValueError(f"steps must be a multiple of stride, {self.stride}, not {self.steps}")
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,10 @@ class TrainingConfiguration:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        if self.steps % self.data.stride:
+            raise ValueError(
+                f"horizon must be a multiple of the data's stride, {self.data.stride}, not {self.horizon}"
+            )
         if not 1 <= self.steps <= self.data.steps:
             raise ValueError(f"horizon must lie in 1 … {self.data.steps}, the data's steps, not {self.horizon}")
 

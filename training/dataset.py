@@ -28,7 +28,7 @@ from training.configuration import DatasetConfiguration
 
 CACHE_VERSION = 2  # raise when the solver, a draw or the files change what they hold
 CHUNK = 50  # trajectories a step of the progress
-START_EVERY = 100  # frames between those of which the velocity is kept, from which a trajectory can be entered
+START_EVERY = 100  # kept frames between those of which the velocity is kept, from which a trajectory can be entered
 
 SPLITS = ("train", "validation", "test")
 
@@ -38,8 +38,9 @@ class Dataset:
     """Trajectories at rest at frame 0.
 
     Attributes:
-        amplitudes: float32 (count, steps + 1, modes) in m, memory-mapped from the cache.
-        velocities: float32 (count, starts, modes) in m/s, of frames 0, START_EVERY, 2 START_EVERY, …
+        amplitudes: float32 (count, kept + 1, modes) in m of frames 0, stride, 2 stride, … steps, memory-mapped from
+            the cache.
+        velocities: float32 (count, starts, modes) in m/s, of every START_EVERY-th of these.
         scale_m: one standard deviation of displacement over the training split; models see displacement/scale.
     """
 
@@ -115,11 +116,11 @@ def load_dataset(
 
 
 def _amplitudes_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
-    return c.count, c.steps + 1, c.modes
+    return c.count, c.steps // c.stride + 1, c.modes
 
 
 def _velocities_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
-    return c.count, -(-c.steps // START_EVERY), c.modes
+    return c.count, -(-c.steps // (c.stride * START_EVERY)), c.modes
 
 
 def _map(file: Path, shape: tuple[int, int, int]) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -136,7 +137,9 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
     unfinished = Path(tempfile.mkdtemp(prefix="unfinished-", dir=folder.parent))
     try:
         c = configuration
-        solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated)
+        solver = SplittingSolver(
+            c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated, substeps=c.substeps
+        )
         new = np.lib.format.open_memmap
         amplitudes = new(unfinished / "amplitudes.npy", "w+", np.float32, _amplitudes_shape(c))
         velocities = new(unfinished / "velocities.npy", "w+", np.float32, _velocities_shape(c))
@@ -146,10 +149,11 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
             rows = slice(first, first + CHUNK)
             state = ModalState.at_rest(initial[rows])
             amplitudes[rows, 0] = state.amplitude.numpy()
-            for start, frame in enumerate(range(0, c.steps, START_EVERY)):
+            for start, done in enumerate(range(0, c.steps // c.stride, START_EVERY)):
                 velocities[rows, start] = state.velocity.numpy()
-                frames, state = solver.advance(state, min(START_EVERY, c.steps - frame))
-                amplitudes[rows, frame + 1 : frame + 1 + frames.shape[1]] = frames.numpy()
+                frames, state = solver.advance(state, min(START_EVERY * c.stride, c.steps - done * c.stride))
+                kept = frames[:, c.stride - 1 :: c.stride].numpy()
+                amplitudes[rows, done + 1 : done + 1 + kept.shape[1]] = kept
         amplitudes.flush()
         velocities.flush()
         training = torch.from_numpy(amplitudes)[split_rows(c.count, "train")]

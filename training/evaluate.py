@@ -30,6 +30,7 @@ from engine.sine_transform import analysis_matrix, listening_weights, synthesis_
 from engine.spectra import spectral_distances
 from training.configuration import DatasetConfiguration
 from training.dataset import Dataset, draw_initial, split_rows
+from training.losses import KoopmanModel
 
 TRAJECTORIES_AT_ONCE = 10
 FRAMES_AT_ONCE = 1000
@@ -44,17 +45,25 @@ def _silent(done: float) -> None:
 
 @torch.no_grad()
 def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps: int | None = None) -> ErrorSums:
-    """Error sums of frames 1 … steps (default: all) over every trajectory of the split."""
+    """Error sums of the kept ones of frames 1 … steps (default: all) over every trajectory of the split."""
     c = dataset.configuration
-    steps = steps or c.steps
+    kept = (steps or c.steps) // c.stride
     device = next(model.parameters()).device
     synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float().to(device)
-    sums = ErrorSums(steps)
+    sums = ErrorSums(kept)
     with _in_evaluation(model):
         for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
-            truth = amplitudes[:, : steps + 1].to(device) @ synthesis
-            sums.add(model(truth[:, 0], steps), truth[:, 1:])
+            truth = amplitudes[:, : kept + 1].to(device) @ synthesis
+            sums.add(_predicted(model, truth[:, 0], kept, c.stride), truth[:, 1:])
     return sums
+
+
+def _predicted(model: StringModel[Any], initial: Tensor, kept: int, stride: int) -> Tensor:
+    """Frames stride, 2 stride, …, (batch, kept, grid_points)."""
+    if stride > 1 and isinstance(model, KoopmanModel):
+        frames = stride * torch.arange(1, kept + 1, device=initial.device)
+        return model.decode(model.latents(model.release(initial).origin, frames))
+    return model(initial, kept * stride)[:, stride - 1 :: stride]
 
 
 @dataclass(frozen=True)
@@ -193,7 +202,7 @@ def _parts(c: DatasetConfiguration, split: str, trajectories: int | None) -> lis
 def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple[Tensor, Iterator[Tensor]]:
     """Modal amplitudes in m, float64: of frame 0, and of blocks of the frames after it."""
     c = dataset.configuration
-    if steps <= c.steps:
+    if steps <= c.steps and c.stride == 1:
         stored = dataset.amplitudes[rows, : steps + 1]
         return stored[:, 0].double(), (frames.double() for frames in stored[:, 1:].split(block, dim=1))
     initial = draw_initial(c)[rows]

@@ -14,7 +14,14 @@ from typing import Any
 
 import torch
 
-from engine.excitation import CENTRE_RANGE, PEAK_RANGE_M, WIDTH_RANGE
+from engine.excitation import (
+    CENTRE_RANGE,
+    PEAK_RANGE_M,
+    PLUCK_PEAK_RANGE_M,
+    PLUCK_POSITION_RANGE,
+    PLUCK_WIDTH_RANGE,
+    WIDTH_RANGE,
+)
 from engine.metrics import ErrorSums, RelativeError
 from engine.models import MODELS
 from engine.preset import Preset, PresetInfo, TrainedRange, load_preset, save_preset
@@ -156,14 +163,14 @@ def run_row(
         )
     except Diverged as error:
         return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
-    row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained))
+    row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, configuration.data.stride))
     with whole_file(file) as unfinished:
         unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
     return row
 
 
-def _figures(trained: TrainedPreset) -> dict[str, Any]:
-    """The errors of a run and what it took, as a row names them."""
+def _figures(trained: TrainedPreset, stride: int) -> dict[str, Any]:
+    """The errors of a run and what it took, as a row names them; `stride` is its data's."""
     info, result, sums = trained.preset.info, trained.result, trained.validation
     spread = sums.spread()
     figures: dict[str, Any] = {
@@ -178,11 +185,11 @@ def _figures(trained: TrainedPreset) -> dict[str, Any]:
         "best_epoch": result.best_epoch,
         "seconds": result.seconds,
     }
-    if info.horizon_steps >= SHORT_HORIZON:
+    if info.horizon_steps >= SHORT_HORIZON and stride == 1:
         short = sums.total(SHORT_HORIZON)
         figures |= {"rel_mse_400": short.rel_mse, "rel_mae_400": short.rel_mae}
     edges_s = [info.horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
-    for number, window in enumerate(sums.windows(info.rate_hz, edges_s), 1):
+    for number, window in enumerate(sums.windows(info.rate_hz / stride, edges_s), 1):
         figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
     return figures
 
@@ -233,6 +240,8 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
 
 def trained_range(initial: str) -> TrainedRange:
     """What the random draws of a kind cover; noise has neither a place nor a width."""
+    if initial == "pluck":
+        return TrainedRange(PLUCK_POSITION_RANGE, PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
     if initial == "noise":
         return TrainedRange(None, None, PEAK_RANGE_M)
     return TrainedRange(CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M)

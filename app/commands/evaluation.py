@@ -205,7 +205,7 @@ def _data_of(preset: Preset) -> DatasetConfiguration:
         data = read(TrainingConfiguration, info.training, f"{preset.path}: metadata.training").data
     except SchemaError as error:
         raise Failure(f"{error}; without it the preset's data set cannot be made") from error
-    size = 4 * data.count * (data.steps + 1) * data.modes
+    size = 4 * data.count * (data.steps // data.stride + 1) * data.modes
     if size > LARGEST_DATASET_BYTES:
         raise Failure(f"{preset.path}: its data set would take {size / 2**30:.0f} GiB; get the preset again")
     for name in ("grid_points", "rate_hz", "modes"):

@@ -177,5 +177,9 @@ def test_plucks_outside_training_are_told(preset_file: Path) -> None:
     text = "; ".join(outside_training(info, Pluck(0.1, 15.0, "gaussian", 0.3)))
     for word in ("position 0.1 ", "width 0.3", "15"):
         assert word in text
+    assert "not the trained gaussian" in "; ".join(outside_training(info, Pluck(0.5, 5.0, "triangular")))
+    any_shape = replace(info, initial="pluck")
+    assert outside_training(any_shape, Pluck(0.5, 5.0, "triangular", 0.5)) == []
+    assert "width 0.5" in "; ".join(outside_training(any_shape, Pluck(0.5, 5.0, "raised_cosine", 0.5)))
     free = replace(info, trained_range=replace(info.trained_range, position=None, width=None))
     assert not any("position" in line for line in outside_training(free, Pluck(0.1, 5.0, "gaussian", 0.05)))

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import torch
 
 from engine.reference import ModalState, SplittingSolver
 from engine.sine_transform import analysis_matrix
 from training.batches import TrainingData, batches
-from training.configuration import Recipe
-from training.dataset import START_EVERY, Dataset
+from training.configuration import DatasetConfiguration, Recipe
+from training.dataset import START_EVERY, Dataset, load_dataset
 from training.losses import Batch
 
 CPU = torch.device("cpu")
@@ -79,3 +81,12 @@ def test_an_epoch_holds_every_trajectory_once_and_repeats_by_its_number() -> Non
 def test_two_frames_are_refused(small_dataset: Dataset) -> None:
     with pytest.raises(ValueError, match="choose 'displacement_velocity'"):
         TrainingData(small_dataset, 400, "two_frames", CPU)
+
+
+def test_of_data_with_a_stride_only_kept_frames_are_asked(tmp_path: Path) -> None:
+    configuration = DatasetConfiguration("pluck", 4000, 5, steps=450, stride=9, count=20)
+    dataset = load_dataset(configuration, tmp_path)
+    data = TrainingData(dataset, 450, "displacement_velocity", CPU)
+    batch = data.draw(Recipe(epochs=1, flip=False, steps_per_batch=7), ROWS, 450, 0)
+    assert len(batch.frames) == 7 and not (batch.frames % 9).any() and int(batch.frames[-1]) <= 450
+    assert_is_a_motion(dataset, batch)

@@ -46,6 +46,15 @@ def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path: Path) 
     assert not list((tmp_path / "datasets").glob("unfinished-*"))
 
 
+def test_a_stride_keeps_some_of_the_frames_and_all_of_the_motion(tmp_path: Path) -> None:
+    every = load_dataset(replace(TINY, steps=450), tmp_path)
+    some = load_dataset(replace(TINY, steps=450, stride=3), tmp_path)
+    assert torch.equal(some.amplitudes, every.amplitudes[:, ::3])
+    assert torch.equal(some.velocities, every.velocities[:, [0, 3]])
+    with pytest.raises(ValueError, match="steps must be a multiple of stride, 4, not 30"):
+        replace(TINY, stride=4)
+
+
 def damage(folder: Path, how: str) -> None:
     facts = json.loads((folder / "dataset.json").read_text())
     if how == "cut":

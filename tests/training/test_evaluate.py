@@ -168,3 +168,18 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
     expected = np.broadcast_to(3 * math.log(10) / sigma, there.shape)
     assert there.sum() > 10
     assert partials.t60_s[:, 0][there] == pytest.approx(expected[there], rel=1e-6)
+
+
+@torch.no_grad()
+def test_kept_frames_of_a_stride_are_measured_alone(tmp_path: Path) -> None:
+    every, some = (load_dataset(replace(DATA, stride=stride), tmp_path) for stride in (1, 5))
+    physics = Physics(DATA.string, DATA.modes, DATA.rate_hz, every.scale_m)
+    for name in ("koopman_integrated", "s5"):  # one knows any frame at once, one does not
+        model = build_model(name, {"state_size": 16, "layers": 1, "hippo_blocks": 2} if name == "s5" else None)
+        model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
+        squared, absolute = evaluate_model(model, every, "validation").per_frame()
+        kept_squared, kept_absolute = evaluate_model(
+            model, replace(some, scale_m=every.scale_m), "validation"
+        ).per_frame()
+        np.testing.assert_allclose(kept_squared, squared[4::5], rtol=1e-3)
+        np.testing.assert_allclose(kept_absolute, absolute[4::5], rtol=1e-3)

@@ -50,10 +50,10 @@ def test_a_run_that_goes_on_from_an_older_checkpoint_repeats_no_epoch(tmp_path: 
     assert [(row[0], row[3]) for row in read(path)[1:]] == [("1", "1"), ("2", "1"), ("3", "7"), ("4", "8")]
 
 
-@pytest.mark.parametrize("kind", ["gaussian", "noise"])
+@pytest.mark.parametrize("kind", ["gaussian", "noise", "pluck"])
 def test_the_trained_range_is_that_of_the_draws(kind: str) -> None:
     found = trained_range(kind)
-    assert found.peak_m == (1e-3, 1e-2)
+    assert found.peak_m == ((5e-4, 1e-2) if kind == "pluck" else (1e-3, 1e-2))
     assert (found.position is None, found.width is None) == (kind == "noise", kind == "noise")
 
 
