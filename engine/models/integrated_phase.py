@@ -77,8 +77,8 @@ class IntegratedPhaseConfiguration:
         rate_unit: unit of K E and of g in radians and nepers a sample. A weight of 1 turns a phase by one radian in
             1/rate_unit samples, the order of a training horizon, so that an optimiser's usual steps suit.
         physical_units: K, g and M are told the tension that each mode adds, as a share of that at rest, instead of
-            the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode, which is
-            what an optimiser and a network need. A start from the physics fills the units in.
+            the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
+            which an optimiser and a network need. A start from the physics fills the units in.
         gain_limit_db: b, the largest change of level that Re f can add up to.
     """
 
