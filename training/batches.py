@@ -5,8 +5,6 @@ Every random choice is a function of (seed, iteration) alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import torch
 from torch import Tensor
 
@@ -65,10 +63,10 @@ class TrainingData:
         return Batch(displacement[:, 0], second, self._stride * wanted[1:], displacement[:, 1:])
 
 
-def batches(recipe: Recipe, count: int, epoch: int) -> Iterator[Tensor]:
+def batches(recipe: Recipe, count: int, epoch: int) -> tuple[Tensor, ...]:
     """The rows of each batch of an epoch: every trajectory once."""
     generator = torch.Generator().manual_seed(recipe.seed * 7_368_787 + epoch)
-    return iter(torch.randperm(count, generator=generator).split(recipe.batch_size))
+    return torch.randperm(count, generator=generator).split(recipe.batch_size)
 
 
 def _frames(recipe: Recipe, horizon: int, generator: torch.Generator) -> Tensor:

@@ -31,6 +31,7 @@ from training.losses import training_loss
 
 CHECKPOINT_EVERY_S = 45.0
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
+TELL_EVERY_S = 5.0  # within an epoch
 EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
 
 
@@ -40,8 +41,16 @@ class Diverged(RuntimeError):
 
 @dataclass(frozen=True)
 class Progress:
-    """A line of the run's log."""
+    """How far a run is: told at the end of every epoch, and within long ones.
 
+    Attributes:
+        step, steps: optimiser's steps, done and in all.
+        epoch: the one that ends, or is under way.
+        loss: mean square of the predictions' errors so far in this epoch.
+    """
+
+    step: int
+    steps: int
     epoch: int
     epochs: int
     horizon: int
@@ -50,6 +59,10 @@ class Progress:
     validation: RelativeError | None
     seconds: float
     seconds_left: float
+
+    @property
+    def ends_epoch(self) -> bool:
+        return self.step * self.epochs == self.epoch * self.steps
 
 
 @dataclass(frozen=True)
@@ -75,7 +88,7 @@ def fit(
     """Trains, or goes on with the run in `run_folder`; what has a closed form (DMD) is computed at once.
 
     Args:
-        report: called after every epoch.
+        report: called after every epoch, and every few seconds within.
         checkpoint_every_s: None: CHECKPOINT_EVERY_S.
 
     Raises:
@@ -89,18 +102,20 @@ def fit(
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
     if path.exists():
         run.restore(Checkpoint.load(path), path)
-    started = saved = time.monotonic()
-    first_epoch, earlier_s = run.epoch, run.seconds
+    started = saved = told = time.monotonic()
+    first_step, earlier_s = run.step, run.seconds
     while not run.ended:
-        loss, horizon, learning_rate = run.train_epoch()
-        if not math.isfinite(loss):
-            raise Diverged(f"the loss is {loss} in epoch {run.epoch}; lower peak_learning_rate")
-        validation = run.validate() if run.validation_is_due else None
+        run.train_step()
+        validation = None
+        if run.ends_epoch:
+            if not math.isfinite(run.loss):
+                raise Diverged(f"the loss is {run.loss} in epoch {run.epoch}; lower peak_learning_rate")
+            validation = run.validate() if run.validation_is_due else None
         now = time.monotonic()
         run.seconds = earlier_s + now - started
-        epochs = configuration.recipe.epochs
-        left_s = (now - started) / (run.epoch - first_epoch) * (epochs - run.epoch)
-        report(Progress(run.epoch, epochs, horizon, learning_rate, loss, validation, run.seconds, left_s))
+        if run.ends_epoch or now - told > TELL_EVERY_S:
+            report(run.progress(validation, (now - started) / (run.step - first_step)))
+            told = now
         if now - saved > every_s or run.ended:
             run.checkpoint().save(path)
             saved = now
@@ -145,7 +160,7 @@ def horizon_at(recipe: Recipe, share: float, steps: int) -> int:
 
 
 class _Run:
-    """A training between two epochs: all that a checkpoint holds."""
+    """A training between two steps: all that a checkpoint holds."""
 
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
@@ -155,49 +170,75 @@ class _Run:
         if recipe.random_start and kind != "displacement_velocity":
             raise ValueError("recipe.random_start needs a model of the input 'displacement_velocity'")
         self._data = TrainingData(dataset, configuration.steps, kind, device)
+        self._per_epoch = -(-self._data.count // recipe.batch_size)
         self._optimiser = _optimiser(self._model, recipe)
         self._average: AveragedModel | None = None
         if recipe.average_decay:
             mean = get_ema_multi_avg_fn(recipe.average_decay)
             self._average = AveragedModel(self._model, multi_avg_fn=mean, use_buffers=True)
-        self.epoch, self.seconds = 0, 0.0
+        self.step, self.seconds = 0, 0.0
+        self._total = torch.zeros((), device=device)  # of this epoch's losses
         self._best: RelativeError | None = None
         self._best_epoch = 0
         self._best_model = _copy(self._model)
 
     @property
+    def epoch(self) -> int:
+        """The one that has just ended, or is under way."""
+        return -(-self.step // self._per_epoch)
+
+    @property
+    def ends_epoch(self) -> bool:
+        return self.step % self._per_epoch == 0
+
+    @property
     def ended(self) -> bool:
         patience = self._recipe.patience
         tired = patience > 0 and self.epoch - self._best_epoch >= patience
-        return self.epoch >= self._recipe.epochs or tired
+        return self.ends_epoch and (self.epoch >= self._recipe.epochs or tired)
 
     @property
     def validation_is_due(self) -> bool:
         return self.epoch % self._recipe.validate_every == 0 or self.epoch == self._recipe.epochs
 
-    def train_epoch(self) -> tuple[float, int, float]:
-        """The mean square of the predictions' errors, and horizon and learning rate at the end."""
+    @property
+    def loss(self) -> float:
+        """Mean square of the predictions' errors, so far in this epoch."""
+        return float(self._total) / ((self.step - 1) % self._per_epoch + 1)
+
+    def train_step(self) -> None:
         recipe, model = self._recipe, self._model
-        per_epoch = -(-self._data.count // recipe.batch_size)
-        total = torch.zeros((), device=next(model.parameters()).device)
+        epoch, number = divmod(self.step, self._per_epoch)
+        if number == 0:
+            self._batches = batches(recipe, self._data.count, epoch)
+            self._total.zero_()
+        horizon, learning_rate = self._schedules()
+        for group in self._optimiser.param_groups:
+            group["lr"] = learning_rate * group["share"]
         model.train()
-        for number, rows in enumerate(batches(recipe, self._data.count, self.epoch)):
-            iteration = self.epoch * per_epoch + number
-            share = iteration / (recipe.epochs * per_epoch)
-            horizon = horizon_at(recipe, share, self._configuration.steps)
-            learning_rate = learning_rate_at(recipe, share)
-            for group in self._optimiser.param_groups:
-                group["lr"] = learning_rate * group["share"]
-            loss, error = training_loss(model, self._data.draw(recipe, rows, horizon, iteration), recipe)
-            self._optimiser.zero_grad(set_to_none=True)
-            loss.backward()
-            torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
-            self._optimiser.step()
-            if self._average is not None:
-                self._average.update_parameters(model)
-            total += error
-        self.epoch += 1
-        return float(total) / per_epoch, horizon, learning_rate
+        batch = self._data.draw(recipe, self._batches[number], horizon, self.step)
+        loss, error = training_loss(model, batch, recipe)
+        self._optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
+        self._optimiser.step()
+        if self._average is not None:
+            self._average.update_parameters(model)
+        self._total += error
+        self.step += 1
+
+    def _schedules(self) -> tuple[int, float]:
+        """Horizon and learning rate of the next step."""
+        share = self.step / (self._recipe.epochs * self._per_epoch)
+        return horizon_at(self._recipe, share, self._configuration.steps), learning_rate_at(self._recipe, share)
+
+    def progress(self, validation: RelativeError | None, step_s: float) -> Progress:
+        """`step_s`: what a step has taken."""
+        epochs, (horizon, learning_rate) = self._recipe.epochs, self._schedules()
+        steps = epochs * self._per_epoch
+        left_s = step_s * (steps - self.step)
+        at = (self.step, steps, self.epoch, epochs, horizon, learning_rate)
+        return Progress(*at, self.loss, validation, self.seconds, left_s)
 
     def validate(self) -> RelativeError:
         """The validation error; the best model so far is kept."""
@@ -217,7 +258,8 @@ class _Run:
     def checkpoint(self) -> Checkpoint:
         facts = {
             "configuration": write(self._configuration),
-            "epoch": self.epoch,
+            "step": self.step,
+            "loss_total": float(self._total),
             "seconds": self.seconds,
             "best": write(self._best) if self._best else None,
             "best_epoch": self._best_epoch,
@@ -230,8 +272,12 @@ class _Run:
         facts, device = checkpoint.facts, next(self._model.parameters()).device
         try:  # read, not compared as it is: fields that came later have their defaults
             other = read(TrainingConfiguration, facts["configuration"], f"{path}: configuration")
-        except SchemaError as error:
-            raise ValueError(f"{error}; delete it to start the run again") from error
+            self.step, self.seconds = int(facts["step"]), float(facts["seconds"])
+            self._total.fill_(facts["loss_total"])
+            self._best_epoch = int(facts["best_epoch"])
+            self._best = read(RelativeError, facts["best"], f"{path}: best") if facts["best"] else None
+        except (SchemaError, KeyError, TypeError) as error:
+            raise ValueError(f"{path}: of another version ({error}); delete it to start the run again") from error
         if other.digest != self._configuration.digest:
             raise ValueError(f"{path}: belongs to another configuration; delete it or choose another run folder")
         self._model.load_state_dict(dict(checkpoint.model))
@@ -239,9 +285,7 @@ class _Run:
             self._average.load_state_dict(dict(checkpoint.average))
         restore_moments(self._optimiser, checkpoint.optimiser)
         self._best_model = {name: t.to(device) for name, t in checkpoint.best_model.items()}
-        self.epoch, self.seconds = facts["epoch"], facts["seconds"]
-        self._best_epoch = facts["best_epoch"]
-        self._best = RelativeError(**facts["best"]) if facts["best"] else None
+        self._batches = batches(self._recipe, self._data.count, self.step // self._per_epoch)
 
     def _measured(self) -> StringModel[Any]:
         """The model that the run is judged by: the running mean of its weights, where it keeps one."""
@@ -256,7 +300,7 @@ def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Cal
     model = DMD.fit(dataset.split("train")[:, : configuration.steps + 1] @ synthesis, sizes)
     error = evaluate_model(model, dataset, "validation", configuration.steps).total()
     seconds = time.monotonic() - started
-    report(Progress(1, 1, configuration.steps, 0.0, error.rel_mse, error, seconds, 0.0))
+    report(Progress(1, 1, 1, 1, configuration.steps, 0.0, error.rel_mse, error, seconds, 0.0))
     return FitResult(model.eval(), error, 1, 1, seconds)
 
 

@@ -62,8 +62,7 @@ def train(
 
     Args:
         dataset: of `configuration.data`.
-        report: called after every epoch, which is in `run_folder`/log.csv by then; the run ends with a plot of it,
-            log.png.
+        report: see `fit`. An epoch is in `run_folder`/log.csv when it is told; the run ends with a plot, log.png.
 
     Raises:
         Diverged, ValueError: see `fit`.
@@ -76,7 +75,8 @@ def train(
     log = TrainingLog(run_folder / "log.csv")
 
     def log_and_report(progress: Progress) -> None:
-        log.add(progress)
+        if progress.ends_epoch:
+            log.add(progress)
         report(progress)
 
     try:

@@ -118,14 +118,14 @@ def _device(wanted: Device) -> str:
 
 
 def _training_report(report: Report) -> Callable[[Progress], None]:
-    """Epoch, horizon, loss and the last validation as progress."""
+    """Step, epoch, horizon, loss and the last validation as progress."""
     last = ""
 
     def told(p: Progress) -> None:
         nonlocal last
         if p.validation:
             last = f", val. MAE {number(p.validation.rel_mae)}"
-        text = f"epoch {p.epoch}/{p.epochs}, horizon {p.horizon}, loss {number(p.loss)}{last}"
-        report(p.epoch / p.epochs, text, p.seconds_left)
+        text = f"step {p.step}, epoch {p.epoch}/{p.epochs}, horizon {p.horizon}, loss {number(p.loss)}{last}"
+        report(p.step / p.steps, text, p.seconds_left)
 
     return told

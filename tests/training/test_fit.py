@@ -84,6 +84,40 @@ def test_a_run_that_is_cut_anywhere_is_the_whole_run(
     assert all(torch.equal(left[name], right[name]) for left, right in pairs for name in left)
 
 
+def test_a_checkpoint_within_an_epoch_goes_on_within_it(
+    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "TELL_EVERY_S", -1.0)
+    configuration = small("lru", batch_size=3)  # six steps an epoch
+    whole: list[Progress] = []
+    fit(configuration, small_dataset, runs / "whole", report=whole.append, checkpoint_every_s=-1)
+    assert [p.step for p in whole] == list(range(1, 25))
+    assert [p.step for p in whole if p.ends_epoch] == [6, 12, 18, 24]
+
+    def cut(progress: Progress) -> None:
+        if progress.step == 10:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fit(configuration, small_dataset, runs / "cut", report=cut, checkpoint_every_s=-1)
+    assert Checkpoint.load(runs / "cut" / "checkpoint.safetensors").facts["step"] == 9
+    rest: list[Progress] = []
+    fit(configuration, small_dataset, runs / "cut", report=rest.append, checkpoint_every_s=-1)
+    assert [p.loss for p in rest] == [p.loss for p in whole[9:]]
+    left, right = weights(runs / "whole"), weights(runs / "cut")
+    assert all(torch.equal(left[name], right[name]) for name in left)
+
+
+def test_a_checkpoint_of_another_version_is_told(small_dataset: Dataset, runs: Path) -> None:
+    fit(small("koopman_var"), small_dataset, runs)
+    path = runs / "checkpoint.safetensors"
+    checkpoint = Checkpoint.load(path)
+    facts = {name: value for name, value in checkpoint.facts.items() if name != "step"}
+    replace(checkpoint, facts=facts).save(path)
+    with pytest.raises(ValueError, match=r"checkpoint.safetensors: of another version .*delete it to start"):
+        fit(small("koopman_var"), small_dataset, runs)
+
+
 def test_early_stopping_ends_when_nothing_gets_better(
     small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,7 @@ from training.run import LOG_FIELDS, TrainingLog, run_row, trained_range
 
 def progress(epoch: int, loss: float = 1.0) -> Progress:
     validation = RelativeError(0.5, 0.25) if epoch % 2 == 0 else None
-    return Progress(epoch, 9, 150, 1e-3, loss, validation, 2.0 * epoch, 1.0)
+    return Progress(2 * epoch, 18, epoch, 9, 150, 1e-3, loss, validation, 2.0 * epoch, 1.0)
 
 
 def read(path: Path) -> list[list[str]]:

@@ -293,7 +293,7 @@ def test_a_row_that_makes_no_sense_is_no_row(task: Task) -> None:
 
 
 def test_a_progress_that_is_not_finite_is_not_told() -> None:
-    progress = Progress(1, 4, 60, 1e-3, 0.5, RelativeError(0.5, 0.25), 1.0, 3.0)
+    progress = Progress(2, 8, 1, 4, 60, 1e-3, 0.5, RelativeError(0.5, 0.25), 1.0, 3.0)
     plain = {"name": "a", "progress": write(progress), "host": "here", "pid": 1}
     assert module._event(plain) == Progressed("a", progress, "here", 1)
     assert module._event(plain | {"progress": write(replace(progress, loss=math.inf))}) is None

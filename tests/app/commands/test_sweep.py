@@ -43,7 +43,7 @@ def row_of(name: str, digest: str = "", **changes: Any) -> Row:
 def progress_of(
     name: str, seconds: float, seconds_left: float, validation: RelativeError | None = None
 ) -> Progressed:
-    return Progressed(name, Progress(1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left), "here", 1)
+    return Progressed(name, Progress(2, 8, 1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left), "here", 1)
 
 
 @pytest.fixture
