@@ -53,7 +53,7 @@ class TrainingData:
             last = (self._kept - kept) // START_EVERY  # the whole horizon lies before the last frame
             starts = torch.randint(0, last + 1, (len(rows),), generator=generator).to(device)
         amplitudes = self._amplitudes[rows[:, None], START_EVERY * starts[:, None] + wanted]
-        velocities = self._velocities[rows, starts.clamp(max=self._velocities.shape[1] - 1)][:, None]
+        velocities = self._velocities[rows, starts][:, None]
         if recipe.flip:
             coin = torch.randint(0, 2, (2, len(rows), 1, 1), generator=generator).to(device)
             turn = (1 - 2 * coin[0]) * torch.where(coin[1] == 1, self._mirror, 1.0)

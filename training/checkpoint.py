@@ -31,7 +31,7 @@ class Checkpoint:
     facts: Mapping[str, Any]
 
     def save(self, path: Path) -> None:
-        """Writes whole or not at all."""
+        """Writes whole or not at all. Raises OSError."""
         tensors = {f"model/{name}": t for name, t in self.model.items()}
         tensors |= {f"best/{name}": t for name, t in self.best_model.items()}
         tensors |= {f"average/{name}": t for name, t in self.average.items()}
@@ -41,7 +41,12 @@ class Checkpoint:
         whole = {name: t.detach().to("cpu", copy=True).contiguous() for name, t in tensors.items()}
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as unfinished:
-            save_file(whole, unfinished, metadata={"facts": json.dumps(self.facts)})
+            try:
+                save_file(whole, unfinished, metadata={"facts": json.dumps(self.facts)})
+            except SafetensorError as error:  # its words for a full disk
+                raise OSError(
+                    f"{path}: cannot be written ({error}); free some space, or choose other --runs"
+                ) from error
 
     @classmethod
     def load(cls, path: Path) -> Checkpoint:

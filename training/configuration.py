@@ -1,4 +1,4 @@
-"""What one training run is, as committed data: `training/configurations/NAME.toml`."""
+"""What one training run is: of a cell of the paper's tables (`cell.py`), or a TOML file of one's own."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from engine.models import MODELS
 from engine.schema import SchemaError, read, write
 from engine.string import StringParameters
 
+DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 CONFIGURATIONS = Path(__file__).parent / "configurations"
 
 
@@ -54,8 +55,9 @@ class Recipe:
     schedule: Literal["one_cycle", "constant"] = "one_cycle"
     start_share: float = 0.04  # of the peak rate, at the start of a cycle
     warm_up: float = 0.1  # share of the run until the peak; then a cosine down to zero
-    eigenvalue_rate: float = 0.2  # learning rate of ν_log and θ_log, as a share
+    eigenvalue_rate: float = 0.2  # learning rate of the eigenvalues' parameters, as a share
     weight_decay: float = 0.01  # AdamW's
+    eigenvalue_decay: bool = False  # whether it decays the eigenvalues' parameters too
     clip_norm: float = 1.0
     loss: Literal["mse", "log10_mse"] = "mse"  # of the prediction
     random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
@@ -97,6 +99,8 @@ class TrainingConfiguration:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        if self.model == "dmd" and self.data.stride > 1:
+            raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:
             raise ValueError(
                 f"horizon must be a multiple of the data's stride, {self.data.stride}, not {self.horizon}"
@@ -119,6 +123,7 @@ class TrainingConfiguration:
             "model": self.model,
             "model_configuration": write(self.model_configuration),
             "data": _unlike_default(self.data),
+            "data_version": DATA_VERSION,
             "recipe": _unlike_default(self.recipe),
             "horizon": self.steps,
         }
@@ -144,10 +149,10 @@ def load(name_or_path: str) -> TrainingConfiguration:
         if not path.is_file() and (cell := Cell.parse(name_or_path)) is not None:
             return configuration_of(cell)
     if not path.is_file():
-        known = ", ".join(sorted(p.stem for p in CONFIGURATIONS.glob("*.toml")))
+        known = "".join(f", {p.stem}" for p in sorted(CONFIGURATIONS.glob("*.toml")))
         raise SchemaError(
-            f"no training configuration {name_or_path!r}; give a .toml file, a cell of the tables like "
-            f"nylon_nonlinear_noise_16k_koopman_var_400_seed1, or one of: {known}"
+            f"no training configuration {name_or_path!r}; give a .toml file, or a name: a cell of the tables like "
+            f"nylon_nonlinear_noise_16k_koopman_var_400_seed1{known}"
         )
     return read(TrainingConfiguration, read_toml(path), str(path))
 

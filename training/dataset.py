@@ -10,23 +10,24 @@ import json
 import math
 import os
 import shutil
-import tempfile
+import zlib
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import torch
+from filelock import FileLock
 from torch import Tensor
 
 from engine.excitation import DRAWS
 from engine.reference import ModalState, SplittingSolver
 from engine.schema import write
 from engine.sine_transform import synthesis_matrix, to_modes
-from training.configuration import DatasetConfiguration
+from training.configuration import DATA_VERSION, DatasetConfiguration
 
-CACHE_VERSION = 2  # raise when the solver, a draw or the files change what they hold
 CHUNK = 50  # trajectories a step of the progress
 START_EVERY = 100  # kept frames between those of which the velocity is kept, from which a trajectory can be entered
 
@@ -70,7 +71,7 @@ def default_cache() -> Path:
 
 def dataset_key(configuration: DatasetConfiguration) -> str:
     """A digest of everything that determines the data."""
-    text = json.dumps([CACHE_VERSION, write(configuration)], sort_keys=True)
+    text = json.dumps([DATA_VERSION, write(configuration)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -101,12 +102,14 @@ def load_dataset(
         ValueError: a cached file is damaged; the message names the file to delete.
     """
     folder = dataset_folder(configuration, cache)
-    if not folder.exists():
-        _generate(configuration, folder, progress)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(folder.with_suffix(".lock")):  # one process makes it, the others wait
+        if not folder.exists():
+            _generate(configuration, folder, progress)
     try:
-        amplitudes = _map(folder / "amplitudes.npy", _amplitudes_shape(configuration))
-        velocities = _map(folder / "velocities.npy", _velocities_shape(configuration))
         facts = json.loads((folder / "dataset.json").read_text(encoding="utf-8"))
+        amplitudes = _map(folder / "amplitudes.npy", _amplitudes_shape(configuration), facts["amplitudes_crc32"])
+        velocities = _map(folder / "velocities.npy", _velocities_shape(configuration), facts["velocities_crc32"])
         scale_m = float(facts["scale_m"])
         if not (scale_m > 0 and math.isfinite(scale_m)):
             raise ValueError(f"dataset.json: scale_m is {scale_m}")
@@ -123,60 +126,85 @@ def _velocities_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
     return c.count, -(-c.steps // (c.stride * START_EVERY)), c.modes
 
 
-def _map(file: Path, shape: tuple[int, int, int]) -> np.ndarray[Any, np.dtype[np.float32]]:
+def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[Any, np.dtype[np.float32]]:
     """An array of the cache, copied on write: nothing can change the cache."""
     values = np.load(file, mmap_mode="c")
     if values.shape != shape or values.dtype != np.float32:
         raise ValueError(f"{file.name} holds {values.dtype} {values.shape}, expected float32 {shape}")
+    found = 0
+    for part in values:
+        found = zlib.crc32(part.tobytes(), found)
+    if found != checksum:
+        raise ValueError(f"{file.name} does not have its checksum")
     return values
 
 
+class _ArrayFile:
+    """A float32 .npy file that is written row by row, so that a full disk is an OSError and not a broken mapping."""
+
+    def __init__(self, path: Path, shape: tuple[int, int, int]) -> None:
+        self._file: BinaryIO = path.open("wb")
+        self.checksum = 0
+        header = {"descr": "<f4", "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(self._file, header)
+
+    def write(self, rows: Tensor) -> None:
+        values = np.ascontiguousarray(rows.numpy(), dtype="<f4")
+        self._file.write(values.data)
+        self.checksum = zlib.crc32(values.tobytes(), self.checksum)
+
+    def close(self) -> None:
+        self._file.close()
+
+
 def _generate(configuration: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Writes into a temporary folder that is renamed when it is whole."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = Path(tempfile.mkdtemp(prefix="unfinished-", dir=folder.parent))
+    """Writes into another folder that is renamed when it is whole; the caller holds the lock."""
+    unfinished = folder.with_suffix(".unfinished")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    unfinished.mkdir()
     try:
-        c = configuration
-        solver = SplittingSolver(
-            c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated, substeps=c.substeps
-        )
-        new = np.lib.format.open_memmap
-        amplitudes = new(unfinished / "amplitudes.npy", "w+", np.float32, _amplitudes_shape(c))
-        velocities = new(unfinished / "velocities.npy", "w+", np.float32, _velocities_shape(c))
-        initial = draw_initial(c)
-        for first in range(0, c.count, CHUNK):
-            progress(first, c.count)
-            rows = slice(first, first + CHUNK)
-            state = ModalState.at_rest(initial[rows])
-            amplitudes[rows, 0] = state.amplitude.numpy()
-            for start, done in enumerate(range(0, c.steps // c.stride, START_EVERY)):
-                velocities[rows, start] = state.velocity.numpy()
-                frames, state = solver.advance(state, min(START_EVERY * c.stride, c.steps - done * c.stride))
-                kept = frames[:, c.stride - 1 :: c.stride].numpy()
-                amplitudes[rows, done + 1 : done + 1 + kept.shape[1]] = kept
-        amplitudes.flush()
-        velocities.flush()
-        training = torch.from_numpy(amplitudes)[split_rows(c.count, "train")]
-        scale_m = displacement_deviation(training, c.grid_points)
-        facts = {"configuration": write(c), "cache_version": CACHE_VERSION, "scale_m": scale_m}
+        facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
+        for name, checksum in _simulate(configuration, unfinished, progress).items():
+            facts[f"{name}_crc32"] = checksum
+        values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
+        facts["scale_m"] = displacement_deviation(values, configuration.grid_points)
+        del values  # an open mapping would hold the folder on Windows
         (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
-        del amplitudes, velocities, training
-        if folder.exists():  # another process was faster with the same data
-            return
         unfinished.rename(folder)
-        progress(c.count, c.count)
+        progress(configuration.count, configuration.count)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def displacement_deviation(amplitudes: Tensor, grid_points: int) -> float:
+def _simulate(c: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> dict[str, int]:
+    """Writes both arrays; their checksums by name."""
+    solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated, substeps=c.substeps)
+    initial = draw_initial(c)
+    with (
+        closing(_ArrayFile(folder / "amplitudes.npy", _amplitudes_shape(c))) as amplitudes,
+        closing(_ArrayFile(folder / "velocities.npy", _velocities_shape(c))) as velocities,
+    ):
+        for first in range(0, c.count, CHUNK):
+            progress(first, c.count)
+            state = ModalState.at_rest(initial[first : first + CHUNK])
+            frames, starts = [state.amplitude[:, None]], []
+            for done in range(0, c.steps, START_EVERY * c.stride):
+                starts.append(state.velocity)
+                block, state = solver.advance(state, min(START_EVERY * c.stride, c.steps - done))
+                frames.append(block[:, c.stride - 1 :: c.stride])
+            amplitudes.write(torch.cat(frames, dim=1))
+            velocities.write(torch.stack(starts, dim=1))
+        return {"amplitudes": amplitudes.checksum, "velocities": velocities.checksum}
+
+
+def displacement_deviation(amplitudes: np.ndarray[Any, Any], grid_points: int) -> float:
     """The standard deviation of displacement over trajectories, frames and grid points, for (…, modes)."""
     synthesis = synthesis_matrix(grid_points, amplitudes.shape[-1])
     gram, column = synthesis @ synthesis.T / grid_points, synthesis.mean(1)
     total = squared = 0.0
     frames = amplitudes.reshape(-1, amplitudes.shape[-1])
-    for chunk in frames.split(100_000):
-        chunk = chunk.double()
+    for first in range(0, len(frames), 100_000):
+        chunk = torch.from_numpy(frames[first : first + 100_000].astype(np.float64))
         squared += float(((chunk @ gram) * chunk).sum())
         total += float((chunk @ column).sum())
     mean = total / len(frames)

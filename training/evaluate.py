@@ -230,7 +230,9 @@ def _true_phasors(c: DatasetConfiguration, initial: Tensor, steps: int, block: i
 
 
 def _solver(c: DatasetConfiguration, oversampling: int = 1) -> SplittingSolver:
-    return SplittingSolver(c.string, c.modes, c.rate_hz * oversampling, tension_modulated=c.tension_modulated)
+    substeps = None if c.substeps is None else -(-c.substeps // oversampling)
+    rate_hz = c.rate_hz * oversampling
+    return SplittingSolver(c.string, c.modes, rate_hz, tension_modulated=c.tension_modulated, substeps=substeps)
 
 
 def _mean_distance(of_parts: Sequence[tuple[Tensor, Tensor]]) -> SpectralDistance:

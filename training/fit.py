@@ -29,7 +29,7 @@ from training.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.losses import training_loss
 
-CHECKPOINT_EVERY_S = 45.0
+CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
 TELL_EVERY_S = 5.0  # within an epoch
 EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
@@ -112,11 +112,12 @@ def fit(
                 raise Diverged(f"the loss is {run.loss} in epoch {run.epoch}; lower peak_learning_rate")
             validation = run.validate() if run.validation_is_due else None
         now = time.monotonic()
+        step_s = (now - started) / (run.step - first_step)
         run.seconds = earlier_s + now - started
         if run.ends_epoch or now - told > TELL_EVERY_S:
-            report(run.progress(validation, (now - started) / (run.step - first_step)))
+            report(run.progress(validation, step_s))
             told = now
-        if now - saved > every_s or run.ended:
+        if now - saved + step_s > every_s or run.ended:
             run.checkpoint().save(path)
             saved = now
     return run.result()
@@ -244,7 +245,7 @@ class _Run:
         """The validation error; the best model so far is kept."""
         model = self._measured()
         error = evaluate_model(model, self._dataset, "validation", self._configuration.steps).total()
-        if math.isfinite(error.rel_mae) and (self._best is None or error.rel_mae < self._best.rel_mae):
+        if _is_finite(error) and (self._best is None or error.rel_mae < self._best.rel_mae):
             self._best, self._best_epoch, self._best_model = error, self.epoch, _copy(model)
         return error
 
@@ -297,10 +298,15 @@ def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Cal
     c = dataset.configuration
     sizes: Any = read(MODELS["dmd"][1], configuration.model_configuration, "model_configuration")
     synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float()
-    model = DMD.fit(dataset.split("train")[:, : configuration.steps + 1] @ synthesis, sizes)
+    truth = dataset.split("train")[:, : configuration.steps + 1] @ synthesis
+    model = DMD.fit(truth, sizes)
     error = evaluate_model(model, dataset, "validation", configuration.steps).total()
+    if not _is_finite(error):
+        raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
-    report(Progress(1, 1, 1, 1, configuration.steps, 0.0, error.rel_mse, error, seconds, 0.0))
+    with torch.no_grad():
+        loss = float((model(truth[:100, 0], configuration.steps) - truth[:100, 1:]).square().mean())
+    report(Progress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
     return FitResult(model.eval(), error, 1, 1, seconds)
 
 
@@ -308,13 +314,21 @@ def _optimiser(model: torch.nn.Module, recipe: Recipe) -> torch.optim.Optimizer:
     named = list(model.named_parameters())
     groups = [
         {"params": [p for n, p in named if not _is_eigenvalue(n)], "share": 1.0},
-        {"params": [p for n, p in named if _is_eigenvalue(n)], "share": recipe.eigenvalue_rate, "weight_decay": 0.0},
+        {
+            "params": [p for n, p in named if _is_eigenvalue(n)],
+            "share": recipe.eigenvalue_rate,
+            "weight_decay": recipe.weight_decay if recipe.eigenvalue_decay else 0.0,
+        },
     ]
     return torch.optim.AdamW(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
 
 
 def _is_eigenvalue(name: str) -> bool:
     return name.rpartition(".")[2] in EIGENVALUES
+
+
+def _is_finite(error: RelativeError) -> bool:
+    return math.isfinite(error.rel_mse) and math.isfinite(error.rel_mae)
 
 
 def _copy(model: torch.nn.Module) -> dict[str, Any]:

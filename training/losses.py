@@ -1,4 +1,4 @@
-"""The losses of the paper, on displacement in normalised units.
+"""The losses of the paper, on displacement in normalised units; means over frames where the paper sums.
 
 Koopman models are trained on prediction, encoding and consistency (§4.2); the others on prediction alone, the Fourier
 models on its logarithm. All take any selection of frames: a Koopman rollout needs no recursion, the others run up to

@@ -105,8 +105,10 @@ def read_results(path: Path) -> list[Row]:
         lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
     except (UnicodeDecodeError, csv.Error) as error:
         raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin anew") from error
-    if not lines or not set(lines[0]) <= set(COLUMNS) or "digest" not in lines[0]:
+    if not lines or "digest" not in lines[0]:
         raise SchemaError(f"{path}: not a results file: its first line must name {', '.join(COLUMNS[:3])}, …")
+    if unknown := sorted(set(lines[0]) - set(COLUMNS)):
+        raise SchemaError(f"{path}: unknown column {unknown[0]!r}; it is of a newer version: update this program")
     columns, *rows = lines
     return [_parse(columns, row, f"{path}: line {n}") for n, row in enumerate(rows, 2)]
 
@@ -141,7 +143,7 @@ def _rank(row: Row) -> tuple[bool, str]:
 def _text(value: object) -> str:
     if value is None:
         return ""
-    return f"{value:.8g}" if isinstance(value, float) else str(value)
+    return str(value)  # of a float all digits: what is read again is what was measured
 
 
 def _parse(columns: list[str], line: list[str], where: str) -> Row:

@@ -7,12 +7,14 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import torch
+from filelock import FileLock, Timeout
 
 from engine.excitation import (
     CENTRE_RANGE,
@@ -112,6 +114,7 @@ def run_row(
     cache: Path | None = None,
     device: torch.device | str = "cpu",
     report: Callable[[Progress], None] = lambda progress: None,
+    waits: Callable[[], None] = lambda: None,
     preset: Path | None = None,
     checkpoint_every_s: float | None = None,
 ) -> Row:
@@ -122,11 +125,29 @@ def run_row(
     Args:
         name, recipe: as the row shall carry them.
         runs: the run's folder is runs/name: checkpoint, log and its plot, row, and the preset where `preset` is None.
+        waits: is told where another process trains in that folder, whose end is awaited.
 
     Raises:
         ValueError, RuntimeError, OSError: see `train`.
     """
     folder = runs / name
+    folder.mkdir(parents=True, exist_ok=True)
+    # never two in one folder, even where a worker that was taken for dead still trains
+    with _held(folder / "run.lock", waits):
+        return _run_row(name, recipe, configuration, folder, cache, device, report, preset, checkpoint_every_s)
+
+
+def _run_row(
+    name: str,
+    recipe: str,
+    configuration: TrainingConfiguration,
+    folder: Path,
+    cache: Path | None,
+    device: torch.device | str,
+    report: Callable[[Progress], None],
+    preset: Path | None,
+    checkpoint_every_s: float | None,
+) -> Row:
     file = folder / "row.json"
     output = preset or folder / f"{name}.safetensors"
     if file.exists() and output.exists():
@@ -167,6 +188,20 @@ def run_row(
     with whole_file(file) as unfinished:
         unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
     return row
+
+
+@contextmanager
+def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
+    lock = FileLock(path)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        waits()
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def _figures(trained: TrainedPreset, stride: int) -> dict[str, Any]:
@@ -231,11 +266,16 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         seed=recipe.seed,
         rel_mse=validation.rel_mse,
         rel_mae=validation.rel_mae,
-        test_rel_mse=test.rel_mse,
-        test_rel_mae=test.rel_mae,
+        test_rel_mse=_finite(test.rel_mse),
+        test_rel_mae=_finite(test.rel_mae),
         training_seconds=result.seconds,
         training=write(configuration),
     )
+
+
+def _finite(error: float) -> float | None:
+    """None for a model that runs away on a trajectory of the test set, though on none of the validation set."""
+    return error if math.isfinite(error) else None
 
 
 def trained_range(initial: str) -> TrainedRange:
@@ -304,7 +344,9 @@ def _is_whole(row: list[str]) -> bool:
 
 def _check_repeats(info: PresetInfo, validation: RelativeError, test: RelativeError, output: Path) -> None:
     stored = (info.rel_mse, info.rel_mae, info.test_rel_mse, info.test_rel_mae)
-    again = (validation.rel_mse, validation.rel_mae, test.rel_mse, test.rel_mae)
+    again = (validation.rel_mse, validation.rel_mae, _finite(test.rel_mse), _finite(test.rel_mae))
     for before, after in zip(stored, again, strict=True):
-        if before is None or not math.isclose(before, after, rel_tol=REPEAT_TOLERANCE):
+        if before is None and after is None:
+            continue
+        if before is None or after is None or not math.isclose(before, after, rel_tol=REPEAT_TOLERANCE):
             raise RuntimeError(f"{output}: measures {after} where the trained model had {before}; train it again")

@@ -11,13 +11,12 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields
 from functools import cache, partial
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Literal, NamedTuple
 
-from engine.models import MODELS
 from engine.schema import SchemaError
 from training.cell import HORIZON, MODEL_NAMES
 from training.configuration import TrainingConfiguration, load
@@ -30,7 +29,6 @@ HORIZONS = (HORIZON, SHORT_HORIZON)
 METRICS = ("rel_mse", "rel_mae")
 MODEL_ORDER = ("dmd", "koopman", "koopman_var", "lru", "s5", "fgru", "frnn", "koopman_integrated")
 NOT_RUN = "not run"
-CHANGED = "nothing: its name has another configuration by now"
 NONE = "—"
 
 RecipeChoice = Literal["ours", "paper", "all"]
@@ -167,9 +165,10 @@ def factor(ours: Figure, paper: Figure) -> str:
 def sections(rows: Iterable[Row], recipe: RecipeChoice = "all") -> list[Section]:
     """The tables of the rows that belong to them, by string and horizon.
 
-    Of two rows of one line, column and seed the one that finished later counts.
+    A row counts as long as its name means the configuration that it was made with: rows of a trial, and of a recipe
+    that has changed since, are another thing.
     """
-    chosen = sorted((row for row in rows if recipe in ("all", row.recipe)), key=lambda row: row.finished)
+    chosen = [row for row in rows if recipe in ("all", row.recipe) and configuration_of(row) is not None]
     return [_section(chosen, string, horizon) for string in STRINGS for horizon in HORIZONS]
 
 
@@ -217,17 +216,8 @@ def _is_measured(row: Row, horizon: int) -> bool:
 
 
 def _line(row: Row) -> Line:
-    if row.model == "dmd":  # fitted: an initialisation is asked of it by nobody
-        return Line(row.model, row.recipe, "", False, row.horizon)
-    how = row.initialisation or _configured_initialisation(row)
-    return Line(row.model, row.recipe, how, replace(row, initialisation=how).structured, row.horizon)
-
-
-def _configured_initialisation(row: Row) -> str:
-    """Of a run that ended before it could tell."""
-    configuration = configuration_of(row)
-    told = configuration.recipe.initialisation if configuration else ""
-    return told or MODELS[row.model][0].initialisations[0]
+    how = "" if row.model == "dmd" else row.initialisation  # fitted: an initialisation is asked of it by nobody
+    return Line(row.model, row.recipe, how, row.structured, row.horizon)
 
 
 def _entry(rows: Sequence[Row], horizon: int) -> Entry:
@@ -255,8 +245,9 @@ def _figure(rows: Sequence[Row], metric: str, horizon: int) -> Figure | None:
 
 TITLES = {"linear": "Linear string", "nonlinear": "Non-linear (tension-modulated) string"}
 LEGEND = f"""\
-Relative errors on the validation set, `mean (standard deviation)`: over seeds, for DMD over the trajectories of the
-validation set. Lower is better. **The paper**'s lines are the figures of its Table 3 as printed (5 seeds).
+Relative errors on the validation set, sums over all its trajectories divided by sums, as `mean (standard deviation)`:
+over seeds, for DMD over the errors of the single trajectories. Lower is better. **The paper**'s lines are the figures
+of its Table 3 as printed (5 seeds).
 
 - **better**, **worse**: than the paper's figure of the same model, by more than one standard deviation (the larger of
   the two; at least {PRINTED:g}, to which the paper's figures are printed). **equal**: within it.
@@ -284,7 +275,7 @@ def as_markdown(rows: Sequence[Row], recipe: RecipeChoice = "all", listing: bool
     if out := len(rows) - len(used):
         parts.append(
             f"{out} of {len(rows)} rows of the results file are not shown: of other data, another horizon or recipe, "
-            "or replaced by a later run of the same seed."
+            "a trial, or made by a recipe that has changed since."
         )
     if listing:
         parts += ["## Runs", _markdown_table(*_listing(used))]
@@ -374,7 +365,7 @@ def _listing(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
             row.commit or NONE,
             row.hardware or NONE,
             NONE if row.seconds is None else f"{row.seconds:.0f}",
-            f"`learned-strings train {row.name}`" if configuration_of(row) else CHANGED,
+            f"`learned-strings train {row.name}`",
         ]
         for row in rows
     ]

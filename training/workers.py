@@ -24,8 +24,6 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from filelock import FileLock, Timeout
-
 from engine.schema import SchemaError, read, write
 from training.results import Row
 
@@ -34,6 +32,7 @@ if TYPE_CHECKING:
 
     from training.fit import Progress
 
+RUN_BYTES = 8 * 2**30  # that a training takes at most: an LRU over 50 strings and 4000 frames
 DEATHS = 3  # of processes that a task survives; Dask's own default
 TELL_EVERY_S = 1.0  # of a run's progress
 CONNECT_S = 10.0  # to a scheduler
@@ -140,7 +139,7 @@ class Layout:
 def fitted(
     tasks: int, *, device: str = "auto", workers: int | None = None, threads: int | None = None, per_device: int = 1
 ) -> Layout:
-    """Workers that fit this machine: one thread on each core, or `per_device` processes on each GPU.
+    """Workers that fit this machine: one on each core as far as memory goes, or `per_device` processes on each GPU.
 
     Args:
         tasks: more workers than these are not made.
@@ -164,8 +163,16 @@ def fitted(
     if device == "cuda":
         raise ValueError("no CUDA device can be used here; choose --device cpu")
     threads = threads or 1
-    count = max(1, min(workers or cores // threads, tasks))
+    count = max(1, min(workers or min(cores // threads, _memory_bytes() // RUN_BYTES), tasks))
     return Layout("cpu", threads, (_environment(threads),) * count)
+
+
+def _memory_bytes() -> int:
+    """Of this machine; without bound where it cannot be told."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return 2**63
 
 
 def _environment(threads: int, gpu: str | None = None) -> dict[str, str]:
@@ -209,7 +216,6 @@ def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> 
     import torch
 
     from training.configuration import TrainingConfiguration
-    from training.dataset import dataset_folder, load_dataset
     from training.run import run_row
 
     configuration = read(TrainingConfiguration, task.configuration, task.name)
@@ -231,46 +237,23 @@ def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> 
             facts = {"progress": write(progress), "host": socket.gethostname(), "pid": os.getpid()}
             tell({"name": task.name, **facts})
 
-    def waits(text: str) -> None:
-        tell({"name": task.name, "text": text})
-
-    folder.mkdir(parents=True, exist_ok=True)
-    data = dataset_folder(configuration.data, cache)
-    data.parent.mkdir(parents=True, exist_ok=True)
-    # Never two in one folder, even where a worker that was taken for dead still trains.
-    with _held(folder / "run.lock", lambda: waits("waits: another process trains it")):
-        with _held(data.with_suffix(".lock"), lambda: waits("waits: another process makes its data set")):
-            load_dataset(configuration.data, cache)
-        return run_row(
-            task.name,
-            task.recipe,
-            configuration,
-            folder.parent,
-            cache=cache,
-            device=device,
-            report=report,
-            checkpoint_every_s=task.checkpoint_every_s,
-        )
+    return run_row(
+        task.name,
+        task.recipe,
+        configuration,
+        folder.parent,
+        cache=cache,
+        device=device,
+        report=report,
+        waits=lambda: tell({"name": task.name, "text": "waits: another process trains it"}),
+        checkpoint_every_s=task.checkpoint_every_s,
+    )
 
 
 def _runs(task: Task) -> Path:
     from training.run import default_runs
 
     return (Path(task.runs) if task.runs else default_runs()) / task.group
-
-
-@contextmanager
-def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
-    lock = FileLock(path)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        waits()
-        lock.acquire()
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def _leave_if_broken(device: str) -> None:

@@ -71,30 +71,42 @@ def train(
     import torch
 
     from engine.preset import SHIPPED
+    from training.cell import Cell
     from training.configuration import load
-    from training.run import default_runs
-    from training.run import train as run  # this command has the name
+    from training.run import default_runs, run_row
 
     configuration = load(config)
     name = Path(config).stem
-    file = output or SHIPPED / f"{name}.safetensors"
-    run_folder = (runs or default_runs()) / name
+    cell = Cell.parse(config)
+    file, folder = output or SHIPPED / f"{name}.safetensors", runs or default_runs()
     if threads is not None:
         torch.set_num_threads(threads)
     try:
-        data = load_data(configuration.data, cache)
+        load_data(configuration.data, cache)
         with progress("train") as report:
-            trained = run(
-                configuration, data, file, run_folder, device=_device(device), report=_training_report(report)
+            row = run_row(
+                name,
+                cell.recipe if cell else "",
+                configuration,
+                folder,
+                cache=cache,
+                device=_device(device),
+                report=_training_report(report),
+                waits=lambda: say(f"{folder / name}: another process trains there; waiting for its end"),
+                preset=file,
             )
     except KeyboardInterrupt:
-        say(f"stopped; the same command goes on with {run_folder}")
+        say(f"stopped; the same command goes on with {folder / name}")
         raise
-    print(trained.preset.path)
-    for split, sums in (("validation", trained.validation), ("test", trained.test)):
-        error = sums.total()
-        print(f"{split:<11} rel. MSE {number(error.rel_mse)}, rel. MAE {number(error.rel_mae)}")
-    print(f"trained in  {duration(trained.result.seconds)}, best epoch {trained.result.best_epoch}")
+    if row.status != "done":
+        raise Failure(f"{name}: {row.message}")
+    print(file)
+    for split, mse, mae in (
+        ("validation", row.rel_mse, row.rel_mae),
+        ("test", row.test_rel_mse, row.test_rel_mae),
+    ):
+        print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
+    print(f"trained in  {duration(row.seconds or 0.0)}, best epoch {row.best_epoch}")
 
 
 def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Dataset:

@@ -16,12 +16,14 @@ the whole field.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import torch
 from torch import Tensor, nn
+from torch.utils.checkpoint import checkpoint
 
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
@@ -142,6 +144,17 @@ class _FourierRecurrent(StringModel[FieldState]):
         return paired and not learns and hidden.device.type == "cpu" and hidden.dtype == torch.float32
 
     def _advance_by_definition(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        if not torch.is_grad_enabled():
+            return self._stretch(hidden, steps)
+        # a gradient needs 0.3 MB of every step and string: kept for one stretch, computed again for the others
+        length, parts = math.isqrt(steps - 1) + 1, []
+        for first in range(0, steps, length):
+            count = min(length, steps - first)
+            part, hidden = checkpoint(self._stretch, hidden, count, use_reentrant=False, preserve_rng_state=False)
+            parts.append(part)
+        return torch.cat(parts, dim=1), hidden
+
+    def _stretch(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         frames = []
         for _ in range(steps):
             hidden = self.step(hidden)

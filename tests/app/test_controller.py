@@ -101,13 +101,13 @@ def test_a_knob_asks_and_shows(qtbot: QtBot, controller: Controller) -> None:
 def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
     controller.player.seek(0.1)
-    qtbot.waitUntil(lambda: controller.window.string._frame is not None, timeout=5_000)
+    qtbot.waitUntil(lambda: controller.window.string._frame is not None, timeout=20_000)
     frame = controller.window.string._frame
     assert frame is not None
     assert set(frame.shapes) == {"model", "truth"}
     for view in (controller.window.spectrum, controller.window.waveform):
         for curve in view._curves.values():
-            qtbot.waitUntil(lambda curve=curve: curve.getData()[0] is not None, timeout=5_000)
+            qtbot.waitUntil(lambda curve=curve: curve.getData()[0] is not None, timeout=20_000)
             assert np.isfinite(curve.getData()[1]).all()
             assert np.ptp(curve.getData()[1]) > 0
 

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 import torch
 
 from engine.reference import ModalState, SplittingSolver
+from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration
 from training.dataset import START_EVERY, Dataset, dataset_folder, draw_initial, load_dataset, split_rows
 
@@ -43,7 +46,31 @@ def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path: Path) 
     load_dataset(TINY, tmp_path, lambda done, total: pytest.fail("made again"))
     assert (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns == stamp
     assert dataset_folder(replace(TINY, seed=1), tmp_path) != dataset_folder(TINY, tmp_path)
-    assert not list((tmp_path / "datasets").glob("unfinished-*"))
+    assert not list((tmp_path / "datasets").glob("*.unfinished"))
+
+
+def test_another_version_of_the_data_is_other_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = dataset_folder(TINY, tmp_path), configuration_of(Cell("lru", True, "noise", 4000)).digest
+    monkeypatch.setattr("training.dataset.DATA_VERSION", 99)
+    monkeypatch.setattr("training.configuration.DATA_VERSION", 99)
+    after = dataset_folder(TINY, tmp_path), configuration_of(Cell("lru", True, "noise", 4000)).digest
+    assert before[0] != after[0] and before[1] != after[1]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX does")
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+        with pytest.raises(OSError, match="File too large"):
+            load_dataset(TINY, tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert [path.suffix for path in (tmp_path / "datasets").iterdir()] == [".lock"]
 
 
 def test_a_stride_keeps_some_of_the_frames_and_all_of_the_motion(tmp_path: Path) -> None:
@@ -64,6 +91,10 @@ def damage(folder: Path, how: str) -> None:
         (folder / "velocities.npy").unlink()
     elif how == "type":
         np.save(folder / "velocities.npy", np.zeros((10, 1, 4)))
+    elif how == "zeros":
+        file = folder / "amplitudes.npy"
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-4000] + bytes(4000))
     elif how == "json":
         (folder / "dataset.json").write_text("{")
     elif how == "scale":
@@ -72,7 +103,7 @@ def damage(folder: Path, how: str) -> None:
         (folder / "dataset.json").write_text(json.dumps({**facts, "scale_m": [1]}))
 
 
-@pytest.mark.parametrize("how", ["cut", "missing", "type", "json", "scale", "list"])
+@pytest.mark.parametrize("how", ["cut", "missing", "type", "zeros", "json", "scale", "list"])
 def test_a_damaged_cache_is_told_with_its_remedy(tmp_path: Path, how: str) -> None:
     load_dataset(TINY, tmp_path)
     folder = dataset_folder(TINY, tmp_path)

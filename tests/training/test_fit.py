@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import torch
 
+from engine.metrics import RelativeError
 from engine.models import DMD
 from training import fit as module
 from training.cell import Cell, configuration_of
@@ -137,6 +138,23 @@ def test_the_mean_of_the_weights_is_what_is_kept(small_dataset: Dataset, runs: P
 def test_a_loss_that_is_no_number_is_a_divergence(small_dataset: Dataset, runs: Path) -> None:
     with pytest.raises(Diverged, match=r"the loss is nan in epoch \d; lower peak_learning_rate"):
         fit(small("frnn", peak_learning_rate=1e30, clip_norm=1e30), small_dataset, runs)
+
+
+def test_a_model_that_overflows_is_never_the_best(
+    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measure = module.evaluate_model
+
+    class Overflowing:
+        def total(self) -> RelativeError:
+            return RelativeError(math.inf, 1e10)
+
+    monkeypatch.setattr(module, "evaluate_model", lambda *asked: Overflowing())
+    with pytest.raises(Diverged, match="the validation error was never a number"):
+        fit(small("koopman_var"), small_dataset, runs)
+    with pytest.raises(Diverged, match="grows beyond all numbers"):
+        fit(small("dmd"), small_dataset, runs)
+    monkeypatch.setattr(module, "evaluate_model", measure)
 
 
 def test_a_checkpoint_of_another_configuration_is_refused(small_dataset: Dataset, runs: Path) -> None:

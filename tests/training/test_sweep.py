@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
@@ -322,6 +323,10 @@ def test_two_tasks_never_train_in_one_folder(task: Task) -> None:
 def test_workers_fit_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("torch.cuda.is_available", lambda: False)
     monkeypatch.setattr("os.sched_getaffinity", lambda pid: set(range(8)), raising=False)
+    monkeypatch.setattr(module, "_memory_bytes", lambda: 20 * 2**30)
+    assert len(fitted(100).environments) == 2
+    assert len(fitted(100, workers=5).environments) == 5
+    monkeypatch.setattr(module, "_memory_bytes", lambda: 2**40)
     found = fitted(100)
     assert (found.device, found.threads, len(found.environments)) == ("cpu", 1, 8)
     assert found.environments[0]["OMP_NUM_THREADS"] == "1"
@@ -405,17 +410,30 @@ def alone(options: Options, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     return replace(options, results=tmp_path / "alone.csv", runs=tmp_path / "alone")
 
 
-class Killer(Watch):
-    """Kills the process that is the first to tell of its progress, in the midst of its run."""
+def wait_until(reached: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not reached():
+        assert time.monotonic() < end
 
-    def __init__(self) -> None:
+
+class Killer(Watch):
+    """Kills the process that is the first to tell of its progress, some epochs into its run."""
+
+    def __init__(self, runs: Path) -> None:
         super().__init__()
+        self._runs = runs
         self.victim = ""
+        self.resumed_at = 0  # the first epoch that is told after that
+        self._pid = 0
 
     def progressed(self, event: Progressed) -> None:
         if not self.victim:
-            self.victim = event.name
+            self.victim, self._pid = event.name, event.pid
+            log = self._runs / event.name / "log.csv"
+            wait_until(lambda: log.read_text(encoding="utf-8").count("\n") > 5)
             psutil.Process(event.pid).kill()
+        elif event.name == self.victim and event.pid != self._pid and not self.resumed_at:
+            self.resumed_at = event.progress.epoch
 
 
 def measured(file: Path) -> list[list[Any]]:
@@ -428,10 +446,10 @@ def here(count: int) -> Layout:
 
 def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options: Options, alone: Options) -> None:
     """Two models on two data sets from two seeds: on two Dask workers with a kill, and one after another here."""
-    made = plan(epochs=40)
+    made = plan(epochs=60)
     sweep(made, Inline(), alone)
 
-    killer = Killer()
+    killer = Killer(options.runs / made.name)
     with local_workers(here(2)) as workers:
         assert "Dask" in workers.description
         rows = sweep(made, workers, options, killer)
@@ -439,9 +457,10 @@ def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options:
     assert len(rows) == 8
     assert [note.name for note in killer.notes if note.text.endswith("died")] == [killer.victim]
     assert measured(options.results) == measured(alone.results)
+    assert killer.resumed_at > 1  # from its checkpoint
     log = options.runs / made.name / killer.victim / "log.csv"
     assert [line.split(",")[0] for line in log.read_text(encoding="utf-8").split()[1:]] == [
-        str(epoch) for epoch in range(1, 41)
+        str(epoch) for epoch in range(1, 61)
     ]
 
     # the same plan again: nothing to do, nothing changed

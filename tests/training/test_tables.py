@@ -186,9 +186,9 @@ def test_prior_knowledge_and_recipes_have_lines_of_their_own() -> None:
         assert {entry[1] for entry in cells if entry[0] == "Koopman_var"} == {"**the paper**"} | runs
 
 
-def test_a_run_that_diverged_before_it_told_its_initialisation_stands_with_the_others() -> None:
+def test_a_run_that_diverged_stands_with_the_others() -> None:
     cells = [Cell("koopman_var", True, "gaussian", 4000, seed=seed) for seed in (0, 1)]
-    gone = row(cells[1], None, None, status="diverged", initialisation="")
+    gone = row(cells[1], None, None, status="diverged", initialisation="physics")
     found = as_markdown([row(cells[0], initialisation="physics"), gone])
     ours = line(table(found, "Non-linear", 4000), "Koopman_var", "our recipe, prior knowledge (physics)")
     assert ours[0] == "0.01 **equal**, 1 seed; diverged (1 of 2 seeds)"
@@ -196,7 +196,7 @@ def test_a_run_that_diverged_before_it_told_its_initialisation_stands_with_the_o
 
 def test_dmd_deviates_over_trajectories_and_is_no_prior_knowledge() -> None:
     cell = Cell("dmd", True, "gaussian", 4000)
-    rows = [row(cell, 1.0, 0.8, initialisation="physics", rel_mse_spread=0.25, rel_mae_spread=0.07)]
+    rows = [row(cell, 1.0, 0.8, initialisation="least squares", rel_mse_spread=0.25, rel_mae_spread=0.07)]
     cells = table(as_markdown(rows), "Non-linear", 4000)
     assert line(cells, "DMD", "our recipe")[:2] == ["1 (0.25) **equal**, 1 seed", "0.8 (0.07) **equal**, 1 seed"]
     assert line(cells, "**our best**", "black box")[0] == "not run"  # fitted, not learned
@@ -227,14 +227,20 @@ def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_
 
 def test_the_listing_traces_every_run() -> None:
     known = row(seconds=61.4, commit="abc1234", hardware="a processor", mse=0.0123456)
-    stale = row(Cell("s5", False, "noise", 16000), digest="another")
-    cells = as_markdown([known, stale], listing=True).partition("## Runs\n\n")[2].splitlines()
+    cells = as_markdown([known], listing=True).partition("## Runs\n\n")[2].splitlines()
     (told,) = (entry for entry in cells if f"| {known.name} " in entry)
     for fact in ("0.0123456", known.digest, "abc1234", "a processor", "61", f"`learned-strings train {known.name}`"):
         assert f" {fact} " in told
-    (changed,) = (entry for entry in cells if f"| {stale.name} " in entry)
-    assert "another configuration by now" in changed
     assert "## Runs" not in as_markdown([known])
+
+
+def test_rows_of_a_trial_or_of_an_older_recipe_are_no_figures() -> None:
+    a, b = seeds(2)
+    told = as_markdown(
+        [row(a, 0.010), row(a, 0.9, digest="of a trial", finished="2999"), row(b, 0.2, digest="older")]
+    )
+    assert line(table(told, "Non-linear", 4000), "LRU", "our recipe")[0] == "0.01 **better**, 1 seed"
+    assert "2 of 3 rows of the results file are not shown" in told
 
 
 def test_csv_has_every_cell_and_exact_figures() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from matplotlib.image import imread
 
+from training.cell import Cell, configuration_of
 from training.results import Row, add_rows
 
 TINY = """
@@ -31,10 +32,12 @@ first_horizon = 10
 def results(tmp_path: Path) -> Path:
     path = tmp_path / "results.csv"
     facts: dict[str, Any] = {"model": "s5", "string": "linear", "initial": "noise", "rate_hz": 4000, "horizon": 4000}
-    rows = [
-        Row(f"d{seed}", f"run_{seed}", "done", **facts, recipe="paper", seed=seed, rel_mse=0.001, rel_mae=0.01 * seed)
-        for seed in (1, 2)
-    ]
+    rows = []
+    for seed in (1, 2):
+        cell = Cell("s5", False, "noise", 4000, recipe="paper", seed=seed)
+        figures = {"rel_mse": 0.001, "rel_mae": 0.01 * seed, "initialisation": "paper"}
+        digest = configuration_of(cell).digest
+        rows.append(Row(digest, cell.name, "done", **facts, recipe="paper", seed=seed, **figures))
     add_rows(path, rows)
     return path
 
@@ -65,7 +68,7 @@ def test_the_tables_are_printed_or_written(run, results: Path, folder: Path) -> 
 
 
 def test_rows_are_listed_and_recipes_chosen(run, results: Path) -> None:
-    assert "| run_1 " in run("table", "--results", results, "--rows").out
+    assert "| nylon_linear_noise_4k_s5_paper_seed1 " in run("table", "--results", results, "--rows").out
     assert (
         "2 of 2 rows of the results file are not shown" in run("table", "--results", results, "--recipe", "ours").out
     )
@@ -73,7 +76,9 @@ def test_rows_are_listed_and_recipes_chosen(run, results: Path) -> None:
 
 def test_csv_is_read_back(run, results: Path) -> None:
     lines = list(csv.DictReader(io.StringIO(run("table", "--results", results, "--format", "csv").out)))
-    assert [entry["runs"] for entry in lines if entry["seeds"] == "2"] == ["run_1 run_2"]
+    assert [entry["runs"] for entry in lines if entry["seeds"] == "2"] == [
+        "nylon_linear_noise_4k_s5_paper_seed1 nylon_linear_noise_4k_s5_paper_seed2"
+    ]
     assert "--rows" in run("table", "--results", results, "--format", "csv", "--rows").usage
 
 
