@@ -184,7 +184,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         if self.encoder_residual is not None:
             z = z + self.encoder_residual(values)
         if self.M_in is not None:
-            z = torch.cat(self._modulate(self.M_in, *z.chunk(2, dim=-1)), dim=-1)
+            real, imag = z.chunk(2, dim=-1)
+            z = torch.cat(self._modulate(self.M_in, real, imag, slice(None)), dim=-1)
         return _at_rest(pack(z))
 
     def advance(
@@ -263,8 +264,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         length = self._segment_length(SEGMENT, step)
         segments, later = self._segments(state, rates, count, step, length)
         alive = segments.alive
-        if not self._has_linear_decoder:
-            alive = torch.arange(len(rates.sigma), device=alive.device)  # what comes before it takes every latent
+        if self.multiplier is not None or self.decoder_residual is not None:
+            alive = torch.arange(len(rates.sigma), device=alive.device)  # their networks take every latent
         ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (_hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
@@ -415,7 +416,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
         """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
         if self.M_out is not None:
-            real, imag = self._modulate(self.M_out, real, imag)
+            real, imag = self._modulate(self.M_out, real, imag, alive)
         if self.multiplier is not None:
             a, b = self.multiplier(real.square() + imag.square()).chunk(2, dim=-1)
             real, imag = real + a * real - b * imag, imag + a * imag + b * real
@@ -429,18 +430,21 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             found = found + nn.functional.linear(hidden(parts), *read_layer(last, readout))
         return found
 
+    def _modulate(self, matrix: Tensor, real: Tensor, imag: Tensor, alive: Tensor | slice) -> tuple[Tensor, Tensor]:
+        """z ⊙ exp(M z²) on both parts of z, of the latents `alive`."""
+        squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
+        n = self.configuration.state_size
+        weight = (matrix * self._modulation_units).view(2, n, 2, n)[:, alive][..., alive]
+        exponent = nn.functional.linear(squares, weight.reshape(2 * weight.shape[1], -1))
+        growth, turn = exponent.chunk(2, dim=-1)
+        gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
+        cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
+        return real * cosine - imag * sine, real * sine + imag * cosine
+
     @property
     def _modulation_units(self) -> Tensor | float:
         """Of M, in radians and nepers for squares of normalised displacement: (2 state_size,), or one for all."""
         return MODULATION_UNIT if self.energy_units is None else self.energy_units.to(self.K.dtype).repeat(2)
-
-    def _modulate(self, matrix: Tensor, real: Tensor, imag: Tensor) -> tuple[Tensor, Tensor]:
-        """z ⊙ exp(M z²) on both parts of z."""
-        squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
-        growth, turn = nn.functional.linear(squares, matrix * self._modulation_units).chunk(2, dim=-1)
-        gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
-        cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
-        return real * cosine - imag * sine, real * sine + imag * cosine
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
