@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from engine.models import MODELS
-from engine.schema import SchemaError, read, write
+from engine.schema import SchemaError, write
 from engine.string import StringParameters
 
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
-CONFIGURATIONS = Path(__file__).parent / "configurations"
 
 
 @dataclass(frozen=True)
@@ -133,28 +132,6 @@ class TrainingConfiguration:
 def _unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
     defaults = {f.name: f.default for f in fields(value)}
     return {name: entry for name, entry in write(value).items() if getattr(value, name) != defaults[name]}
-
-
-def load(name_or_path: str) -> TrainingConfiguration:
-    """A committed configuration by its file's name, a cell of the tables by its name, or any TOML file by path.
-
-    Raises:
-        SchemaError: not found, not TOML, or a field is wrong; the message names the file and the field.
-    """
-    from training.cell import Cell, configuration_of  # cells are made of what this module defines
-
-    path = Path(name_or_path)
-    if not path.suffix:
-        path = CONFIGURATIONS / f"{name_or_path}.toml"
-        if not path.is_file() and (cell := Cell.parse(name_or_path)) is not None:
-            return configuration_of(cell)
-    if not path.is_file():
-        known = "".join(f", {p.stem}" for p in sorted(CONFIGURATIONS.glob("*.toml")))
-        raise SchemaError(
-            f"no training configuration {name_or_path!r}; give a .toml file, or a name: a cell of the tables like "
-            f"nylon_nonlinear_noise_16k_koopman_var_400_seed1{known}"
-        )
-    return read(TrainingConfiguration, read_toml(path), str(path))
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -18,8 +18,9 @@ from statistics import fmean, stdev
 from typing import Literal, NamedTuple
 
 from engine.schema import SchemaError
+from training.by_name import load
 from training.cell import HORIZON, MODEL_NAMES
-from training.configuration import TrainingConfiguration, load
+from training.configuration import TrainingConfiguration
 from training.results import SHORT_HORIZON, Row
 
 PAPER = Path(__file__).parent / "paper_tables.csv"

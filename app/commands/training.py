@@ -26,7 +26,7 @@ Device = Literal["cpu", "cuda", "auto"]
 
 def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> None:
     """Make the data set of a training configuration, or find it in the cache, and describe it."""
-    from training.configuration import load
+    from training.by_name import load
     from training.dataset import dataset_folder, dataset_key, draw_initial
 
     configuration = load(config).data
@@ -71,8 +71,8 @@ def train(
     import torch
 
     from engine.preset import SHIPPED
+    from training.by_name import load
     from training.cell import Cell
-    from training.configuration import load
     from training.run import default_runs, run_row
 
     configuration = load(config)

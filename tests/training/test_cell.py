@@ -6,8 +6,8 @@ import pytest
 
 from engine.models import MODELS, build_model
 from engine.schema import SchemaError
+from training.by_name import load
 from training.cell import Case, Cell, configuration_of, recipe_names
-from training.configuration import load
 
 EVERY_CELL = [
     Cell(model, nonlinear, initial, rate_hz, horizon, recipe, seed)
