@@ -508,8 +508,9 @@ def test_a_plain_process_that_dies_is_replaced(monkeypatch: pytest.MonkeyPatch) 
         assert "task.threads: expected int" in ended.error
         # one that kills process after process is given up, and the next task has a new one
         monkeypatch.setattr(module, "DEATHS", 0)
+        workers._places[0].process.kill()  # before the task, which it would end at once
+        workers._places[0].process.join()
         workers.start(wrong)
-        workers._places[0].process.kill()
         assert until_it_ends(workers) == Ended("a", None, module._killed(1), final=True)
         workers.start(wrong)
         assert "task.threads" in until_it_ends(workers).error
