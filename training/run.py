@@ -134,60 +134,46 @@ def run_row(
     folder.mkdir(parents=True, exist_ok=True)
     # never two in one folder, even where a worker that was taken for dead still trains
     with _held(folder / "run.lock", waits):
-        return _run_row(name, recipe, configuration, folder, cache, device, report, preset, checkpoint_every_s)
-
-
-def _run_row(
-    name: str,
-    recipe: str,
-    configuration: TrainingConfiguration,
-    folder: Path,
-    cache: Path | None,
-    device: torch.device | str,
-    report: Callable[[Progress], None],
-    preset: Path | None,
-    checkpoint_every_s: float | None,
-) -> Row:
-    file = folder / "row.json"
-    output = preset or folder / f"{name}.safetensors"
-    if file.exists() and output.exists():
-        row = _read_row(file)
-        if row.digest == configuration.digest:
-            return row
-    dataset = load_dataset(configuration.data, cache)
-    facts: dict[str, Any] = {
-        "digest": configuration.digest,
-        "name": name,
-        "model": configuration.model,
-        "string": "nonlinear" if configuration.data.tension_modulated else "linear",
-        "initial": configuration.data.initial,
-        "rate_hz": configuration.data.rate_hz,
-        "horizon": configuration.steps,
-        "recipe": recipe,
-        "seed": configuration.recipe.seed,
-        "initialisation": initialisation_of(configuration),
-        "device": torch.device(device).type,
-        "threads": torch.get_num_threads(),
-        "hardware": provenance.hardware(device),
-        "torch": torch.__version__,
-        "commit": provenance.commit(),
-    }
-    try:
-        trained = train(
-            configuration,
-            dataset,
-            output,
-            folder,
-            device=device,
-            report=report,
-            checkpoint_every_s=checkpoint_every_s,
-        )
-    except Diverged as error:
-        return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
-    row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, configuration.data.stride))
-    with whole_file(file) as unfinished:
-        unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
-    return row
+        file = folder / "row.json"
+        output = preset or folder / f"{name}.safetensors"
+        if file.exists() and output.exists():
+            row = _read_row(file)
+            if row.digest == configuration.digest:
+                return row
+        dataset = load_dataset(configuration.data, cache)
+        facts: dict[str, Any] = {
+            "digest": configuration.digest,
+            "name": name,
+            "model": configuration.model,
+            "string": "nonlinear" if configuration.data.tension_modulated else "linear",
+            "initial": configuration.data.initial,
+            "rate_hz": configuration.data.rate_hz,
+            "horizon": configuration.steps,
+            "recipe": recipe,
+            "seed": configuration.recipe.seed,
+            "initialisation": initialisation_of(configuration),
+            "device": torch.device(device).type,
+            "threads": torch.get_num_threads(),
+            "hardware": provenance.hardware(device),
+            "torch": torch.__version__,
+            "commit": provenance.commit(),
+        }
+        try:
+            trained = train(
+                configuration,
+                dataset,
+                output,
+                folder,
+                device=device,
+                report=report,
+                checkpoint_every_s=checkpoint_every_s,
+            )
+        except Diverged as error:
+            return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
+        row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, configuration.data.stride))
+        with whole_file(file) as unfinished:
+            unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
+        return row
 
 
 @contextmanager

@@ -159,6 +159,11 @@ class _Measurement:
             }
             for window, heard, spectrum in zip(*sums, motion.spectra[1:], strict=True)
         ]
+        end_s = windows[-1][1]
+        if self.past_s and end_s >= 2:  # whether it rings true: the question of every long run
+            for name, start_s in (("first_second", 0.0), ("last_second", end_s - 1)):
+                (second,) = motion.string.windows(info.rate_hz, [start_s, start_s + 1])
+                found[name] = {"rel_mse": second.rel_mse, "rel_mae": second.rel_mae}
         if self.partials:
             found["partials"] = self._partials(split, windows)
             self.report.next()
@@ -238,6 +243,10 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
         f"spectral convergence {number(errors['spectral_convergence'])}, "
         f"spectra {number(errors['log_spectrum_db'])} dB apart"
     )
+    if "first_second" in errors:
+        first, last = errors["first_second"]["rel_mse"], errors["last_second"]["rel_mse"]
+        times = f", {last / first:.3g} times as much" if first > 0 else ""
+        print(f"rel. MSE of the first second {number(first)}, of the last {number(last)}{times}")
     columns = ("from s", "to s", "rel. MSE", "rel. MAE", "null dB", "convergence", "spectra dB", "")
     keys = ("start_s", "stop_s", "rel_mse", "rel_mae", "null_depth_db", "spectral_convergence", "log_spectrum_db")
     print_table(

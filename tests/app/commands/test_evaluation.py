@@ -85,7 +85,13 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     # the first mode is left, and exp(-0.1 σt) of it: so much is known of the error
     sigma, middle_s = float(DATA.string.decay_rates(1)), 2.375
     assert late[2]["rel_mse"] == pytest.approx((1 - math.exp(-0.1 * sigma * middle_s)) ** 2, rel=0.1)
+    # damped a tenth less, it errs more and more: the last second's figure lies between those of its windows
+    assert late[1]["rel_mse"] < found["last_second"]["rel_mse"] < late[2]["rel_mse"]
+    assert found["first_second"]["rel_mse"] < late[0]["rel_mse"]
+    times = found["last_second"]["rel_mse"] / found["first_second"]["rel_mse"]
+    assert f"{times:.3g} times as much" in told.out
     at_horizon = json.loads(run("evaluate", preset, "--json", *cache).out)
+    assert "first_second" not in at_horizon["validation"]
     assert found["rel_mse"] == pytest.approx(at_horizon["rel_mse"], rel=1e-4)
 
 
