@@ -1,8 +1,8 @@
-"""Where everything is connected: session, render worker, player and window.
+"""Where everything is connected: session, render worker, player, panels and window.
 
-    widgets ── intents ──► session ── changed ──► controller ──► worker, player, widgets
+    widgets ── intents ──► session ── changed ──► controller ──► worker, player, panels, widgets
     worker, player ── (their threads) ── signals of `_Mail`, queued ──► controller
-    a timer ── 60 times a second ──► playhead, motion, meter
+    a timer ── 60 times a second ──► the panels that can be seen, meter
 
 Everything here runs in the window's thread.
 """
@@ -14,26 +14,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
-from app.library import PresetEntry, list_presets
+from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
-from app.motion import Strobe, frame_at
-from app.rendering import SOURCES, RenderRequest, RenderWorker, Take
+from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
+from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
 from app.views.export_dialog import ExportDialog
 from engine.metrics import ErrorSums
-from engine.preset import outside_training
-from engine.sources import FULL_SCALE_M
+
+LEFT: tuple[type[Panel], ...] = (SpectrumPanel,)
+RIGHT: tuple[type[Panel], ...] = (WaveformPanel,)
 
 BUFFER_S = 0.05  # of sound ahead: room for a busy interpreter, and still a prompt pluck
 FRAME_MS = 16
-SPECTRUM_EVERY = 3  # frames of the picture: 20 spectra a second
-MM = 1000.0
 ProblemListener = Callable[[AudioProblem], None]
 MOTION_FIELDS = {"preset", "position", "amplitude_mm", "shape", "width", "seconds"}
 
@@ -67,7 +65,6 @@ class _Stage:
     take: Take | None = None
     track: Track | None = None
     play_when_ready: bool = False
-    drawn_frames: int = -1  # of the waveform
 
 
 class Controller(QObject):
@@ -89,18 +86,18 @@ class Controller(QObject):
         self.player = make_player(self._mail.audio_problem.emit)
         self.worker = RenderWorker(self._mail)
         self._stage = _Stage()
-        self._strobe = Strobe()
-        self._ticks = 0
         self._last_tick_s = time.monotonic()
-        self._spectrum_place: tuple[object, int, float] | None = None
         self._asked_rate_hz = 0
         self._audio_notice = ""
-        self.entries, problems = list_presets()
+        entries, problems = list_presets()
+        self.library = Library(entries)
+        self.panels = self._make_panels()
         self._connect()
-        self._choose_first_preset()
+        if self.entry is None and (first := self.library.first()):
+            self.session.update(preset=first.name)
         for problem in problems:
             self.window.notices.tell(problem)
-        self._show_choices(frozenset(type(self.session.choices).model_fields))
+        self._choices_shown(frozenset(type(self.session.choices).model_fields))
         self._open_device()
         self._render()
         self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
@@ -109,17 +106,31 @@ class Controller(QObject):
 
     # Connections
 
+    def _make_panels(self) -> list[Panel]:
+        """Every panel, its view in its place in the window."""
+        session, window = self.session, self.window
+        string = StringPanel(session, self.library)
+        window.show_string(string.view)
+        panels: list[Panel] = [string]
+        for field, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
+            for panel in (kind(session, self.library) for kind in kinds):
+                deck.add(panel.key, panel.title, panel.view)
+                panels.append(panel)
+            deck.chosen.connect(lambda key, field=field: session.update(**{field: key}))
+        for panel in panels:
+            panel.seek_asked.connect(self.player.seek)
+            panel.pluck_asked.connect(self.pluck)
+            panel.told.connect(window.notices.tell)
+        return panels
+
     def _connect(self) -> None:
         window, session = self.window, self.session
         session.changed.connect(self._choices_changed)
-        window.presets.set_entries(self.entries)
+        window.presets.set_entries(self.library.entries)
         window.presets.preset_chosen.connect(lambda name: session.update(preset=name))
         window.presets.step_asked.connect(self._step_preset)
         window.previous_asked.connect(lambda: self._step_preset(-1))
         window.next_asked.connect(lambda: self._step_preset(1))
-        window.string.pluck_drawn.connect(session.move_pluck)
-        window.string.pluck_released.connect(self.pluck)
-        window.string.listening_point_moved.connect(session.move_listening_point)
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.transport.export_asked.connect(self.export)
@@ -128,8 +139,6 @@ class Controller(QObject):
         window.pluck_asked.connect(self.pluck)
         window.switch_asked.connect(session.switch_source)
         window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
-        window.waveform.seek_asked.connect(self.player.seek)
-        window.waveform.getPlotItem().sigXRangeChanged.connect(self._redraw_waveform)
         window.audio_menu.aboutToShow.connect(self._fill_audio_menu)
         window.closing.connect(self.close)
         self._mail.started.connect(self._take_started)
@@ -142,7 +151,7 @@ class Controller(QObject):
         try:
             self.session.update(**{field: value})
         except ValueError:  # a knob at its end asks for a hair more
-            self._show_choices(frozenset({field}))
+            self._choices_shown(frozenset({field}))
 
     # Intents
 
@@ -175,7 +184,7 @@ class Controller(QObject):
     @property
     def entry(self) -> PresetEntry | None:
         """The chosen preset."""
-        return next((e for e in self.entries if e.name == self.session.choices.preset), None)
+        return self.library.find(self.session.choices.preset)
 
     def close(self) -> None:
         """Saves the choices and ends every thread."""
@@ -187,64 +196,39 @@ class Controller(QObject):
             save_settings(self._settings_path, self._settings)
         except OSError as error:
             self.window.notices.tell(f"The settings {self._settings_path} cannot be written ({error.strerror}).")
+        for panel in self.panels:
+            panel.close()
         self.worker.close()
         self.player.close()
 
     # Session → everything
 
     def _choices_changed(self, names: frozenset[str]) -> None:
-        self._show_choices(names)
+        self._choices_shown(names)
         if names & MOTION_FIELDS:
             self._stage.play_when_ready |= self.player.status().playing
             self._render()
         elif "listen" in names:
             self._render()
 
-    def _show_choices(self, names: frozenset[str]) -> None:
+    def _choices_shown(self, names: frozenset[str]) -> None:
         choices, window = self.session.choices, self.window
         window.transport.show_choices(choices)
         if "preset" in names:
             window.presets.set_chosen(choices.preset)
-        if names & {"position", "amplitude_mm", "shape", "width", "preset", "listen"}:
-            self._show_pluck()
-        if "heard" in names:
-            for view in (window.string, window.spectrum, window.waveform):
-                view.set_heard(choices.heard)
-            if self._stage.track is not None:
-                self.player.select(choices.heard)
+        window.left.show_key(choices.left_view)
+        window.right.show_key(choices.right_view)
+        for panel in self.panels:
+            panel.choices_changed(names)
+        if "heard" in names and self._stage.track is not None:
+            self.player.select(choices.heard)
         if "loop" in names:
             self.player.set_loop(choices.loop)
         if "volume_db" in names:
             self.player.set_volume_db(choices.volume_db)
 
-    def _show_pluck(self) -> None:
-        choices, entry, string = self.session.choices, self.entry, self.window.string
-        points = entry.info.grid_points if entry else 101
-        string.set_pluck(choices.position, choices.amplitude_mm, choices.pluck.displacement(points).numpy() * MM)
-        string.set_listening_point(choices.listen)
-        trained = entry.info.trained_range.position if entry else None
-        string.set_trained_positions(trained)
-        string.set_warning(self._pluck_warning())
-
-    def _pluck_warning(self) -> str:
-        choices, entry = self.session.choices, self.entry
-        if choices.amplitude_mm == 0:
-            return "silent: the amplitude is 0"
-        if choices.listen in (0.0, 1.0):
-            return "silent: the listening point is at a fixed end"
-        if entry is None:
-            return ""
-        return "; ".join(outside_training(entry.info, choices.pluck))
-
     def _step_preset(self, step: int) -> None:
-        self.session.step_preset([entry.name for entry in self.entries], step)
-
-    def _choose_first_preset(self) -> None:
-        if self.entry is None and self.entries:
-            highest_hz = max(entry.info.rate_hz for entry in self.entries)
-            fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
-            best = min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae)
-            self.session.update(preset=best.name)
+        self.session.step_preset(self.library.names, step)
 
     # Rendering
 
@@ -266,13 +250,9 @@ class Controller(QObject):
     def _take_started(self, take: Take, track: Track) -> None:
         if self._is_stale(take):
             return
-        info = take.info
-        new_preset = self._stage.take is None or self._stage.take.info is not info
         self._stage = _Stage(take, track, self._stage.play_when_ready)
-        if new_preset:
-            self.window.spectrum.set_rate(info.rate_hz)
-        peak_mm = max(1e-3, float(np.abs(take.signal_m("truth", self.session.choices.listen)).max()) * MM)
-        self.window.waveform.set_take(take.seconds, info.horizon_s, 1.25 * peak_mm)
+        for panel in self.panels:
+            panel.take_started(take)
         self.window.error_label.setText("rendering …")
         if self._load(track, keep_position=False) and self._stage.play_when_ready:
             self._begin()
@@ -280,13 +260,10 @@ class Controller(QObject):
     def _begin(self) -> None:
         self._stage.play_when_ready = False
         self.player.play()
-        self._strobe.restart()
 
     def _track_replaced(self, take: Take, track: Track) -> None:
         if take is self._stage.take:
             self._stage.track = track
-            self._stage.drawn_frames = -1
-            self._spectrum_place = None
             self._load(track, keep_position=True)
 
     def _load(self, track: Track, keep_position: bool) -> bool:
@@ -302,6 +279,8 @@ class Controller(QObject):
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
         if take is not self._stage.take:
             return
+        for panel in self.panels:
+            panel.take_finished(take, errors)
         if take.model_ends_s is not None:
             self.window.notices.tell(
                 f"The model's output ran away {take.model_ends_s:.2f} s after the pluck and is silent from there; "
@@ -324,7 +303,6 @@ class Controller(QObject):
     def _tick(self) -> None:
         now_s = time.monotonic()
         elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        self._ticks += 1
         status = self.player.status()
         window = self.window
         window.transport.show_playing(status.playing)
@@ -335,41 +313,13 @@ class Controller(QObject):
         if status.rate_hz != self._asked_rate_hz:
             self._render()
         take = self._stage.take
-        if take is None:
-            return
-        self._show_rate(take, status.rate_hz, status.device is not None)
-        position_s = min(status.position_s, take.seconds)
-        window.waveform.show_playhead(position_s)
-        if status.playing or position_s > 0:
-            self._strobe.advance(
-                elapsed_s if status.playing else 0.0, self.session.choices.speed, take.fundamental_hz
-            )
-            shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
-            window.string.show_frame(frame_at(take, position_s, shown_s, self.session.choices.speed))
-        else:
-            window.string.show_frame(None)
-        if self._ticks % SPECTRUM_EVERY == 0:
-            self._show_spectrum(take, position_s)
-            if self._stage.drawn_frames != take.ready_frames:
-                self._redraw_waveform()
-
-    def _show_spectrum(self, take: Take, position_s: float) -> None:
-        place = (take, take.ready_frames if not take.complete else -1, position_s)
-        if place == self._spectrum_place:
-            return
-        self._spectrum_place = place
-        first = round(position_s * take.info.rate_hz)
-        last = first + self.window.spectrum.analyser.window_frames
-        self.window.spectrum.show_signals(
-            {name: take.signal_m(name, self.session.choices.listen, first, last) / FULL_SCALE_M for name in SOURCES}
-        )
-
-    def _redraw_waveform(self) -> None:
-        take = self._stage.take
         if take is not None:
-            self._stage.drawn_frames = take.ready_frames
-            signals = {name: take.signal_m(name, self.session.choices.listen) * MM for name in SOURCES}
-            self.window.waveform.show_signals(signals, take.info.rate_hz)
+            self._show_rate(take, status.rate_hz, status.device is not None)
+        position_s = min(status.position_s, take.seconds) if take is not None else 0.0
+        moment = Moment(take, position_s, status.playing, elapsed_s)
+        for panel in self.panels:
+            if panel.view.isVisible():
+                panel.show_moment(moment)
 
     def _show_rate(self, take: Take, sound_rate_hz: int, has_device: bool) -> None:
         model, device = take.info.rate_hz / 1000, sound_rate_hz / 1000

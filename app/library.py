@@ -18,6 +18,26 @@ class PresetEntry:
     parameters: int
 
 
+class Library:
+    """The presets in the order of the list, found by name."""
+
+    def __init__(self, entries: list[PresetEntry]) -> None:
+        self.entries = entries
+
+    @property
+    def names(self) -> list[str]:
+        return [entry.name for entry in self.entries]
+
+    def find(self, name: str) -> PresetEntry | None:
+        return next((entry for entry in self.entries if entry.name == name), None)
+
+    def first(self) -> PresetEntry | None:
+        """What a first start shows: the best of the highest rate."""
+        highest_hz = max((entry.info.rate_hz for entry in self.entries), default=0)
+        fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
+        return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
+
+
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     """The usable presets by name, and a line for each file that is not one: it does not hide the rest."""
     entries, problems = [], []

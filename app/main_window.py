@@ -16,13 +16,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.views.deck import Deck
 from app.views.notice_bar import NoticeBar
 from app.views.parts import tool_button
 from app.views.preset_bar import PresetBar
-from app.views.spectrum_view import SpectrumView
-from app.views.string_view import StringView
 from app.views.transport_bar import TransportBar
-from app.views.waveform_view import WaveformView
 
 KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
@@ -57,9 +55,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(1180, 560)
         self.resize(1280, 800)
         self.presets = PresetBar()
-        self.string = StringView()
-        self.spectrum = SpectrumView()
-        self.waveform = WaveformView()
+        self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
         self.notices = NoticeBar()
         self.error_label = QLabel()
@@ -95,15 +91,13 @@ class MainWindow(QMainWindow):
         facts.addWidget(self.presets.card)
         facts.addStretch(1)
         facts.addWidget(self.error_label)
-        plots = QSplitter(Qt.Orientation.Horizontal)
-        plots.addWidget(self.spectrum)
-        plots.addWidget(self.waveform)
-        plots.setSizes([560, 720])
-        views = QSplitter(Qt.Orientation.Vertical)
-        views.addWidget(self.string)
-        views.addWidget(plots)
-        views.setSizes([380, 250])
-        for splitter in (plots, views):
+        decks = QSplitter(Qt.Orientation.Horizontal)
+        decks.addWidget(self.left)
+        decks.addWidget(self.right)
+        decks.setSizes([560, 720])
+        self._stage = QSplitter(Qt.Orientation.Vertical)
+        self._stage.addWidget(decks)
+        for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
             splitter.setHandleWidth(8)
         column = QVBoxLayout()
@@ -112,12 +106,17 @@ class MainWindow(QMainWindow):
         column.addLayout(head)
         column.addLayout(facts)
         column.addWidget(self.notices)
-        column.addWidget(views, 1)
+        column.addWidget(self._stage, 1)
         column.addWidget(self.transport)
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
-        self.string.setFocus()
+
+    def show_string(self, view: QWidget) -> None:
+        """Puts the string above the decks; it has the keyboard at first."""
+        self._stage.insertWidget(0, view)
+        self._stage.setSizes([380, 250])
+        view.setFocus()
 
     def geometry_text(self) -> str:
         """Size and place, for `restore_geometry`."""

@@ -35,6 +35,8 @@ class Choices(BaseModel):
     loop: bool = False
     volume_db: float = Field(0.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
     speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
+    left_view: str = "spectrum"  # keys of panels
+    right_view: str = "waveform"
 
     @property
     def pluck(self) -> Pluck:

@@ -54,6 +54,12 @@ QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; b
 QSlider::handle:horizontal:focus {{ background: {TRUTH}; }}
 QProgressBar {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; text-align: center; }}
 QProgressBar::chunk {{ background: {TRUTH}; }}
+QTabWidget::pane {{ border: none; }}
+QTabBar {{ background: transparent; }}
+QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 2px solid transparent; }}
+QTabBar::tab:hover {{ color: {TEXT}; }}
+QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
+QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}
 QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; }}
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,11 @@ from app.views.string_view import MARGIN_X
 LEFT = Qt.MouseButton.LeftButton
 
 
+def view(controller: Controller, key: str) -> Any:
+    """The view of a panel."""
+    return next(panel.view for panel in controller.panels if panel.key == key)
+
+
 def wait_for_take(qtbot: QtBot, controller: Controller) -> None:
     qtbot.waitUntil(
         lambda: "error of this pluck" in controller.window.error_label.text(),
@@ -26,7 +32,7 @@ def wait_for_take(qtbot: QtBot, controller: Controller) -> None:
 
 
 def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller) -> None:
-    string = controller.window.string
+    string = view(controller, "string")
     wait_for_take(qtbot, controller)
     x = round(MARGIN_X + 0.6 * (string.width() - 2 * MARGIN_X))
     qtbot.mousePress(string, LEFT, pos=QPoint(x, string.height() // 2))
@@ -41,7 +47,7 @@ def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller)
 
 
 def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: Controller) -> None:
-    string = controller.window.string
+    string = view(controller, "string")
     width = string.width() - 2 * MARGIN_X
     start = QPoint(round(MARGIN_X + controller.session.choices.listen * width), string.height() - 30)
     qtbot.mousePress(string, LEFT, pos=start)
@@ -52,7 +58,7 @@ def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: 
 
 
 def test_keys(qtbot: QtBot, controller: Controller) -> None:
-    window, session = controller.window, controller.session
+    window, session, string = controller.window, controller.session, view(controller, "string")
     wait_for_take(qtbot, controller)
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
@@ -63,11 +69,11 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     assert session.choices.loop
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: not controller.player.status().playing, timeout=5_000)
-    qtbot.keyClick(window.string, Qt.Key.Key_Right)
+    qtbot.keyClick(string, Qt.Key.Key_Right)
     assert session.choices.position == pytest.approx(0.36)
-    qtbot.keyClick(window.string, Qt.Key.Key_Up)
+    qtbot.keyClick(string, Qt.Key.Key_Up)
     assert session.choices.amplitude_mm == 4.5
-    qtbot.keyClick(window.string, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
+    qtbot.keyClick(string, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     assert session.choices.listen == pytest.approx(0.36)
 
 
@@ -101,12 +107,12 @@ def test_a_knob_asks_and_shows(qtbot: QtBot, controller: Controller) -> None:
 def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
     controller.player.seek(0.1)
-    qtbot.waitUntil(lambda: controller.window.string._frame is not None, timeout=20_000)
-    frame = controller.window.string._frame
+    qtbot.waitUntil(lambda: view(controller, "string")._frame is not None, timeout=20_000)
+    frame = view(controller, "string")._frame
     assert frame is not None
     assert set(frame.shapes) == {"model", "truth"}
-    for view in (controller.window.spectrum, controller.window.waveform):
-        for curve in view._curves.values():
+    for plot in (view(controller, "spectrum"), view(controller, "waveform")):
+        for curve in plot._curves.values():
             qtbot.waitUntil(lambda curve=curve: curve.getData()[0] is not None, timeout=20_000)
             assert np.isfinite(curve.getData()[1]).all()
             assert np.ptp(curve.getData()[1]) > 0
@@ -114,13 +120,13 @@ def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
 
 def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller) -> None:
     controller.session.update(position=0.1)
-    assert "outside the trained" in controller.window.string._warning
+    assert "outside the trained" in view(controller, "string")._warning
     controller.session.update(position=0.5, amplitude_mm=0)
-    assert "silent" in controller.window.string._warning
+    assert "silent" in view(controller, "string")._warning
     controller.session.update(amplitude_mm=5, listen=1.0)
-    assert "fixed end" in controller.window.string._warning
+    assert "fixed end" in view(controller, "string")._warning
     controller.session.update(listen=0.3)
-    assert controller.window.string._warning == ""
+    assert view(controller, "string")._warning == ""
 
 
 def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: Controller) -> None:
@@ -176,3 +182,12 @@ def test_every_control_has_a_name(controller: Controller) -> None:
     for control in [*window.findChildren(QAbstractButton), *window.findChildren(QComboBox)]:
         if control.focusPolicy() != Qt.FocusPolicy.NoFocus and control.isVisible():
             assert control.accessibleName() or control.text(), control
+
+
+def test_decks_and_session_agree_on_the_views(controller: Controller) -> None:
+    left, session = controller.window.left, controller.session
+    assert left.currentWidget() is view(controller, session.choices.left_view)
+    left.chosen.emit("spectrum")
+    assert session.choices.left_view == "spectrum"
+    session.update(left_view="none such")  # of another version: what is in front stays
+    assert left.currentWidget() is view(controller, "spectrum")

@@ -1,0 +1,11 @@
+"""What the window shows of the motion on stage, one panel an aspect: a view, and what is told to it.
+
+`base.py` has the contract; the controller holds the list of panels and tells them all the same things.
+"""
+
+from app.panels.base import Moment, Panel
+from app.panels.spectrum import SpectrumPanel
+from app.panels.string import StringPanel
+from app.panels.waveform import WaveformPanel
+
+__all__ = ["Moment", "Panel", "SpectrumPanel", "StringPanel", "WaveformPanel"]

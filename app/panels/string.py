@@ -1,0 +1,62 @@
+"""The string in motion, the pluck that is being drawn, and why a pluck may be silent or beyond the training."""
+
+from __future__ import annotations
+
+from app.library import Library
+from app.motion import Strobe, frame_at
+from app.panels.base import Moment, Panel
+from app.rendering import Take
+from app.session import Session
+from app.views.string_view import StringView
+from engine.preset import outside_training
+
+MM = 1000.0
+PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "listen"}
+
+
+class StringPanel(Panel):
+    key = "string"
+    title = "String"
+    view: StringView
+
+    def __init__(self, session: Session, library: Library) -> None:
+        super().__init__(session, library)
+        self.view = StringView()
+        self.view.pluck_drawn.connect(session.move_pluck)
+        self.view.pluck_released.connect(self.pluck_asked)
+        self.view.listening_point_moved.connect(session.move_listening_point)
+        self._strobe = Strobe()
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        if names & PLUCK_FIELDS:
+            self._show_pluck()
+        if "heard" in names:
+            self.view.set_heard(self.session.choices.heard)
+
+    def take_started(self, take: Take) -> None:
+        self._strobe.restart()
+
+    def show_moment(self, moment: Moment) -> None:
+        take, position_s, speed = moment.take, moment.position_s, self.session.choices.speed
+        if take is None or not (moment.playing or position_s > 0):
+            self.view.show_frame(None)
+            return
+        self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, speed, take.fundamental_hz)
+        shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
+        self.view.show_frame(frame_at(take, position_s, shown_s, speed))
+
+    def _show_pluck(self) -> None:
+        choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
+        points = entry.info.grid_points if entry else 101
+        view.set_pluck(choices.position, choices.amplitude_mm, choices.pluck.displacement(points).numpy() * MM)
+        view.set_listening_point(choices.listen)
+        view.set_trained_positions(entry.info.trained_range.position if entry else None)
+        view.set_warning(self._pluck_warning())
+
+    def _pluck_warning(self) -> str:
+        choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
+        if choices.amplitude_mm == 0:
+            return "silent: the amplitude is 0"
+        if choices.listen in (0.0, 1.0):
+            return "silent: the listening point is at a fixed end"
+        return "; ".join(outside_training(entry.info, choices.pluck)) if entry else ""
