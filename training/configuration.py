@@ -55,10 +55,11 @@ class Recipe:
     start_share: float = 0.04  # of the peak rate, at the start of a cycle
     warm_up: float = 0.1  # share of the run until the peak; then a cosine down to zero
     eigenvalue_rate: float = 0.2  # learning rate of the eigenvalues' parameters, as a share
+    coupling_rate: float = 1.0  # learning rate of an integrated phase's K, as a share
     weight_decay: float = 0.01  # AdamW's
     eigenvalue_decay: bool = False  # whether it decays the eigenvalues' parameters too
     clip_norm: float = 1.0
-    loss: Literal["mse", "log10_mse"] = "mse"  # of the prediction
+    loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
     random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …

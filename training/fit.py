@@ -33,6 +33,7 @@ CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
 TELL_EVERY_S = 5.0  # within an epoch
 EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
+COUPLING = "K"  # of an integrated phase: too
 
 
 class Diverged(RuntimeError):
@@ -313,7 +314,8 @@ def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Cal
 def _optimiser(model: torch.nn.Module, recipe: Recipe) -> torch.optim.Optimizer:
     named = list(model.named_parameters())
     groups = [
-        {"params": [p for n, p in named if not _is_eigenvalue(n)], "share": 1.0},
+        {"params": [p for n, p in named if not _is_eigenvalue(n) and n != COUPLING], "share": 1.0},
+        {"params": [p for n, p in named if n == COUPLING], "share": recipe.coupling_rate},
         {
             "params": [p for n, p in named if _is_eigenvalue(n)],
             "share": recipe.eigenvalue_rate,

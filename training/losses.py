@@ -16,6 +16,8 @@ from torch import Tensor
 from engine.models import StringModel
 from training.configuration import Recipe
 
+SILENT = 1e-12  # a string's mean square in normalised units that a relative loss divides by at least
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -53,12 +55,12 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
         ValueError: it is not.
     """
     if not isinstance(model, KoopmanModel):
-        prediction = _mean_square(_predicted(model, batch), batch.target)
-        return recipe.prediction_weight * _scaled(prediction, recipe), prediction.detach()
+        loss, prediction = _prediction(_predicted(model, batch), batch.target, recipe)
+        return recipe.prediction_weight * loss, prediction
     origin = model.encode(batch.initial, batch.second).origin
     latents = model.latents(origin, batch.frames)
-    prediction = _mean_square(model.decode(latents), batch.target)
-    loss = recipe.prediction_weight * _scaled(prediction, recipe)
+    loss, prediction = _prediction(model.decode(latents), batch.target, recipe)
+    loss = recipe.prediction_weight * loss
     if recipe.encoding_weight:
         loss = loss + recipe.encoding_weight * _mean_square(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
@@ -67,7 +69,7 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
         consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()
         loss = loss + recipe.consistency_weight * consistency
-    return loss, prediction.detach()
+    return loss, prediction
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
@@ -79,5 +81,12 @@ def _mean_square(found: Tensor, wanted: Tensor) -> Tensor:
     return (found - wanted).square().mean()
 
 
-def _scaled(prediction: Tensor, recipe: Recipe) -> Tensor:
-    return prediction.log10() if recipe.loss == "log10_mse" else prediction
+def _prediction(found: Tensor, wanted: Tensor, recipe: Recipe) -> tuple[Tensor, Tensor]:
+    """The prediction's loss, and the mean square of its error."""
+    error = _mean_square(found, wanted)
+    if recipe.loss == "log10_mse":
+        return error.log10(), error.detach()
+    if recipe.loss == "relative_mse":
+        own = (found - wanted).square().mean((1, 2)) / wanted.square().mean((1, 2)).clamp(min=SILENT)
+        return own.mean(), error.detach()
+    return error, error.detach()

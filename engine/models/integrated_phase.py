@@ -11,6 +11,9 @@ The linear term is integrated in closed form, ∫ = Σ_m K_nm E_m(0) (1 - e^{-2�
 rule on nodes at fixed times, and between them by the cubic whose slope is the parabola through its samples. No
 recursion: any time can be had in any order, whole samples or not, so a model renders at any sample rate.
 
+Second order. g may count by Σ E_m, so that K E alone is f's first order, which averaging knows exactly: what is left
+of f when the string has become quiet, long after the frames that a training sees.
+
 Modulation. Averaging follows the mean tension; within a period it also swings, at twice the frequency of every mode,
 and high modes swing with it. What that does to first order is a product, and its inverse leads into the averaged
 coordinates (a near-identity transform):
@@ -18,6 +21,10 @@ coordinates (a near-identity transform):
     û = decoder(z ⊙ exp(M_out z²)),     z(0) = y ⊙ exp(M_in y²),  y = encoder(u₀),
 
 with real matrices on [Re z², Im z²] that yield log gain (bounded as above) and phase.
+
+Adiabatic change. What a falling tension leaves alone is a mode's action, ω q²: as the pitch falls the amplitude
+gains. With A_in and A_out, real, the exponents have A |z|² beside M z², so that |z| may be the action's root, which
+decays by σ alone; then E(s) above is right long after the start.
 
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
 parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
@@ -73,12 +80,14 @@ class IntegratedPhaseConfiguration:
         multiplier_widths: hidden widths of Koopman_var's multiplier, 1 + MLP(|z|²). Evaluated at every frame.
         decoder_widths: hidden widths of an MLP that is added to the linear decoder. Evaluated at every frame.
         modulation: whether there are M_in and M_out. Evaluated at every frame.
+        adiabatic: whether there are A_in and A_out, too; they need the modulation.
         node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
         rate_unit: unit of K E and of g in radians and nepers a sample. A weight of 1 turns a phase by one radian in
             1/rate_unit samples, the order of a training horizon, so that an optimiser's usual steps suit.
         physical_units: K, g and M are told the tension that each mode adds, as a share of that at rest, instead of
             the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
             which an optimiser and a network need. A start from the physics fills the units in.
+        second_order: whether g counts by Σ E_m.
         gain_limit_db: b, the largest change of level that Re f can add up to.
     """
 
@@ -90,14 +99,18 @@ class IntegratedPhaseConfiguration:
     multiplier_widths: tuple[int, ...] = ()
     decoder_widths: tuple[int, ...] = ()
     modulation: bool = False
+    adiabatic: bool = False
     node_spacing: int = 40
     rate_unit: float = 1e-3
     physical_units: bool = False
+    second_order: bool = False
     gain_limit_db: float = 6.0
 
     def __post_init__(self) -> None:
         widths = ("encoder_widths", "eigenvalue_widths", "multiplier_widths", "decoder_widths")
         check_sizes(self, "grid_points", "state_size", *widths, "node_spacing")
+        if self.adiabatic and not self.modulation:
+            raise ValueError("adiabatic needs modulation = true")
         for name in ("rate_unit", "gain_limit_db"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
@@ -176,6 +189,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         self.decoder_residual = _mlp(2 * n, c.decoder_widths, c.grid_points)
         self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None  # real parts first
         self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None
+        self.A_in = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
+        self.A_out = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
 
     def encode(self, displacement: Tensor, second: Tensor | None = None) -> IntegratedPhaseState:
         """See the contract; `second` as in `engine.models.inputs.join_input`."""
@@ -185,7 +200,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             z = z + self.encoder_residual(values)
         if self.M_in is not None:
             real, imag = z.chunk(2, dim=-1)
-            z = torch.cat(self._modulate(self.M_in, real, imag, slice(None)), dim=-1)
+            z = torch.cat(self._modulate(self.M_in, self.A_in, real, imag, slice(None)), dim=-1)
         return _at_rest(pack(z))
 
     def advance(
@@ -395,6 +410,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             energies = energies * self.energy_units
         f = self.g(energies.to(dtype)) - self.g(energy.new_zeros(energy.shape[-1], dtype=dtype))
         f = f.double() * self._rate_units
+        if self.configuration.second_order:
+            f = f * energies.sum(-1, keepdim=True)
         positions = torch.cat([times / spacing - first, times.new_tensor([float(last - first)])])
         integrals, slopes = integrate_parabolas(f, positions)
         return integrals[:, :-1] * spacing, slopes[:, :-1], integrals[:, -1] * spacing
@@ -416,7 +433,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
         """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
         if self.M_out is not None:
-            real, imag = self._modulate(self.M_out, real, imag, alive)
+            real, imag = self._modulate(self.M_out, self.A_out, real, imag, alive)
         if self.multiplier is not None:
             a, b = self.multiplier(real.square() + imag.square()).chunk(2, dim=-1)
             real, imag = real + a * real - b * imag, imag + a * imag + b * real
@@ -430,21 +447,28 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             found = found + nn.functional.linear(hidden(parts), *read_layer(last, readout))
         return found
 
-    def _modulate(self, matrix: Tensor, real: Tensor, imag: Tensor, alive: Tensor | slice) -> tuple[Tensor, Tensor]:
-        """z ⊙ exp(M z²) on both parts of z, of the latents `alive`."""
+    def _modulate(
+        self, matrix: Tensor, adiabatic: Tensor | None, real: Tensor, imag: Tensor, alive: Tensor | slice
+    ) -> tuple[Tensor, Tensor]:
+        """z ⊙ exp(M z² + A |z|²) on both parts of z, of the latents `alive`."""
         squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
         n = self.configuration.state_size
         weight = (matrix * self._modulation_units).view(2, n, 2, n)[:, alive][..., alive]
         exponent = nn.functional.linear(squares, weight.reshape(2 * weight.shape[1], -1))
         growth, turn = exponent.chunk(2, dim=-1)
+        if adiabatic is not None:
+            weight = (adiabatic * self._modulation_units[..., :n])[alive][:, alive]
+            growth = growth + nn.functional.linear(real.square() + imag.square(), weight)
         gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
         cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
         return real * cosine - imag * sine, real * sine + imag * cosine
 
     @property
-    def _modulation_units(self) -> Tensor | float:
-        """Of M, in radians and nepers for squares of normalised displacement: (2 state_size,), or one for all."""
-        return MODULATION_UNIT if self.energy_units is None else self.energy_units.to(self.K.dtype).repeat(2)
+    def _modulation_units(self) -> Tensor:
+        """Of M, half of them of A: radians and nepers for squares of normalised displacement, (2 state_size,)."""
+        if self.energy_units is None:
+            return self.K.new_full((2 * self.configuration.state_size,), MODULATION_UNIT)
+        return self.energy_units.to(self.K.dtype).repeat(2)
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
@@ -455,7 +479,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         averaging: physics, and K of the tension-modulated string to first order in ΔT/T₀, by averaging over a
             period: f_n = i k_n/4ω_n Σ_m η_m² E_m (1 + ½δ_nm). A solution without learning: a trained model must
             beat it to have learned more. M_out is what the same order adds within a period (`averaged_modulation`),
-            and M_in undoes it at rest.
+            and M_in undoes it at rest. A_out and A_in
+            are the amplitude's share of the action (`averaged_amplitude`).
 
         The last two are prior knowledge that the paper's models do not have: say so in a table.
         """
@@ -466,7 +491,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
                     _initialise_mlp(network, generator)
             for linear in (self.encoder, self.decoder):
                 initialise_orthogonal(linear, generator)
-            for matrix in (self.K, self.M_in, self.M_out):
+            for matrix in (self.K, self.M_in, self.M_out, self.A_in, self.A_out):
                 if matrix is not None:
                     nn.init.zeros_(matrix)
             if how == "random":
@@ -490,6 +515,9 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             modulation[:n, :modes], modulation[n:, n : n + modes] = gain, turn
             self.M_out.copy_(modulation / self._modulation_units)
             self.M_in[:n, :n] = -self.M_out[:n, :n]
+        if self.A_in is not None and self.A_out is not None:
+            self.A_in[:, :modes] = averaged_amplitude(physics)[mode] / self._modulation_units[:modes]
+            self.A_out.copy_(-self.A_in)
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
@@ -528,6 +556,15 @@ def averaged_coupling(physics: Physics) -> Tensor:
     share = string.tension_coupling(modes) / (4 * string.undamped_frequencies(modes))
     squares = string.wavenumbers(modes).square() * physics.scale_m**2
     return share[:, None] * squares * (1 + 0.5 * torch.eye(modes, dtype=torch.float64)) / physics.rate_hz
+
+
+def averaged_amplitude(physics: Physics) -> Tensor:
+    """A_in of `initialise`, float64 (modes, modes): half the share by which each frequency rises, in nepers.
+
+    The action ω q² / 2 stays while ω changes slowly, so that √ω q does.
+    """
+    frequencies = physics.string.undamped_frequencies(physics.modes) / physics.rate_hz
+    return averaged_coupling(physics) / (2 * frequencies[:, None])
 
 
 def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
