@@ -55,12 +55,18 @@ class TrainingData:
         amplitudes = self._amplitudes[rows[:, None], START_EVERY * starts[:, None] + wanted]
         velocities = self._velocities[rows, starts][:, None]
         if recipe.flip:
-            coin = torch.randint(0, 2, (2, len(rows), 1, 1), generator=generator).to(device)
-            turn = (1 - 2 * coin[0]) * torch.where(coin[1] == 1, self._mirror, 1.0)
+            sign, mirrored = flips(len(rows), generator, device)
+            turn = sign[..., None] * torch.where(mirrored[..., None], self._mirror, 1.0)
             amplitudes, velocities = amplitudes * turn, velocities * turn
         displacement = amplitudes @ self._synthesis
         second = None if self._kind == "displacement" else (velocities @ self._synthesis)[:, 0]
         return Batch(displacement[:, 0], second, self._stride * wanted[1:], displacement[:, 1:])
+
+
+def flips(count: int, generator: torch.Generator, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Which trajectories are turned over, as a sign, and which are mirrored: (count, 1) each."""
+    coin = torch.randint(0, 2, (2, count, 1), generator=generator).to(device)
+    return 1 - 2 * coin[0], coin[1] == 1
 
 
 def batches(recipe: Recipe, count: int, epoch: int) -> tuple[Tensor, ...]:

@@ -28,6 +28,7 @@ from training.configuration import Recipe, TrainingConfiguration
 from training.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.losses import training_loss
+from training.pursuit import LatentFit, pursue
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
@@ -172,6 +173,10 @@ class _Run:
         if recipe.random_start and kind != "displacement_velocity":
             raise ValueError("recipe.random_start needs a model of the input 'displacement_velocity'")
         self._data = TrainingData(dataset, configuration.steps, kind, device)
+        self._latents: LatentFit | None = None
+        if recipe.latent_epochs:
+            generator = torch.Generator().manual_seed(recipe.seed)
+            self._latents = pursue(self._model, dataset, configuration.steps, generator)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
         self._optimiser = _optimiser(self._model, recipe)
         self._average: AveragedModel | None = None
@@ -218,8 +223,11 @@ class _Run:
         for group in self._optimiser.param_groups:
             group["lr"] = learning_rate * group["share"]
         model.train()
-        batch = self._data.draw(recipe, self._batches[number], horizon, self.step)
-        loss, error = training_loss(model, batch, recipe)
+        if self._latents is not None and epoch < recipe.latent_epochs:
+            loss, error = self._latents.loss(model, recipe, self._batches[number], self.step)
+        else:
+            batch = self._data.draw(recipe, self._batches[number], horizon, self.step)
+            loss, error = training_loss(model, batch, recipe)
         self._optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
@@ -231,8 +239,12 @@ class _Run:
 
     def _schedules(self) -> tuple[int, float]:
         """Horizon and learning rate of the next step."""
-        share = self.step / (self._recipe.epochs * self._per_epoch)
-        return horizon_at(self._recipe, share, self._configuration.steps), learning_rate_at(self._recipe, share)
+        recipe, latent_steps = self._recipe, self._recipe.latent_epochs * self._per_epoch
+        if self.step < latent_steps:
+            peak = recipe.latent_learning_rate / recipe.peak_learning_rate
+            return self._configuration.steps, peak * learning_rate_at(recipe, self.step / latent_steps)
+        share = (self.step - latent_steps) / max(1, recipe.epochs * self._per_epoch - latent_steps)
+        return horizon_at(recipe, share, self._configuration.steps), learning_rate_at(recipe, share)
 
     def progress(self, validation: RelativeError | None, step_s: float) -> Progress:
         """`step_s`: what a step has taken."""

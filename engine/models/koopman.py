@@ -38,6 +38,7 @@ from engine.sine_transform import analysis_matrix, synthesis_matrix
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
 STRAIGHT = 4.0  # in the data's deviations: where "physics" holds the units, so that most plucks leave them straight
 SHARPEST = 0.05  # "physics": share by which the strongest plucks raise a mode's frequency
+FAR = 12.0  # the same for `store_basis`, which must be exact for the strongest plucks too
 UNHEARD = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
 
 
@@ -118,6 +119,24 @@ class Koopman(DiagonalModel):
             else:
                 self._initialise_linear_string(physics, generator)
 
+    @torch.no_grad()
+    def store_basis(
+        self, log_eigenvalues: Tensor, shapes: Tensor, mixing: Tensor, generator: torch.Generator
+    ) -> None:
+        """Eigenvalues, a decoder that is û = Σ_j Re z_j shape_j where SELU is straight, and the mixing layer.
+
+        Args:
+            log_eigenvalues: complex (state_size,).
+            shapes: (state_size, grid_points).
+            mixing: (2 state_size, 2 state_size), real parts first.
+        """
+        store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
+        synthesis = torch.cat([shapes.T, torch.zeros_like(shapes.T)], dim=1)
+        _store_linear_map(dense_layers(self.decoder), synthesis, generator, straight=FAR, spare=False)
+        last = dense_layers(self.encoder)[-1]
+        last.weight.copy_(mixing)
+        nn.init.zeros_(last.bias)
+
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         c, modes = self.configuration, physics.modes
         sharpest = SHARPEST if physics.tension_modulated else 0.0
@@ -134,7 +153,12 @@ class Koopman(DiagonalModel):
 
 
 def _store_linear_map(
-    layers: list[nn.Linear], matrix: Tensor, generator: torch.Generator, others: float = 0.0
+    layers: list[nn.Linear],
+    matrix: Tensor,
+    generator: torch.Generator,
+    others: float = 0.0,
+    straight: float = STRAIGHT,
+    spare: bool = True,
 ) -> None:
     """Makes dense layers with SELU between `matrix` (outputs, inputs), where no unit leaves SELU's straight part.
 
@@ -143,6 +167,9 @@ def _store_linear_map(
 
     Args:
         others: size of the last layer's random weights for what `matrix` does not read.
+        straight: where the units are held.
+        spare: whether the first layer's units hold what `matrix` does not read, too; latents that nearly cancel in
+            what is read are large in all else.
 
     Raises:
         ValueError: a hidden layer is too narrow.
@@ -152,11 +179,15 @@ def _store_linear_map(
     through = torch.eye(matrix.shape[1], dtype=torch.float64)
     silent = torch.zeros(matrix.shape[1], dtype=torch.float64)  # what a layer is given where the input is zero
     for layer in hidden:
-        weight = layer.weight.double() / SELU_SLOPE if layer is not hidden[0] else _reading(layer, matrix, generator)
+        weight = (
+            layer.weight.double() / SELU_SLOPE
+            if layer is not hidden[0]
+            else _reading(layer, matrix, generator, spare)
+        )
         layer.weight.copy_(weight)
-        layer.bias.copy_(STRAIGHT - weight @ silent)
+        layer.bias.copy_(straight - weight @ silent)
         through = SELU_SLOPE * weight @ through
-        silent = torch.full((len(weight),), SELU_SLOPE * STRAIGHT, dtype=torch.float64)
+        silent = torch.full((len(weight),), SELU_SLOPE * straight, dtype=torch.float64)
     weight = matrix @ torch.linalg.pinv(through)
     if not torch.allclose(weight @ through, matrix, atol=1e-6 * float(matrix.abs().max())):
         narrow = min(layer.out_features for layer in hidden)
@@ -168,12 +199,12 @@ def _store_linear_map(
     last.bias.copy_(-weight @ silent)
 
 
-def _reading(layer: nn.Linear, matrix: Tensor, generator: torch.Generator) -> Tensor:
-    """Orthonormal rows or columns (units, inputs), in which all that `matrix` reads is held first."""
+def _reading(layer: nn.Linear, matrix: Tensor, generator: torch.Generator, spare: bool) -> Tensor:
+    """Weights (units, inputs) that hold all that `matrix` reads, and if `spare` what else there is room for."""
     _, values, rows = torch.linalg.svd(matrix, full_matrices=False)
     rows = rows[values > 1e-9 * values[0]]
     units, inputs = layer.weight.shape
     others = torch.empty(inputs, inputs, dtype=torch.float64).normal_(generator=generator)
-    basis = torch.linalg.qr(torch.cat([rows, others]).T).Q[:, : min(units, inputs)].T
+    basis = torch.linalg.qr(torch.cat([rows, others]).T).Q[:, : min(units, inputs)].T if spare else rows
     turn = nn.init.orthogonal_(torch.empty(units, len(basis), dtype=torch.float64), generator=generator)
     return turn @ basis

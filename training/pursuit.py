@@ -1,0 +1,182 @@
+"""A start for Koopman from the training data: eigenvalues by matching pursuit, and what its encoder shall yield.
+
+With a linear decoder and given eigenvalues the best latents of a trajectory are a least-squares fit. So the
+eigenvalues are chosen first: for each mode of the string the exponentials that explain most of all its motions, one
+after the other, from a grid of frequencies that its rising tension reaches and of decay rates (simultaneous
+orthogonal matching pursuit; Tropp, Gilbert, Strauss 2006). The decoder sums them, each in its mode's shape. Then
+the encoder learns the fitted latents, in orthonormal coordinates: the distance there *is* the error of the prediction
+over every frame of the horizon, at the cost of no rollout.
+
+It uses the string's modes and linear frequencies: prior knowledge that the paper's models do not have.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from engine.models import StringModel
+from engine.models.koopman import Koopman
+from engine.sine_transform import synthesis_matrix
+from training.batches import flips
+from training.configuration import Recipe
+from training.dataset import Dataset
+
+TRAJECTORIES = 400  # of the training split that choose the eigenvalues
+FREQUENCIES = 80  # of a mode's grid, between the linear one and the highest that the tension reaches
+DECAYS = (0.0, 1.0, 3.0, 8.0)  # nepers over the horizon, beside the mode's own
+APART = 1e-3  # share of an exponential that no chosen one explains, at least
+
+
+@dataclass(frozen=True)
+class LatentFit:
+    """What the encoder shall yield for the training split.
+
+    Attributes:
+        initial: displacement (count, grid_points) in normalised units.
+        targets: orthonormal coordinates of the fitted latents, (count, 2 state_size); their squares sum up to the
+            mean over frames of the squared modal amplitudes.
+        mirror: factors (2 state_size,) of the coordinates of a string seen from its other end.
+    """
+
+    initial: Tensor
+    targets: Tensor
+    mirror: Tensor
+
+    def loss(self, model: StringModel, recipe: Recipe, rows: Tensor, iteration: int) -> tuple[Tensor, Tensor]:
+        """The relative error, and the mean square of the prediction's, of the trajectories `rows`."""
+        assert isinstance(model, Koopman)
+        rows = rows.to(self.initial.device)
+        initial, targets = self.initial[rows], self.targets[rows]
+        if recipe.flip:
+            generator = torch.Generator().manual_seed((recipe.seed + 1) * 1_000_003 + iteration)
+            sign, mirrored = flips(len(rows), generator, initial.device)
+            initial = sign * torch.where(mirrored, initial.flip(1), initial)
+            targets = sign * torch.where(mirrored, targets * self.mirror, targets)
+        error = (model.encoder[:-1](initial) - targets).square().sum(1).mean()
+        # a mode's mean square over the string is half its amplitude's
+        return error / self._energy, (error / 2).detach()
+
+    @property
+    def _energy(self) -> Tensor:
+        return self.targets.square().sum(1).mean()
+
+
+def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator) -> LatentFit:
+    """Gives a Koopman its eigenvalues, its decoder and the last layer of its encoder.
+
+    Args:
+        steps: frames of the horizon.
+
+    Raises:
+        ValueError: the model is no Koopman with a mixing layer, or its data are strided.
+    """
+    c = dataset.configuration
+    if not isinstance(model, Koopman) or not model.configuration.mixing_layer:
+        raise ValueError("latent_epochs needs the model 'koopman' with its mixing layer; set it to 0")
+    if c.stride != 1:
+        raise ValueError(f"latent_epochs needs every frame: the data's stride must be 1, not {c.stride}")
+    amplitudes = dataset.split("train").double() / dataset.scale_m
+    n = model.configuration.state_size
+    most = min(n, 3 * (-(-n // c.modes)))
+    chains = [_chain(dataset, amplitudes, mode, steps, most) for mode in range(c.modes)]
+    lengths = _share_out([chain.gains for chain in chains], n)
+
+    log_eigenvalues = torch.full((n,), complex(-1.0 / steps, math.pi / 2), dtype=torch.complex128)
+    shapes = torch.zeros(n, c.grid_points, dtype=torch.float64)
+    mixing = torch.zeros(2 * n, 2 * n, dtype=torch.float64)
+    targets = torch.zeros(len(amplitudes), 2 * n, dtype=torch.float64)
+    mirror = torch.ones(2 * n)
+    sines = synthesis_matrix(c.grid_points, c.modes)
+    first = 0
+    for mode, (chain, length) in enumerate(zip(chains, lengths, strict=True)):
+        here = torch.arange(first, first + length)
+        log_eigenvalues[here] = chain.log_eigenvalues[:length]
+        shapes[here] = sines[mode]
+        basis = chain.basis[:, : 2 * length]
+        exponentials = torch.exp(chain.log_eigenvalues[:length] * _frames(steps)[:, None])
+        columns = torch.cat([exponentials.real, -exponentials.imag], dim=1)
+        places = torch.cat([here, n + here])
+        coordinates = torch.arange(2 * first, 2 * (first + length))
+        mixing[places[:, None], coordinates] = math.sqrt(steps) * torch.linalg.inv(basis.T @ columns)
+        targets[:, coordinates] = amplitudes[:, 1 : steps + 1, mode] @ basis / math.sqrt(steps)
+        mirror[coordinates] = (-1.0) ** mode
+        first += length
+    model.store_basis(log_eigenvalues, shapes, mixing, generator)
+    initial = (amplitudes[:, 0] @ sines).float()
+    device = model.nu_log.device
+    return LatentFit(initial.to(device), targets.float().to(device), mirror.to(device))
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """A mode's exponentials in the order of their choice.
+
+    Attributes:
+        log_eigenvalues: complex128 (length,).
+        gains: what each explains of the motions' squares.
+        basis: orthonormal columns (steps, 2 length), two for each.
+    """
+
+    log_eigenvalues: Tensor
+    gains: list[float]
+    basis: Tensor
+
+
+def _chain(dataset: Dataset, amplitudes: Tensor, mode: int, steps: int, most: int) -> _Chain:
+    c = dataset.configuration
+    linear = c.string.eigenvalues(c.modes)[mode] / c.rate_hz
+    rise = 0.0
+    if c.tension_modulated:  # at most half of the tension's, at the start of the strongest motion
+        rise = 0.5 * float(c.string.relative_tension_rise(amplitudes[:, 0] * dataset.scale_m).max())
+    lowest = float(linear.imag) - 4 * math.pi / steps
+    highest = float(linear.imag) * (1 + rise) + math.pi / steps
+    spacing = max(math.pi / 2 / steps, float(linear.imag) * rise / FREQUENCIES)
+    frequencies = torch.arange(lowest, highest, spacing, dtype=torch.float64)
+    frequencies = torch.cat([linear.imag[None], frequencies[frequencies > 0]])
+    decays = torch.tensor(DECAYS, dtype=torch.float64) / steps - linear.real
+    grid = torch.complex(-decays.expand(len(frequencies), -1), frequencies[:, None].expand(-1, len(decays))).flatten()
+    return _pursuit(grid, amplitudes[:TRAJECTORIES, 1 : steps + 1, mode], most)
+
+
+def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:
+    """Simultaneous orthogonal matching pursuit of real motions (count, steps) in exponentials of `grid`."""
+    exponentials = torch.exp(grid[:, None] * _frames(motions.shape[1]))
+    pairs = torch.stack([exponentials.real, exponentials.imag], dim=1)  # (grid, 2, steps)
+    pairs = pairs / pairs.square().sum(-1, keepdim=True).sqrt()
+    products = torch.einsum("st,gkt->gks", motions, pairs)
+    chosen, gains, basis = [], [], []
+    for _ in range(most):
+        gram = pairs @ pairs.mT
+        determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1].square()
+        apart = (gram[:, 0, 0] > APART) & (gram[:, 1, 1] > APART) & (determinant > 0.1 * APART**2)
+        if not bool(apart.any()):
+            break
+        squares = products @ products.mT
+        explained = gram[:, 1, 1] * squares[:, 0, 0] + gram[:, 0, 0] * squares[:, 1, 1]
+        explained = (explained - 2 * gram[:, 0, 1] * squares[:, 0, 1]) / determinant
+        best = int(torch.where(apart, explained, -1.0).argmax())
+        columns = torch.linalg.qr(pairs[best].T).Q
+        chosen.append(grid[best])
+        gains.append(float(explained[best]))
+        basis.append(columns)
+        overlap = pairs @ columns
+        products = products - overlap @ (motions @ columns).T
+        pairs = pairs - overlap @ columns.T
+    return _Chain(torch.stack(chosen), gains, torch.cat(basis, dim=1))
+
+
+def _share_out(gains: list[list[float]], size: int) -> list[int]:
+    """How many of its exponentials each mode gets, the greatest gains first: `size` in all, or all there are."""
+    lengths = [0] * len(gains)
+    for _ in range(min(size, sum(map(len, gains)))):
+        open_modes = [mode for mode, chain in enumerate(gains) if lengths[mode] < len(chain)]
+        lengths[max(open_modes, key=lambda mode: gains[mode][lengths[mode]])] += 1
+    return lengths
+
+
+def _frames(steps: int) -> Tensor:
+    return torch.arange(1, steps + 1, dtype=torch.float64)
