@@ -37,17 +37,20 @@ class LatentFit:
 
     Attributes:
         initial: displacement (count, grid_points) in normalised units.
-        targets: orthonormal coordinates of the fitted latents, (count, 2 state_size); their squares sum up to the
-            mean over frames of the squared modal amplitudes.
+        targets: orthonormal coordinates of the fitted latents, (count, 2 state_size), of mean square 1: what a
+            network is at ease with.
+        unit: of the coordinates. Their squares, times its own, sum up to the mean over frames of the squared modal
+            amplitudes.
         mirror: factors (2 state_size,) of the coordinates of a string seen from its other end.
     """
 
     initial: Tensor
     targets: Tensor
+    unit: float
     mirror: Tensor
 
     def loss(self, model: StringModel, recipe: Recipe, rows: Tensor, iteration: int) -> tuple[Tensor, Tensor]:
-        """The relative error, and the mean square of the prediction's, of the trajectories `rows`."""
+        """The error of the coordinates, and the mean square of the prediction's, of the trajectories `rows`."""
         assert isinstance(model, Koopman)
         rows = rows.to(self.initial.device)
         initial, targets = self.initial[rows], self.targets[rows]
@@ -56,13 +59,9 @@ class LatentFit:
             sign, mirrored = flips(len(rows), generator, initial.device)
             initial = sign * torch.where(mirrored, initial.flip(1), initial)
             targets = sign * torch.where(mirrored, targets * self.mirror, targets)
-        error = (model.encoder[:-1](initial) - targets).square().sum(1).mean()
+        error = (model.encoder[:-1](initial) - targets).square().mean()
         # a mode's mean square over the string is half its amplitude's
-        return error / self._energy, (error / 2).detach()
-
-    @property
-    def _energy(self) -> Tensor:
-        return self.targets.square().sum(1).mean()
+        return error, (error * targets.shape[1] * self.unit**2 / 2).detach()
 
 
 def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator) -> LatentFit:
@@ -105,10 +104,11 @@ def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Ge
         targets[:, coordinates] = amplitudes[:, 1 : steps + 1, mode] @ basis / math.sqrt(steps)
         mirror[coordinates] = (-1.0) ** mode
         first += length
-    model.store_basis(log_eigenvalues, shapes, mixing, generator)
+    unit = float(targets.square().mean().sqrt())
+    model.store_basis(log_eigenvalues, shapes, unit * mixing, generator)
     initial = (amplitudes[:, 0] @ sines).float()
     device = model.nu_log.device
-    return LatentFit(initial.to(device), targets.float().to(device), mirror.to(device))
+    return LatentFit(initial.to(device), (targets / unit).float().to(device), unit, mirror.to(device))
 
 
 @dataclass(frozen=True)
