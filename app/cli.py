@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import bench, evaluation, listing, motion, render, sweep, tables, training
+from app.commands import abx, bench, evaluation, listing, motion, render, sweep, tables, training
 from app.commands.console import say
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
@@ -68,6 +68,7 @@ for command in (
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
 cli.add_typer(bench.bench, name="bench")
+cli.add_typer(abx.abx, name="abx")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

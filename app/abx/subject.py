@@ -1,0 +1,40 @@
+"""What is put to the test: the sounds that can be A or B, and the pluck that they share."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+from app.abx.record import HeardPluck
+from app.abx.sound import Candidate
+from app.library import PresetEntry
+from app.session import Choices
+
+
+@dataclass(frozen=True)
+class Subject:
+    """See the module. `volume_db` is the player's: it stays as it is during the test.
+
+    Attributes:
+        candidates: two or more; the first two are A and B until another choice is made.
+    """
+
+    candidates: tuple[Candidate, ...]
+    pluck: HeardPluck
+    volume_db: float
+
+
+def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
+    """Model and truth of the preset on stage. Raises OSError where its file cannot be read."""
+    with entry.path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    pluck = HeardPluck(
+        position=choices.position,
+        amplitude_mm=choices.amplitude_mm,
+        shape=choices.shape,
+        width=choices.width,
+        listen=choices.listen,
+        seconds=choices.seconds,
+    )
+    candidates = tuple(Candidate(source, source.capitalize(), entry.name, digest) for source in ("model", "truth"))
+    return Subject(candidates, pluck, choices.volume_db)

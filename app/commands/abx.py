@@ -1,0 +1,24 @@
+"""abx show: the record of a listening test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+abx = typer.Typer(no_args_is_help=True, help="Records of listening tests.", rich_markup_mode=None)
+
+
+@abx.callback()
+def group() -> None:
+    """Records of listening tests."""
+
+
+@abx.command()
+def show(file: Annotated[Path, typer.Argument(metavar="FILE", help="A record that the app has saved.")]) -> None:
+    """Check a record and print it in words."""
+    from app.abx.record import load_record
+    from app.abx.text import as_text
+
+    print(as_text(load_record(file)), end="")
