@@ -9,6 +9,7 @@ Everything here runs in the window's thread.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 
+from app.abx.subject import subject_of
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
@@ -24,6 +26,7 @@ from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
+from app.views.abx_dialog import AbxDialog
 from app.views.export_dialog import ExportDialog
 from engine.metrics import ErrorSums
 
@@ -89,6 +92,7 @@ class Controller(QObject):
         self._last_tick_s = time.monotonic()
         self._asked_rate_hz = 0
         self._audio_notice = ""
+        self._abx: AbxDialog | None = None  # while it is open, the player is its own
         entries, problems = list_presets()
         self.library = Library(entries)
         self.panels = self._make_panels()
@@ -135,6 +139,7 @@ class Controller(QObject):
         window.transport.play_asked.connect(self.play_or_stop)
         window.transport.export_asked.connect(self.export)
         window.export_asked.connect(self.export)
+        window.abx_asked.connect(self.listening_test)
         window.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
         window.switch_asked.connect(session.switch_source)
@@ -181,6 +186,32 @@ class Controller(QObject):
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
+    def listening_test(self) -> None:
+        """Opens the ABX test on what is on stage; until it is closed, the player belongs to it."""
+        entry, stage = self.entry, self._stage
+        if entry is None or stage.track is None or stage.take is None or self._is_stale(stage.take):
+            self.window.notices.tell("The listening test needs a sound: wait until the pluck is rendered.")
+            return
+        try:
+            subject = subject_of(entry, self.session.choices)
+        except OSError as error:
+            self.window.notices.tell(f"{entry.path} cannot be read ({error.strerror}).")
+            return
+        self._abx = AbxDialog(self.player, subject, self._settings.abx, self.window)
+        self._abx.finished.connect(self._listening_test_ended)
+        self._abx.set_track(stage.track)
+        self._abx.open()
+
+    def _listening_test_ended(self) -> None:
+        dialog, self._abx = self._abx, None
+        assert dialog is not None
+        self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
+        dialog.deleteLater()
+        self._stage.play_when_ready = False
+        self.player.set_loop(self.session.choices.loop)
+        if self._stage.track is not None:
+            self._load(self._stage.track, keep_position=False)
+
     @property
     def entry(self) -> PresetEntry | None:
         """The chosen preset."""
@@ -188,6 +219,8 @@ class Controller(QObject):
 
     def close(self) -> None:
         """Saves the choices and ends every thread."""
+        if self._abx is not None:
+            self._abx.abandon()
         self._timer.stop()
         self._settings = self._settings.model_copy(
             update={"choices": self.session.choices, "window_geometry": self.window.geometry_text()}
@@ -268,6 +301,9 @@ class Controller(QObject):
 
     def _load(self, track: Track, keep_position: bool) -> bool:
         """False where the device changed its rate meanwhile: the sound is then made again at the new one."""
+        if self._abx is not None:
+            self._abx.set_track(track)
+            return False
         try:
             self.player.load(track, keep_position)
         except ValueError:
@@ -306,7 +342,8 @@ class Controller(QObject):
         status = self.player.status()
         window = self.window
         window.transport.show_playing(status.playing)
-        window.transport.meter.show_level(status.peak_db, status.limiting)
+        hidden = self._abx is not None  # a level would give away what is heard
+        window.transport.meter.show_level(-math.inf if hidden else status.peak_db, status.limiting and not hidden)
         if status.device is not None and self._audio_notice:
             window.notices.withdraw(self._audio_notice)  # the sound is back
             self._audio_notice = ""

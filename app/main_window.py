@@ -30,6 +30,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
     ("Ctrl+E", "export_asked", "export WAV"),
+    ("Ctrl+T", "abx_asked", "listening test: can you tell model and truth apart?"),
     ("F1", "help_asked", "these keys"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
@@ -45,6 +46,7 @@ class MainWindow(QMainWindow):
     previous_asked = Signal()
     next_asked = Signal()
     export_asked = Signal()
+    abx_asked = Signal()
     help_asked = Signal()
     quit_asked = Signal()
     closing = Signal()
@@ -85,6 +87,9 @@ class MainWindow(QMainWindow):
         head.addSpacing(12)
         head.addWidget(self.presets)
         head.addStretch(1)
+        test = tool_button("ABX …", "Listening test", "Can you tell model and truth apart, blind? (Ctrl+T)")
+        test.clicked.connect(self.abx_asked)
+        head.addWidget(test)
         head.addWidget(self.rate_label)
         head.addWidget(self._audio_button)
         facts = QHBoxLayout()

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 from platformdirs import user_config_path
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from app.abx.trials import MOST_TRIALS
 from app.session import Choices
 from engine.whole_file import whole_file
 
@@ -35,6 +36,16 @@ class DeviceChoice(BaseModel):
     host_api: str
 
 
+class AbxChoices(BaseModel):
+    """The listening test's last state. An empty folder: `app.abx.record.default_folder`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    trials: int = Field(16, ge=1, le=MOST_TRIALS)
+    restart: bool = False
+    folder: str = ""
+
+
 class Settings(BaseModel):
     """The whole file."""
 
@@ -43,6 +54,7 @@ class Settings(BaseModel):
     version: Literal[1] = 1
     choices: Choices = Choices()
     export: ExportChoices = ExportChoices()
+    abx: AbxChoices = AbxChoices()
     device: DeviceChoice | None = None
     window_geometry: str = ""  # Qt's, in base64
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from PySide6.QtWidgets import QComboBox, QFrame, QToolButton
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QToolButton
 
 
 def tool_button(text: str, name: str = "", tip: str = "") -> QToolButton:
@@ -31,3 +32,13 @@ def vertical_rule() -> QFrame:
     line.setObjectName("rule")
     line.setFixedWidth(1)
     return line
+
+
+def label(kind: str = "", text: str = "", selectable: bool = False) -> QLabel:
+    """Text that wraps; `kind` is a name in the style sheet ("faint", "warning")."""
+    made = QLabel(text)
+    made.setObjectName(kind)
+    made.setWordWrap(True)
+    if selectable:
+        made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return made
