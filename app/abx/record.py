@@ -40,7 +40,7 @@ class HeardSource(BaseModel):
     label: str
     preset: str
     preset_sha256: Sha256
-    gain_db: Finite
+    gain_db: Annotated[float, Field(le=0, allow_inf_nan=False)]
 
 
 class HeardPluck(BaseModel):

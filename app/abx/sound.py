@@ -79,7 +79,7 @@ def make_stimuli(track: Track, sources: Sequence[str], volume_db: float = 0.0) -
     made.append(levelled)
     return Stimuli(
         made,
-        (20 * math.log10(gains[0]), 20 * math.log10(gains[1])),
+        (min(0.0, 20 * math.log10(gains[0])), min(0.0, 20 * math.log10(gains[1]))),  # not a rounding above 0
         same=bool(np.array_equal(made.read("A", 0, a.size), made.read("B", 0, a.size))),
         trivial=_convergence(levelled["A"], levelled["B"]) > TRIVIAL_CONVERGENCE,
     )

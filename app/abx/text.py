@@ -42,6 +42,7 @@ def as_text(record: AbxRecord) -> str:
         "Remark": record.remark,
         "A": _source(record.a),
         "B": _source(record.b),
+        **_presets(record),
         "Pluck": f"position {pluck.position:g}, {pluck.amplitude_mm:g} mm, {pluck.shape}, width {pluck.width:g}",
         "Heard": f"at {pluck.listen:g} of the length, {pluck.seconds:g} s",
         "Device": f"{through.device} ({through.host_api}), {through.rate_hz} Hz, volume {through.volume_db:+g} dB",
@@ -50,7 +51,7 @@ def as_text(record: AbxRecord) -> str:
         "Program": f"Learned Strings {record.program}",
     }
     lines = ["ABX listening test", ""]
-    lines += [f"{name:<8} {value}" for name, value in head.items() if value]
+    lines += [f"{name:<9} {value}" for name, value in head.items() if value]
     lines += ["", "trial  X  answer  right  seconds  auditions"]
     for number, trial in enumerate(record.trials, 1):
         right = "yes" if trial.correct else "no"
@@ -62,4 +63,12 @@ def as_text(record: AbxRecord) -> str:
 
 
 def _source(source: HeardSource) -> str:
-    return f"{source.label}, preset {source.preset} (SHA-256 {source.preset_sha256}), {source.gain_db:+.2f} dB"
+    return f"{source.label}, turned down by {abs(source.gain_db):.2f} dB"
+
+
+def _presets(record: AbxRecord) -> dict[str, str]:
+    """One, or that of A and that of B; a name may have come to mean another file, its digest may not."""
+    a, b = ((source.preset, source.preset_sha256) for source in (record.a, record.b))
+    if a == b:
+        return {"Preset": a[0], "SHA-256": a[1]}
+    return {"Preset A": a[0], "SHA-256 A": a[1], "Preset B": b[0], "SHA-256 B": b[1]}

@@ -6,6 +6,7 @@ The number of trials is fixed beforehand: stopping at a lucky moment would make 
 
 from __future__ import annotations
 
+import math
 import random
 import secrets
 from dataclasses import dataclass, replace
@@ -34,10 +35,13 @@ def draw_order(seed: int, trials: int) -> tuple[Identity, ...]:
 
 
 def p_value(correct: int, trials: int) -> float:
-    """The probability that guessing alone gives `correct` right answers or more: one-sided, binomial."""
-    from scipy.stats import binomtest
+    """The probability that guessing alone gives `correct` right answers or more: one-sided, binomial, exact.
 
-    return float(binomtest(correct, trials, 0.5, alternative="greater").pvalue)
+    In integers and not by `scipy.stats`, whose import would let the window stand still for seconds.
+    """
+    if not 0 <= correct <= trials:
+        raise ValueError(f"{correct} of {trials} answers cannot be right")
+    return sum(math.comb(trials, count) for count in range(correct, trials + 1)) / 2**trials
 
 
 def needed_correct(trials: int, level: float = LEVEL) -> int | None:

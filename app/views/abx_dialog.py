@@ -53,7 +53,7 @@ class AbxDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
-        self.resize(680, 520)
+        self.resize(680, 470)
         self._player, self._subject, self._seed = player, subject, seed
         self._track: Track | None = None
         self._stimuli: Stimuli | None = None

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from app.abx.record import AbxRecord, list_records
 from app.abx.text import as_text, score_text
+from app.views import theme
 from app.views.parts import label
 from app.whole_file import WriteError, whole_file
 
@@ -32,6 +33,8 @@ class RecordsPage(QWidget):
         super().__init__()
         self._records: list[tuple[Path, AbxRecord]] = []
         self._list = QListWidget()
+        self._list.setSpacing(3)
+        self._list.setStyleSheet(f"QListWidget::item:selected {{ background: {theme.LINE}; color: {theme.TEXT}; }}")
         self._list.setAccessibleName("Earlier listening tests")
         self._list.currentRowChanged.connect(self._show_row)
         self._text = QPlainTextEdit(readOnly=True)

@@ -26,6 +26,8 @@ from app.abx.text import MEANING
 from app.abx.trials import LEVEL, MOST_TRIALS, USUAL_TRIALS, needed_correct
 from app.views.parts import combo_box, label, tool_button
 
+ROW_HEIGHT = 30
+
 
 class SetupPage(QWidget):
     """Asks with signals; `show_state` says whether the test can start."""
@@ -42,11 +44,14 @@ class SetupPage(QWidget):
         self.folder = folder
         self._pair = [self._build_choice(name, place) for place, name in enumerate("AB")]
         self._trials = QSpinBox(minimum=1, maximum=MOST_TRIALS, value=trials)
+        self._trials.setFixedSize(64, ROW_HEIGHT)
+        self._trials.setStyleSheet("QLineEdit { border: none; padding: 0 6px; }")
         self._trials.setAccessibleName("Number of trials")
         self._trials.setToolTip("Fixed before the start, for a test that may stop at a lucky moment proves nothing")
         self._trials.valueChanged.connect(self._show_trials)
         self._restart = QCheckBox("Begin again from the pluck at each switch")
         self._restart.setChecked(restart)
+        self._restart.setMinimumHeight(ROW_HEIGHT)
         self._restart.setToolTip("Otherwise the switch happens at the playhead, with a cross-fade")
         self._needed = label("faint")
         self._folder = label("faint", selectable=True)
@@ -184,5 +189,5 @@ class SetupPage(QWidget):
 def _row_name(text: str) -> QLabel:
     """As high as the row's buttons, so that both stand on one line."""
     made = QLabel(text)
-    made.setMinimumHeight(30)
+    made.setMinimumHeight(ROW_HEIGHT)
     return made

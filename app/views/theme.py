@@ -34,7 +34,7 @@ QPushButton, QToolButton {{ background: {RAISED}; border: 1px solid {LINE}; bord
 QPushButton:hover, QToolButton:hover {{ border-color: {FAINT}; }}
 QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {TEXT}; }}
-QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus
+QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus
     {{ border: 1px solid {TEXT}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: {LINE}; }}
 QPushButton#model:checked {{ background: {MODEL}; color: {BACKGROUND}; border-color: {MODEL}; font-weight: 600; }}
@@ -42,7 +42,7 @@ QPushButton#truth:checked {{ background: {TRUTH}; color: {BACKGROUND}; border-co
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
 QToolButton::menu-indicator {{ image: none; }}
-QComboBox, QLineEdit, QDoubleSpinBox, QSpinBox {{
+QComboBox, QLineEdit, QDoubleSpinBox {{
     background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;
     selection-background-color: {TRUTH}; selection-color: {BACKGROUND}; }}
 QComboBox::drop-down {{ border: none; width: 22px; }}

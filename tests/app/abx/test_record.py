@@ -117,15 +117,23 @@ def test_the_text_says_everything(record: AbxRecord) -> None:
     text = as_text(record)
     for part in (
         "9 of 10 right, p = 0.011",
-        "Model, preset nylon (SHA-256 0f0f",
-        "-0.50 dB",
+        "Model, turned down by 0.50 dB",
+        "Preset    nylon\n",
+        "SHA-256   0f0f",
         "position 0.35, 4 mm, gaussian",
         "Headphones (ALSA), 48000 Hz",
-        "Seed     5",
+        "Seed      5",
         "guessing alone",
     ):
         assert part in text
     assert sum("  yes  " in line for line in text.splitlines()) == 9
+
+
+def test_two_presets_are_told_apart(record: AbxRecord) -> None:
+    other = record.b.model_copy(update={"preset_sha256": "aa" * 32})
+    text = as_text(record.model_copy(update={"b": other}))
+    assert "SHA-256 A 0f0f" in text
+    assert "SHA-256 B aaaa" in text
 
 
 def test_the_smallest_p_values_are_a_bound() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from pydantic import ValidationError
+from scipy.stats import binomtest
 
 from app.abx.trials import Run, Trial, draw_order, needed_correct, p_value
 
@@ -21,6 +22,15 @@ from app.abx.trials import Run, Trial, draw_order, needed_correct, p_value
 )
 def test_p_values_are_those_of_the_tables(correct: int, trials: int, expected: float) -> None:
     assert p_value(correct, trials) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("trials", [1, 2, 16, 25, 200])
+def test_p_values_are_those_of_scipy(trials: int) -> None:
+    for correct in range(trials + 1):
+        expected = binomtest(correct, trials, 0.5, alternative="greater").pvalue
+        assert p_value(correct, trials) == pytest.approx(expected, rel=1e-9)
+    with pytest.raises(ValueError, match="cannot be right"):
+        p_value(trials + 1, trials)
 
 
 @pytest.mark.parametrize(("trials", "needed"), [(4, None), (5, 5), (10, 9), (16, 12), (25, 18)])
