@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QShortcut
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMainWindow,
-    QMenu,
-    QMessageBox,
+    QScrollArea,
+    QSizePolicy,
     QSplitter,
-    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
+from app.views.app_menu import AppMenu, menu_button
 from app.views.deck import Deck
 from app.views.notice_bar import NoticeBar
 from app.views.parts import tool_button
@@ -30,7 +30,9 @@ KEYS = (  # (key, name of the signal, what it does)
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
     ("Ctrl+E", "export_asked", "export WAV"),
-    ("F1", "help_asked", "these keys"),
+    ("Ctrl+,", "audio_asked", "audio settings"),
+    ("F8", "notices_asked", "notices of this run"),
+    ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
 
@@ -45,15 +47,20 @@ class MainWindow(QMainWindow):
     previous_asked = Signal()
     next_asked = Signal()
     export_asked = Signal()
+    audio_asked = Signal()
+    notices_asked = Signal()
     help_asked = Signal()
+    about_asked = Signal()
     quit_asked = Signal()
     closing = Signal()
+    first_painted = Signal()  # once, as soon as there is something to be seen
 
     def __init__(self) -> None:
         super().__init__()
         self.setWindowTitle("Learned Strings")
-        self.setMinimumSize(1180, 560)
+        self.setMinimumSize(780, 480)
         self.resize(1280, 800)
+        self._painted = False
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
@@ -64,16 +71,18 @@ class MainWindow(QMainWindow):
         )
         self.rate_label = QLabel()
         self.rate_label.setObjectName("badge")
-        self.audio_menu = QMenu(self)
-        self._audio_button = tool_button("Audio ▾", "Audio device", "Choose where the sound goes")
-        self._audio_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self._audio_button.setMenu(self.audio_menu)
+        self._audio_button = tool_button("Audio …", "Audio settings", "Where the sound goes, and how (Ctrl+,)")
+        self._audio_button.clicked.connect(self.audio_asked)
+        self.menu = AppMenu(self)
+        self._menu_button = menu_button(self.menu)
         self._lay_out()
         for key, signal, _ in KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setAutoRepeat(False)
             shortcut.activated.connect(getattr(self, signal))
-        self.help_asked.connect(self.show_help)
+        self.notices_asked.connect(self.notices.show_all)
+        for action, signal in self.menu.asked.items():
+            action.triggered.connect(getattr(self, signal))
         self.quit_asked.connect(self.close)
 
     def _lay_out(self) -> None:
@@ -83,20 +92,26 @@ class MainWindow(QMainWindow):
         head.setSpacing(10)
         head.addWidget(brand)
         head.addSpacing(12)
-        head.addWidget(self.presets)
+        head.addWidget(self.presets, 3)
         head.addStretch(1)
-        head.addWidget(self.rate_label)
-        head.addWidget(self._audio_button)
+        for widget in (self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
+            head.addWidget(widget)
         facts = QHBoxLayout()
-        facts.addWidget(self.presets.card)
-        facts.addStretch(1)
+        facts.setSpacing(24)
+        facts.addWidget(self.presets.card, 1)
         facts.addWidget(self.error_label)
-        decks = QSplitter(Qt.Orientation.Horizontal)
+        self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
         decks.addWidget(self.right)
         decks.setSizes([560, 720])
         self._stage = QSplitter(Qt.Orientation.Vertical)
+        self._loading = QLabel("Loading the models …")
+        self._loading.setObjectName("faint")
+        self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._stage.addWidget(self._loading)
         self._stage.addWidget(decks)
+        self._stage.setSizes([380, 250])
+        self._set_alive(False)
         for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
             splitter.setHandleWidth(8)
@@ -107,16 +122,24 @@ class MainWindow(QMainWindow):
         column.addLayout(facts)
         column.addWidget(self.notices)
         column.addWidget(self._stage, 1)
-        column.addWidget(self.transport)
+        column.addWidget(_sideways(self.transport))
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
 
     def show_string(self, view: QWidget) -> None:
-        """Puts the string above the decks; it has the keyboard at first."""
+        """Puts the string above the decks; it has the keyboard at first. Until then the window only waits."""
+        self._loading.hide()
         self._stage.insertWidget(0, view)
         self._stage.setSizes([380, 250])
+        self._set_alive(True)
         view.setFocus()
+
+    def _set_alive(self, alive: bool) -> None:
+        for part in (self.presets, self.transport, self._audio_button, self._menu_button):
+            part.setEnabled(alive)
+        self._decks.setVisible(alive)
+        self.rate_label.setVisible(alive)
 
     def geometry_text(self) -> str:
         """Size and place, for `restore_geometry`."""
@@ -126,15 +149,24 @@ class MainWindow(QMainWindow):
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
 
-    def show_help(self) -> None:
-        rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, _, what in KEYS)
-        QMessageBox.information(
-            self,
-            "Keys",
-            f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
-            "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
-        )
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if not self._painted:
+            self._painted = True
+            QTimer.singleShot(0, self.first_painted.emit)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()
         super().closeEvent(event)
+
+
+def _sideways(part: QWidget) -> QScrollArea:
+    """Lets a part be scrolled sideways where the window is narrower than it."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+    area.setWidget(part)
+    return area
