@@ -98,6 +98,7 @@ class Controller(QObject):
         entries, problems = list_presets()
         self.library = Library(entries)
         self.panels = self._make_panels()
+        window.order_tabs()
         self._connect()
         if self.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)

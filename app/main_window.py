@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QShortcut
+from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMainWindow,
-    QScrollArea,
-    QSizePolicy,
     QSplitter,
+    QTabBar,
     QVBoxLayout,
     QWidget,
 )
@@ -20,6 +21,7 @@ from app.views.deck import Deck
 from app.views.notice_bar import NoticeBar
 from app.views.parts import tool_button
 from app.views.preset_bar import PresetBar
+from app.views.sideways import Sideways
 from app.views.transport_bar import TransportBar
 
 KEYS = (  # (key, name of the signal, what it does)
@@ -35,6 +37,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
+WIDE, HIGH = 960, 560  # below, the window is sparing
 
 
 class MainWindow(QMainWindow):
@@ -58,7 +61,7 @@ class MainWindow(QMainWindow):
     def __init__(self) -> None:
         super().__init__()
         self.setWindowTitle("Learned Strings")
-        self.setMinimumSize(780, 480)
+        self.setMinimumSize(760, 480)
         self.resize(1280, 800)
         self._painted = False
         self.presets = PresetBar()
@@ -86,13 +89,12 @@ class MainWindow(QMainWindow):
         self.quit_asked.connect(self.close)
 
     def _lay_out(self) -> None:
-        brand = QLabel("LEARNED STRINGS")
-        brand.setObjectName("brand")
+        self._brand = QLabel("LEARNED STRINGS")
+        self._brand.setObjectName("brand")
         head = QHBoxLayout()
         head.setSpacing(10)
-        head.addWidget(brand)
-        head.addSpacing(12)
-        head.addWidget(self.presets, 3)
+        head.addWidget(self._brand)
+        head.addWidget(self.presets, 100)
         head.addStretch(1)
         for widget in (self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
             head.addWidget(widget)
@@ -109,20 +111,19 @@ class MainWindow(QMainWindow):
         self._loading.setObjectName("faint")
         self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._stage.addWidget(self._loading)
+        self._string: QWidget = self._loading  # until it is there
         self._stage.addWidget(decks)
         self._stage.setSizes([380, 250])
         self._set_alive(False)
         for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
             splitter.setHandleWidth(8)
-        column = QVBoxLayout()
-        column.setContentsMargins(14, 12, 14, 12)
-        column.setSpacing(10)
+        self._column = column = QVBoxLayout()
         column.addLayout(head)
         column.addLayout(facts)
         column.addWidget(self.notices)
         column.addWidget(self._stage, 1)
-        column.addWidget(_sideways(self.transport))
+        column.addWidget(Sideways(self.transport))
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
@@ -130,10 +131,28 @@ class MainWindow(QMainWindow):
     def show_string(self, view: QWidget) -> None:
         """Puts the string above the decks; it has the keyboard at first. Until then the window only waits."""
         self._loading.hide()
+        self._string = view
         self._stage.insertWidget(0, view)
         self._stage.setSizes([380, 250])
         self._set_alive(True)
         view.setFocus()
+
+    def order_tabs(self) -> None:
+        """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""
+        header = (self.presets, self.notices.bell, self._audio_button, self._menu_button)
+        chain: list[QWidget] = []
+        for part in (*header, self.notices, self._string, self.left, self.right, self.transport):
+            inside = [part, *part.findChildren(QWidget)]
+            stops = [
+                widget
+                for widget in inside
+                if widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+                and widget.focusProxy() is None
+                and widget.window() is self  # a list's pop-up is not
+            ]
+            chain += sorted(stops, key=lambda widget: not isinstance(widget, QTabBar))  # a deck's names come first
+        for before, after in pairwise(chain):
+            QWidget.setTabOrder(before, after)
 
     def _set_alive(self, alive: bool) -> None:
         for part in (self.presets, self.transport, self._audio_button, self._menu_button):
@@ -149,6 +168,14 @@ class MainWindow(QMainWindow):
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """A small window spends its room on what is to be seen and turned."""
+        super().resizeEvent(event)
+        self._brand.setVisible(self.width() >= WIDE)
+        low = self.height() < HIGH
+        self._column.setContentsMargins(*((8, 6, 8, 6) if low else (14, 12, 14, 12)))
+        self._column.setSpacing(6 if low else 10)
+
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         if not self._painted:
@@ -158,15 +185,3 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()
         super().closeEvent(event)
-
-
-def _sideways(part: QWidget) -> QScrollArea:
-    """Lets a part be scrolled sideways where the window is narrower than it."""
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setFrameShape(QScrollArea.Shape.NoFrame)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-    area.setWidget(part)
-    return area

@@ -58,7 +58,7 @@ class StringView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setMinimumSize(480, 200)
+        self.setMinimumSize(480, 112)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
@@ -216,6 +216,10 @@ class StringView(QWidget):
         self._paint_ends(painter)
         self._paint_listening_point(painter)
         self._paint_words(painter)
+        if self.hasFocus():
+            painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, 6)
 
     def _ground(self) -> QPixmap:
         """The picture behind the string, painted anew only when something in it changes."""

@@ -62,7 +62,7 @@ LIGHT = Face(
     text="#1b2029",
     faint="#596272",
     disabled="#9aa2b0",
-    model="#9a5700",
+    model="#a05a00",
     truth="#00698f",
     warning="#b3261e",
     good="#1a7044",
@@ -164,12 +164,22 @@ QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; b
 QSlider::handle:horizontal:focus {{ background: {TRUTH}; }}
 QProgressBar {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; text-align: center; }}
 QProgressBar::chunk {{ background: {TRUTH}; }}
+QGraphicsView {{ border: 1px solid transparent; }}
+QGraphicsView:focus {{ border: 1px solid {FAINT}; }}
 QTabWidget::pane {{ border: none; }}
 QTabBar {{ background: transparent; qproperty-drawBase: 0; }}
 QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 2px solid transparent; }}
 QTabBar::tab:hover {{ color: {TEXT}; }}
 QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
 QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}
+QScrollBar {{ background: transparent; border: none; }}
+QScrollBar:horizontal {{ height: 9px; }}
+QScrollBar:vertical {{ width: 9px; }}
+QScrollBar::handle {{
+    background: {face.disabled}; border-radius: 3px; margin: 1px; min-width: 24px; min-height: 24px; }}
+QScrollBar::handle:hover {{ background: {FAINT}; }}
+QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
+QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
 QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; }}
 """
 
