@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from app.views.app_menu import AppMenu, menu_button
 from app.views.deck import Deck
+from app.views.focus_ring import FocusRing
 from app.views.notice_bar import NoticeBar
 from app.views.parts import tool_button
 from app.views.preset_bar import PresetBar
@@ -94,8 +95,7 @@ class MainWindow(QMainWindow):
         head = QHBoxLayout()
         head.setSpacing(10)
         head.addWidget(self._brand)
-        head.addWidget(self.presets, 100)
-        head.addStretch(1)
+        head.addWidget(self.presets, 1)
         for widget in (self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
             head.addWidget(widget)
         facts = QHBoxLayout()
@@ -113,7 +113,6 @@ class MainWindow(QMainWindow):
         self._stage.addWidget(self._loading)
         self._string: QWidget = self._loading  # until it is there
         self._stage.addWidget(decks)
-        self._stage.setSizes([380, 250])
         self._set_alive(False)
         for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
@@ -127,13 +126,14 @@ class MainWindow(QMainWindow):
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
+        FocusRing(middle)
 
     def show_string(self, view: QWidget) -> None:
         """Puts the string above the decks; it has the keyboard at first. Until then the window only waits."""
         self._loading.hide()
         self._string = view
         self._stage.insertWidget(0, view)
-        self._stage.setSizes([380, 250])
+        self._stage.setSizes([380, 0, 250])
         self._set_alive(True)
         view.setFocus()
 

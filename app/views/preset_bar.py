@@ -40,8 +40,10 @@ class PresetBar(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
-        for widget in (previous, self._list, following):
-            row.addWidget(widget)
+        row.addWidget(previous)
+        row.addWidget(self._list, 1000)  # all of the room, up to its greatest width
+        row.addWidget(following)
+        row.addStretch(1)
 
     def set_entries(self, entries: list[PresetEntry]) -> None:
         self._entries = entries

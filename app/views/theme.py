@@ -164,8 +164,6 @@ QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; b
 QSlider::handle:horizontal:focus {{ background: {TRUTH}; }}
 QProgressBar {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; text-align: center; }}
 QProgressBar::chunk {{ background: {TRUTH}; }}
-QGraphicsView {{ border: 1px solid transparent; }}
-QGraphicsView:focus {{ border: 1px solid {FAINT}; }}
 QTabWidget::pane {{ border: none; }}
 QTabBar {{ background: transparent; qproperty-drawBase: 0; }}
 QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 2px solid transparent; }}

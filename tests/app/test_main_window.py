@@ -15,6 +15,7 @@ from app.controller import Controller
 from app.main_window import KEYS, MainWindow
 from app.settings import Look
 from app.views import theme
+from app.views.focus_ring import FocusRing
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,6 +98,19 @@ def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
     ]
     assert met == sorted(met)
     assert set(met) == set(range(len(parts)))
+
+
+def test_the_plot_that_has_the_keyboard_is_ringed(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    (ring,) = window.findChildren(FocusRing)
+    plot = window.right.currentWidget()
+    plot.setFocus()
+    qtbot.waitUntil(ring.isVisible)
+    assert ring.geometry().size() == plot.size()
+    window.resize(window.width() - 100, window.height())
+    qtbot.waitUntil(lambda: ring.geometry().size() == plot.size())
+    window.transport.knobs["width"].setFocus()
+    qtbot.waitUntil(lambda: not ring.isVisible())
 
 
 def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controller) -> None:
