@@ -16,24 +16,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QAction
 
+from app.about import about_text
 from app.abx.subject import subject_of
-from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
+from app.appearance import Appearance
+from app.audio import AudioProblem, Player, Track
+from app.audio_control import AudioControl
 from app.library import Library, PresetEntry, list_presets
-from app.main_window import MainWindow
+from app.main_window import KEYS, MainWindow
 from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
-from app.settings import DeviceChoice, Settings, save_settings
+from app.settings import Settings, save_settings
+from app.views.about_dialog import AboutDialog
 from app.views.abx_dialog import AbxDialog
 from app.views.export_dialog import ExportDialog
+from app.views.help_dialog import HelpDialog
 from engine.metrics import ErrorSums
+from engine.preset import SHIPPED
 
 LEFT: tuple[type[Panel], ...] = (SpectrumPanel,)
 RIGHT: tuple[type[Panel], ...] = (WaveformPanel,)
 
-BUFFER_S = 0.05  # of sound ahead: room for a busy interpreter, and still a prompt pluck
 FRAME_MS = 16
 ProblemListener = Callable[[AudioProblem], None]
 MOTION_FIELDS = {"preset", "position", "amplitude_mm", "shape", "width", "seconds"}
@@ -88,21 +92,24 @@ class Controller(QObject):
         self._mail = _Mail()
         self.player = make_player(self._mail.audio_problem.emit)
         self.worker = RenderWorker(self._mail)
+        self.audio = AudioControl(window, self.player, settings.device, settings.sound)
+        self.appearance = Appearance(window, settings.look)
         self._stage = _Stage()
         self._last_tick_s = time.monotonic()
         self._asked_rate_hz = 0
-        self._audio_notice = ""
         self._abx: AbxDialog | None = None  # while it is open, the player is its own
+        self._help: HelpDialog | None = None
         entries, problems = list_presets()
         self.library = Library(entries)
         self.panels = self._make_panels()
+        window.order_tabs()
         self._connect()
         if self.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)
         for problem in problems:
             self.window.notices.tell(problem)
         self._choices_shown(frozenset(type(self.session.choices).model_fields))
-        self._open_device()
+        self.audio.open()
         self._render()
         self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
@@ -144,13 +151,14 @@ class Controller(QObject):
         window.pluck_asked.connect(self.pluck)
         window.switch_asked.connect(session.switch_source)
         window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
-        window.audio_menu.aboutToShow.connect(self._fill_audio_menu)
+        window.help_asked.connect(self.show_help)
+        window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
         window.closing.connect(self.close)
         self._mail.started.connect(self._take_started)
         self._mail.replaced.connect(self._track_replaced)
         self._mail.finished.connect(self._take_finished)
         self._mail.failed.connect(self._render_failed)
-        self._mail.audio_problem.connect(self._tell_audio_problem)
+        self._mail.audio_problem.connect(self.audio.tell)
 
     def _change(self, field: str, value: object) -> None:
         try:
@@ -212,6 +220,13 @@ class Controller(QObject):
         if self._stage.track is not None:
             self._load(self._stage.track, keep_position=False)
 
+    def show_help(self) -> None:
+        if self._help is None:
+            views = [(panel.title, panel.help) for panel in self.panels if panel.help]
+            self._help = HelpDialog([(key, what) for key, _, what in KEYS], views, self.window)
+        self._help.show()
+        self._help.raise_()
+
     @property
     def entry(self) -> PresetEntry | None:
         """The chosen preset."""
@@ -223,7 +238,13 @@ class Controller(QObject):
             self._abx.abandon()
         self._timer.stop()
         self._settings = self._settings.model_copy(
-            update={"choices": self.session.choices, "window_geometry": self.window.geometry_text()}
+            update={
+                "choices": self.session.choices,
+                "device": self.audio.device,
+                "sound": self.audio.sound,
+                "look": self.appearance.look,
+                "window_geometry": self.window.geometry_text(),
+            }
         )
         try:
             save_settings(self._settings_path, self._settings)
@@ -344,59 +365,12 @@ class Controller(QObject):
         window.transport.show_playing(status.playing)
         hidden = self._abx is not None  # a level would give away what is heard
         window.transport.meter.show_level(-math.inf if hidden else status.peak_db, status.limiting and not hidden)
-        if status.device is not None and self._audio_notice:
-            window.notices.withdraw(self._audio_notice)  # the sound is back
-            self._audio_notice = ""
         if status.rate_hz != self._asked_rate_hz:
             self._render()
         take = self._stage.take
-        if take is not None:
-            self._show_rate(take, status.rate_hz, status.device is not None)
+        self.audio.show(status, take)
         position_s = min(status.position_s, take.seconds) if take is not None else 0.0
         moment = Moment(take, position_s, status.playing, elapsed_s)
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)
-
-    def _show_rate(self, take: Take, sound_rate_hz: int, has_device: bool) -> None:
-        model, device = take.info.rate_hz / 1000, sound_rate_hz / 1000
-        text = f"{model:g} → {device:g} kHz" if has_device else f"{model:g} kHz  ·  no sound device"
-        if self.window.rate_label.text() != text:
-            self.window.rate_label.setText(text)
-            self.window.rate_label.setToolTip("The model's rate, converted to the sound device's rate")
-
-    # Sound device
-
-    def _open_device(self) -> None:
-        chosen = self._settings.device
-        self.player.open(AudioDevice(chosen.name, chosen.host_api) if chosen else None, BUFFER_S)
-
-    def _tell_audio_problem(self, problem: AudioProblem) -> None:
-        self._audio_notice = f"{problem} The app goes on without sound."
-        self.window.notices.tell(self._audio_notice, problem.detail)
-
-    def _fill_audio_menu(self) -> None:
-        menu = self.window.audio_menu
-        menu.clear()
-        default = QAction("System default", menu)
-        default.triggered.connect(lambda: self._choose_device(None))
-        menu.addAction(default)
-        menu.addSeparator()
-        try:
-            devices = output_devices(rescan=self.player.status().device is None)
-        except AudioUnavailable as error:
-            menu.addAction(str(error)).setEnabled(False)
-            return
-        present = self.player.status().device
-        for device in devices:
-            action = QAction(f"{device.name}   ({device.host_api})", menu, checkable=True)
-            action.setChecked(
-                present is not None and (device.name, device.host_api) == (present.name, present.host_api)
-            )
-            choice = DeviceChoice(name=device.name, host_api=device.host_api)
-            action.triggered.connect(lambda _=False, choice=choice: self._choose_device(choice))
-            menu.addAction(action)
-
-    def _choose_device(self, choice: DeviceChoice | None) -> None:
-        self._settings = self._settings.model_copy(update={"device": choice})
-        self._open_device()

@@ -1,35 +1,94 @@
-"""The start of the window."""
+"""The start of the window: it is shown first, and what takes long to load follows."""
 
 from __future__ import annotations
 
 import os
 import sys
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if sys.platform == "win32":
+    import torch  # noqa: F401 - before Qt: the other order fails there
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QApplication
+
+from app.main_window import MainWindow
+from app.settings import Settings, load_settings, settings_file
+from app.views.theme import apply_theme
+
+if TYPE_CHECKING:
+    from app.controller import Controller
+
+
+class _Start(QObject):
+    """Loads the engine in a thread of its own once the window is painted, then brings the window to life."""
+
+    _loaded = Signal()
+
+    def __init__(self, window: MainWindow, settings: Settings, path: Path, notice: str) -> None:
+        super().__init__()
+        self._window, self._settings, self._path, self._notice = window, settings, path, notice
+        self._thread = threading.Thread(target=self._load, name="engine-loader")
+        self._controller: Controller | None = None
+        self.failure: Exception | None = None
+        self._loaded.connect(self._begin, Qt.ConnectionType.QueuedConnection)
+        window.first_painted.connect(self._thread.start)
+
+    def wait(self) -> None:
+        """Until nothing is being loaded any more."""
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _load(self) -> None:
+        try:
+            load_engine()
+        except Exception as error:
+            self.failure = error
+        self._loaded.emit()
+
+    def _begin(self) -> None:
+        try:
+            if self.failure is not None:
+                raise self.failure
+            from app.controller import Controller
+            from app.views.plots import dress_plots
+
+            dress_plots()
+            self._controller = Controller(self._window, self._settings, self._path)
+        except Exception as error:
+            self.failure = error
+            QApplication.quit()
+            return
+        if self._notice:
+            self._window.notices.tell(self._notice)
+
+
+def load_engine() -> None:
+    """What the window does not need in order to be seen: two seconds and more, most of it for torch."""
+    import torch
+
+    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
 
 def run() -> int:
     """Opens the app and returns its exit status when it is closed."""
-    import torch  # before Qt: on Windows the other order fails
-
     sys.setswitchinterval(0.0005)  # the audio callback must get the interpreter in time, whoever holds it
-    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
-
-    from PySide6.QtWidgets import QApplication
-
-    from app.controller import Controller
-    from app.main_window import MainWindow
-    from app.settings import load_settings, settings_file
-    from app.views.theme import apply_theme
-
+    path = settings_file()
+    settings, notice = load_settings(path)
+    if settings.look.size_percent != 100:  # Qt reads it when the application is made
+        os.environ.setdefault("QT_SCALE_FACTOR", str(settings.look.size_percent / 100))
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("Learned Strings")
-    apply_theme(application)
-    path = settings_file()
-    settings, notice = load_settings(path)
+    apply_theme(application, settings.look.face)
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
-    Controller(window, settings, path)
-    if notice:
-        window.notices.tell(notice)
+    start = _Start(window, settings, path, notice)
     window.show()
-    return application.exec()
+    status = application.exec()
+    start.wait()
+    if start.failure is not None:
+        raise start.failure
+    return status

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from itertools import pairwise
+
+from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMainWindow,
-    QMenu,
-    QMessageBox,
     QSplitter,
-    QToolButton,
+    QTabBar,
     QVBoxLayout,
     QWidget,
 )
 
+from app.views.app_menu import AppMenu, menu_button
 from app.views.deck import Deck
+from app.views.focus_ring import FocusRing
 from app.views.notice_bar import NoticeBar
 from app.views.parts import tool_button
 from app.views.preset_bar import PresetBar
+from app.views.sideways import Sideways
 from app.views.transport_bar import TransportBar
 
 KEYS = (  # (key, name of the signal, what it does)
@@ -31,9 +34,12 @@ KEYS = (  # (key, name of the signal, what it does)
     ("PgDown", "next_asked", "next preset"),
     ("Ctrl+E", "export_asked", "export WAV"),
     ("Ctrl+T", "abx_asked", "listening test: can you tell model and truth apart?"),
-    ("F1", "help_asked", "these keys"),
+    ("Ctrl+,", "audio_asked", "audio settings"),
+    ("F8", "notices_asked", "notices of this run"),
+    ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
+WIDE, HIGH = 960, 560  # below, the window is sparing
 
 
 class MainWindow(QMainWindow):
@@ -47,15 +53,20 @@ class MainWindow(QMainWindow):
     next_asked = Signal()
     export_asked = Signal()
     abx_asked = Signal()
+    audio_asked = Signal()
+    notices_asked = Signal()
     help_asked = Signal()
+    about_asked = Signal()
     quit_asked = Signal()
     closing = Signal()
+    first_painted = Signal()  # once, as soon as there is something to be seen
 
     def __init__(self) -> None:
         super().__init__()
         self.setWindowTitle("Learned Strings")
-        self.setMinimumSize(1180, 560)
+        self.setMinimumSize(760, 480)
         self.resize(1280, 800)
+        self._painted = False
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
@@ -66,62 +77,92 @@ class MainWindow(QMainWindow):
         )
         self.rate_label = QLabel()
         self.rate_label.setObjectName("badge")
-        self.audio_menu = QMenu(self)
-        self._audio_button = tool_button("Audio ▾", "Audio device", "Choose where the sound goes")
-        self._audio_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self._audio_button.setMenu(self.audio_menu)
+        self._audio_button = tool_button("Audio …", "Audio settings", "Where the sound goes, and how (Ctrl+,)")
+        self._audio_button.clicked.connect(self.audio_asked)
+        self.menu = AppMenu(self)
+        self._menu_button = menu_button(self.menu)
         self._lay_out()
         for key, signal, _ in KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setAutoRepeat(False)
             shortcut.activated.connect(getattr(self, signal))
-        self.help_asked.connect(self.show_help)
+        self.notices_asked.connect(self.notices.show_all)
+        for action, signal in self.menu.asked.items():
+            action.triggered.connect(getattr(self, signal))
         self.quit_asked.connect(self.close)
 
     def _lay_out(self) -> None:
-        brand = QLabel("LEARNED STRINGS")
-        brand.setObjectName("brand")
+        self._brand = QLabel("LEARNED STRINGS")
+        self._brand.setObjectName("brand")
         head = QHBoxLayout()
         head.setSpacing(10)
-        head.addWidget(brand)
-        head.addSpacing(12)
-        head.addWidget(self.presets)
-        head.addStretch(1)
+        head.addWidget(self._brand)
+        head.addWidget(self.presets, 1)
         test = tool_button("ABX …", "Listening test", "Can you tell model and truth apart, blind? (Ctrl+T)")
         test.clicked.connect(self.abx_asked)
-        head.addWidget(test)
-        head.addWidget(self.rate_label)
-        head.addWidget(self._audio_button)
+        for widget in (test, self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
+            head.addWidget(widget)
         facts = QHBoxLayout()
-        facts.addWidget(self.presets.card)
-        facts.addStretch(1)
+        facts.setSpacing(24)
+        facts.addWidget(self.presets.card, 1)
         facts.addWidget(self.error_label)
-        decks = QSplitter(Qt.Orientation.Horizontal)
+        self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
         decks.addWidget(self.right)
         decks.setSizes([560, 720])
         self._stage = QSplitter(Qt.Orientation.Vertical)
+        self._loading = QLabel("Loading the models …")
+        self._loading.setObjectName("faint")
+        self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._stage.addWidget(self._loading)
+        self._string: QWidget = self._loading  # until it is there
         self._stage.addWidget(decks)
+        self._set_alive(False)
         for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
             splitter.setHandleWidth(8)
-        column = QVBoxLayout()
-        column.setContentsMargins(14, 12, 14, 12)
-        column.setSpacing(10)
+        self._column = column = QVBoxLayout()
         column.addLayout(head)
         column.addLayout(facts)
         column.addWidget(self.notices)
         column.addWidget(self._stage, 1)
-        column.addWidget(self.transport)
+        column.addWidget(Sideways(self.transport))
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
+        FocusRing(middle)
 
     def show_string(self, view: QWidget) -> None:
-        """Puts the string above the decks; it has the keyboard at first."""
+        """Puts the string above the decks; it has the keyboard at first. Until then the window only waits."""
+        self._loading.hide()
+        self._string = view
         self._stage.insertWidget(0, view)
-        self._stage.setSizes([380, 250])
+        self._stage.setSizes([380, 0, 250])
+        self._set_alive(True)
         view.setFocus()
+
+    def order_tabs(self) -> None:
+        """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""
+        header = (self.presets, self.notices.bell, self._audio_button, self._menu_button)
+        chain: list[QWidget] = []
+        for part in (*header, self.notices, self._string, self.left, self.right, self.transport):
+            inside = [part, *part.findChildren(QWidget)]
+            stops = [
+                widget
+                for widget in inside
+                if widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+                and widget.focusProxy() is None
+                and widget.window() is self  # a list's pop-up is not
+            ]
+            chain += sorted(stops, key=lambda widget: not isinstance(widget, QTabBar))  # a deck's names come first
+        for before, after in pairwise(chain):
+            QWidget.setTabOrder(before, after)
+
+    def _set_alive(self, alive: bool) -> None:
+        for part in (self.presets, self.transport, self._audio_button, self._menu_button):
+            part.setEnabled(alive)
+        self._decks.setVisible(alive)
+        self.rate_label.setVisible(alive)
 
     def geometry_text(self) -> str:
         """Size and place, for `restore_geometry`."""
@@ -131,14 +172,19 @@ class MainWindow(QMainWindow):
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
 
-    def show_help(self) -> None:
-        rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, _, what in KEYS)
-        QMessageBox.information(
-            self,
-            "Keys",
-            f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
-            "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
-        )
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """A small window spends its room on what is to be seen and turned."""
+        super().resizeEvent(event)
+        self._brand.setVisible(self.width() >= WIDE)
+        low = self.height() < HIGH
+        self._column.setContentsMargins(*((8, 6, 8, 6) if low else (14, 12, 14, 12)))
+        self._column.setSpacing(6 if low else 10)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if not self._painted:
+            self._painted = True
+            QTimer.singleShot(0, self.first_painted.emit)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()

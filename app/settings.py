@@ -1,10 +1,14 @@
-"""What is remembered between two starts: one validated JSON file. A broken one is set aside, not fatal."""
+"""What is remembered between two starts: one validated JSON file.
+
+A broken one is set aside, not fatal; where only some fields are wrong, the others are kept.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from platformdirs import user_config_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -46,6 +50,27 @@ class AbxChoices(BaseModel):
     folder: str = ""
 
 
+Buffer = Literal["low", "medium", "high", 128, 256, 512, 1024, 2048]  # a latency, or frames
+
+
+class SoundChoice(BaseModel):
+    """How a device is opened. rate_hz 0: at its own rate."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rate_hz: Literal[0, 44_100, 48_000, 96_000] = 0
+    buffer: Buffer = "medium"
+
+
+class Look(BaseModel):
+    """The window's face and the size of everything in it; the size counts from the next start on."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    face: Literal["system", "dark", "light"] = "system"
+    size_percent: Literal[100, 115, 125, 150] = 100
+
+
 class Settings(BaseModel):
     """The whole file."""
 
@@ -56,6 +81,8 @@ class Settings(BaseModel):
     export: ExportChoices = ExportChoices()
     abx: AbxChoices = AbxChoices()
     device: DeviceChoice | None = None
+    sound: SoundChoice = SoundChoice()
+    look: Look = Look()
     window_geometry: str = ""  # Qt's, in base64
 
 
@@ -66,13 +93,15 @@ def settings_file() -> Path:
 
 
 def load_settings(path: Path) -> tuple[Settings, str]:
-    """The settings and a notice: empty, or why the defaults were taken and where the broken file went."""
+    """The settings and a notice: empty, or what was not usable and where the broken file went."""
     try:
-        return Settings.model_validate_json(path.read_bytes()), ""
+        text = path.read_bytes()
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
         return Settings(), f"The settings {path} cannot be read ({error.strerror}); starting with defaults."
+    try:
+        return Settings.model_validate_json(text), ""
     except ValidationError as error:
         first = error.errors()[0]
         aside = path.with_suffix(".broken.json")
@@ -81,7 +110,36 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         except OSError:
             aside = path
         field = ".".join(map(str, first["loc"])) or "the file"
-        return Settings(), f"The settings were not usable ({field}: {first['msg']}); set aside as {aside}."
+        kept = _without(text, error)
+        return (
+            kept or Settings(),
+            f"{'Some' if kept else 'The'} settings were not usable ({field}: {first['msg']}) and have their defaults "
+            f"again; the file was set aside as {aside}.",
+        )
+
+
+def _without(text: bytes, error: ValidationError) -> Settings | None:
+    """The settings less the fields that `error` names; None where nothing is left to keep."""
+    fields = [[str(part) for part in fault["loc"]] for fault in error.errors()]
+    if any(field[:1] in ([], ["version"]) for field in fields):  # no settings, or those of another version
+        return None
+    data: dict[str, Any] = json.loads(text)
+    for field in fields:
+        _drop(data, field)
+    try:
+        return Settings.model_validate(data)
+    except ValidationError:
+        return None
+
+
+def _drop(data: dict[str, Any], field: list[str]) -> None:
+    """Takes the value at a path of keys out; what lacks a necessary key goes as a whole."""
+    key, *rest = field
+    inner = data.get(key)
+    if rest and isinstance(inner, dict) and rest[0] in inner:
+        _drop(inner, rest)
+    else:
+        data.pop(key, None)
 
 
 def save_settings(path: Path, settings: Settings) -> None:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from app.audio.problems import no_device, not_started, portaudio_missing, refused, vanished
 
+SHORT_BUFFER_S = 0.02
+
 
 @dataclass(frozen=True)
 class AudioDevice:
@@ -73,13 +75,15 @@ def open_device(device: AudioDevice, buffer_s: float, block_frames: int, callbac
     """Opens, but does not start, a float32 stream at the device's own rate, so that no rate is forced on it.
 
     The device's buffer is PortAudio's safe choice ("high latency"), or `buffer_s` where that is longer: a
-    callback in Python has to wait for the interpreter lock now and then.
+    callback in Python has to wait for the interpreter lock now and then. A buffer below `SHORT_BUFFER_S` is a wish
+    for promptness: then it is what the device itself calls low latency.
 
     Raises:
         AudioUnavailable: With the reason in plain words.
     """
     sounddevice = _sounddevice()
     index, _ = _find(device.name, device.host_api)
+    safe = "default_high_output_latency" if buffer_s >= SHORT_BUFFER_S else "default_low_output_latency"
     try:
         stream: RawStream = sounddevice.OutputStream(
             samplerate=device.default_rate_hz,
@@ -87,7 +91,7 @@ def open_device(device: AudioDevice, buffer_s: float, block_frames: int, callbac
             device=index,
             channels=min(device.channels, 2),
             dtype="float32",
-            latency=max(buffer_s, sounddevice.query_devices(index)["default_high_output_latency"]),
+            latency=max(buffer_s, sounddevice.query_devices(index)[safe]),
             callback=callback,
         )
     except (sounddevice.PortAudioError, OSError, ValueError) as error:

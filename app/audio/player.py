@@ -30,6 +30,7 @@ from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, vani
 from app.audio.silent import SilentOutput
 from app.audio.stream import BUFFER_S, OutputStream
 from app.audio.timeline import Timeline
+from app.audio.tone import Side, Tone
 from app.audio.track import Track
 
 TRY_AGAIN_S = 2.0  # between two looks for a device that vanished
@@ -78,7 +79,28 @@ class PlayerStatus:
     device: AudioDevice | None = None  # None: silent
     rate_hz: int = DEFAULT_RATE_HZ  # of the tracks; opening a device may change it and unload the track
     latency_s: float = 0.0
+    changes_done: int = 0  # how many calls of `open` have been obeyed, or refused
     problem: str | None = None  # why there is no sound, or why the last device could not be opened
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """An output as it was asked for; see `Player.open`."""
+
+    device: AudioDevice | None = None
+    buffer_s: float = BUFFER_S
+    rate_hz: int = 0
+    buffer_frames: int = 0
+
+    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
+        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
+
+    def buffer_s_at(self, rate_hz: int) -> float:
+        return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
+
+
+def _same(one: AudioDevice, other: AudioDevice) -> bool:
+    return (one.name, one.host_api) == (other.name, other.host_api)
 
 
 def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
@@ -111,6 +133,9 @@ class Player:
         self._output: Output = SilentOutput(rate_hz)
         self._buffer_s = BUFFER_S
         self._timeline = Timeline(0)
+        self._wanted = _Wanted()
+        self._changes_done = 0
+        self._tone: Tone | None = None
         self._problem: str | None = None
         self._track: Track | None = None  # the caller's latest, to refuse a wrong `select` on the spot
         self._lost: AudioDevice | None = None  # vanished while it was ours: tried again now and then
@@ -121,14 +146,31 @@ class Player:
         self._feeder = threading.Thread(target=self._feed, name="audio-feeder", daemon=True)
         self._feeder.start()
 
-    def open(self, device: AudioDevice | None = None, buffer_s: float = BUFFER_S) -> None:
+    def open(
+        self,
+        device: AudioDevice | None = None,
+        buffer_s: float = BUFFER_S,
+        rate_hz: int = 0,
+        buffer_frames: int = 0,
+        rescan: bool = False,
+    ) -> None:
         """Changes to another device, known by name and host API, or, for None, to the system's default.
 
-        The present one stays until the new one plays; if that fails, `on_problem` hears of it. A device of
-        another rate stops playback and unloads the track: load it again at `status().rate_hz`. A longer
-        buffer cures crackles and delays commands; see `OutputStream`.
+        The present one stays until the new one plays, and is taken again if the same device refuses a new rate
+        or buffer; then `on_problem` hears of it. Another rate stops playback and unloads the track: load it again
+        at `status().rate_hz`. A longer buffer cures crackles and delays commands; see `OutputStream`.
+
+        Args:
+            rate_hz: 0 for the device's own.
+            buffer_frames: The buffer in frames at that rate; 0 for `buffer_s`.
+            rescan: Looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
-        self._commands.put(lambda: self._change_output(device, buffer_s))
+        wanted = _Wanted(device, buffer_s, rate_hz, buffer_frames)
+        self._commands.put(lambda: self._change_output(wanted, rescan))
+
+    def sound_tone(self, side: Side) -> None:
+        """A soft tone for a second on one side, whatever else is playing."""
+        self._commands.put(lambda: self._start_tone(side))
 
     def load(self, track: Track, keep_position: bool = False) -> None:
         """Takes another track, from its beginning or at the same position; see `Mixer.load`."""
@@ -232,28 +274,56 @@ class Player:
             self._mixer.select(source)
 
     def _write_block(self) -> None:
-        self._output.write(self._mixer.next_block(self._output.block_frames))
+        block = self._mixer.next_block(self._output.block_frames)
+        if self._tone is not None:
+            block = np.clip(block + self._tone.next_block(len(block)), -1, 1)
+            self._tone = None if self._tone.over else self._tone
+        self._output.write(block)
         state = self._mixer.status()
         self._timeline.note(self._output.frames_queued, state.position_frames, state.playing and not state.waiting)
 
-    def _change_output(self, wanted: AudioDevice | None, buffer_s: float) -> None:
-        present = self._output.device
+    def _start_tone(self, side: Side) -> None:
+        device = self._output.device
+        alone = device is not None and device.channels == 1
+        self._tone = Tone(self._output.rate_hz, "both" if alone else side)
+
+    def _change_output(self, wanted: _Wanted, rescan: bool) -> None:
+        present, present_buffer_s = self._output.device, self._buffer_s
         was_playing = self._mixer.status().playing
-        self._lost = None
+        self._lost = self._tone = None
         self._fade_to_silence()  # opening takes a while, in which nobody feeds the present device
+        released = False
         try:
+            if rescan and present is not None:
+                self._adopt_output(SilentOutput(self._output.rate_hz))
+                released = True
             # PortAudio may only look for new devices while none is open.
-            device = self._look_up(wanted, present is None)
-            if device != present or buffer_s != self._buffer_s:
-                if device == present:  # it might refuse to be opened twice
-                    self._adopt_output(SilentOutput(self._output.rate_hz))
+            device = wanted.at_its_rate(self._look_up(wanted.device, present is None or released))
+            buffer_s = wanted.buffer_s_at(device.default_rate_hz)
+            if released or device != present or buffer_s != present_buffer_s:
+                if present is not None and not released and _same(device, present):
+                    self._adopt_output(SilentOutput(self._output.rate_hz))  # it might refuse to be opened twice
+                    released = True
                 self._adopt_output(self._open_output(device, buffer_s))
-                self._buffer_s = buffer_s
+                self._buffer_s, self._wanted = buffer_s, wanted
             self._problem = None
         except AudioUnavailable as error:
+            if released and present is not None:
+                self._take_back(present, present_buffer_s)
+            elif present is None and error.kind is ProblemKind.VANISHED:  # it may still be plugged in
+                self._lost, self._wanted = wanted.device, wanted
+                self._try_again_s = time.monotonic() + TRY_AGAIN_S
             self._report(error.problem)
+        self._changes_done += 1
         if was_playing:
             self._mixer.play()
+
+    def _take_back(self, device: AudioDevice, buffer_s: float) -> None:
+        """The device as it was before a change that was refused; if it is gone too, it is looked for."""
+        try:
+            self._adopt_output(self._open_output(device, buffer_s))
+        except AudioUnavailable:
+            self._lost, self._try_again_s = device, time.monotonic() + TRY_AGAIN_S
 
     def _fade_to_silence(self) -> None:
         self._mixer.stop()
@@ -274,7 +344,8 @@ class Player:
         if self._lost is None or time.monotonic() < self._try_again_s:
             return
         try:
-            output = self._open_output(self._look_up(self._lost, True), self._buffer_s)
+            device = self._wanted.at_its_rate(self._look_up(self._lost, True))
+            output = self._open_output(device, self._buffer_s)
         except AudioUnavailable:
             self._try_again_s = time.monotonic() + TRY_AGAIN_S
             return
@@ -290,6 +361,8 @@ class Player:
 
     def _report(self, problem: AudioProblem) -> None:
         self._problem = str(problem)
+        # who hears of it may look at once
+        self._status = replace(self._status, problem=self._problem, device=self._output.device)
         if self._on_problem is not None:
             self._on_problem(problem)
 
@@ -309,5 +382,6 @@ class Player:
             device=output.device,
             rate_hz=output.rate_hz,
             latency_s=output.latency_s,
+            changes_done=self._changes_done,
             problem=self._problem,
         )

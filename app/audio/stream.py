@@ -20,6 +20,7 @@ from app.audio.devices import AudioDevice, Callback, RawStream, open_device
 from app.audio.problems import refused
 
 BLOCK_FRAMES = 256
+SHORTEST_BLOCK = 64
 BUFFER_S = 0.025  # of ready sound: outlasts a busy moment of Python, and delays a command by as much
 LOST_AFTER_S = 1.5
 SETTLING_S = 0.1
@@ -37,7 +38,7 @@ class OutputStream:
     Args:
         device: Where to play.
         buffer_s: Sound kept ready in the queue, and at least as much in the device's own buffer.
-        block_frames: Frames per block, for the device as well as for `write`.
+        block_frames: Frames per block, for the device as well as for `write`; fewer where the buffer is short.
         open_device: Makes the raw stream; tests put another one in.
 
     Raises:
@@ -53,7 +54,7 @@ class OutputStream:
     ) -> None:
         self.device: AudioDevice | None = device
         self.rate_hz = device.default_rate_hz
-        self.block_frames = block_frames
+        self.block_frames = block_frames = min(block_frames, max(SHORTEST_BLOCK, round(buffer_s * self.rate_hz) // 2))
         self.callback_count = 0
         self.frames_written = 0  # by the callback to the device, without the zeros of underruns
         self.underruns = 0  # blocks that came too late, and gaps that the device itself has noticed

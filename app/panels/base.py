@@ -41,6 +41,7 @@ class Panel(QObject):
 
     key: ClassVar[str]  # in `Choices.left_view` or `right_view`
     title: ClassVar[str]  # on its tab
+    help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     view: QWidget
 
     seek_asked = Signal(float)  # move the playhead to this time in s

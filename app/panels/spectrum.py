@@ -15,6 +15,10 @@ EVERY = 3  # moments
 class SpectrumPanel(Panel):
     key = "spectrum"
     title = "Spectrum"
+    help = (
+        "Level against frequency at the playhead and the listening point, of model and truth on the same "
+        "axes; 0 dB is a full-scale sine. A partial that is out of tune or decays wrongly parts here first."
+    )
     view: SpectrumView
 
     def __init__(self, session: Session, library: Library) -> None:

@@ -17,6 +17,11 @@ PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "listen"
 class StringPanel(Panel):
     key = "string"
     title = "String"
+    help = (
+        "The string seen from the side: model and truth in motion, slowed as by a stroboscope, or the pluck "
+        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Darker parts lie "
+        "outside the training."
+    )
     view: StringView
 
     def __init__(self, session: Session, library: Library) -> None:

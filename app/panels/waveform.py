@@ -17,6 +17,10 @@ EVERY = 3  # moments
 class WaveformPanel(Panel):
     key = "waveform"
     title = "Waveform"
+    help = (
+        "The displacement at the listening point over the whole pluck. Click to move the playhead; the wheel "
+        "zooms. Behind the red line the model goes on without training."
+    )
     view: WaveformView
 
     def __init__(self, session: Session, library: Library) -> None:

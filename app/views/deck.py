@@ -14,6 +14,7 @@ class Deck(QTabWidget):
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName(name)
+        self.tabBar().setAccessibleName(name)
         self.setDocumentMode(True)
         self.setUsesScrollButtons(True)
         self._keys: list[str] = []

@@ -74,7 +74,7 @@ class Knob(QWidget):
         self._pressed_share = 0.0
         self._editor: QLineEdit | None = None
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(name)
         self.setToolTip(
             f"{tip or name}\nDrag, wheel or arrow keys; Shift is finer; type a number; double-click resets"
@@ -92,6 +92,9 @@ class Knob(QWidget):
 
     def sizeHint(self) -> QSize:
         return QSize(70, 82)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(62, 82)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:

@@ -17,7 +17,7 @@ class Meter(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Level")
         self.setToolTip(
             "Playback level in dBFS. LIMIT lights when the safety limiter acts (playback only, never a file)"
@@ -27,6 +27,9 @@ class Meter(QWidget):
 
     def sizeHint(self) -> QSize:
         return QSize(170, 40)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(110, 40)
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)
@@ -55,7 +58,7 @@ class Meter(QWidget):
         painter.drawRoundedRect(QRectF(bar.left(), bar.top(), bar.width() * share, bar.height()), 3, 3)
         painter.setFont(theme.small_font(9))
         painter.setPen(QColor(theme.FAINT))
-        for db in (-60, -40, -20, 0):
+        for db in (-60, -40, -20, 0) if bar.width() > 80 else (-60, 0):
             x = bar.left() + bar.width() * (1 - db / LOWEST_DB)
             painter.drawText(QRectF(x - 14, 20, 28, 12), Qt.AlignmentFlag.AlignCenter, f"{db}")
         light = QRectF(self.width() - 44, 5, 44, 16)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QWidget
+from typing import TYPE_CHECKING
 
-from app.library import PresetEntry
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QSizePolicy, QWidget
+
 from app.views.parts import tool_button
+
+if TYPE_CHECKING:
+    from app.library import PresetEntry
 
 
 class PresetBar(QWidget):
@@ -24,16 +28,22 @@ class PresetBar(QWidget):
         following.clicked.connect(lambda: self.step_asked.emit(1))
         self._list = QComboBox()
         self._list.setAccessibleName("Preset")
-        self._list.setMinimumWidth(330)
+        self._list.setMinimumWidth(180)
+        self._list.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self._list.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._list.setMaximumWidth(420)
         self._list.setMaxVisibleItems(24)
         self._list.activated.connect(lambda row: self.preset_chosen.emit(self._entries[row].name))
         self.card = QLabel()  # placed by the window
         self.card.setObjectName("faint")
+        self.card.setWordWrap(True)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
-        for widget in (previous, self._list, following):
-            row.addWidget(widget)
+        row.addWidget(previous)
+        row.addWidget(self._list, 1000)  # all of the room, up to its greatest width
+        row.addWidget(following)
+        row.addStretch(1)
 
     def set_entries(self, entries: list[PresetEntry]) -> None:
         self._entries = entries

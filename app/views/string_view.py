@@ -58,7 +58,7 @@ class StringView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setMinimumSize(480, 200)
+        self.setMinimumSize(480, 112)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
@@ -216,10 +216,14 @@ class StringView(QWidget):
         self._paint_ends(painter)
         self._paint_listening_point(painter)
         self._paint_words(painter)
+        if self.hasFocus():
+            painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, 6)
 
     def _ground(self) -> QPixmap:
         """The picture behind the string, painted anew only when something in it changes."""
-        key = (self.size(), self.devicePixelRatioF(), self._span_mm, self._trained)
+        key = (self.size(), self.devicePixelRatioF(), self._span_mm, self._trained, theme.face)
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF())
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
@@ -233,8 +237,8 @@ class StringView(QWidget):
 
     def _paint_ground(self, painter: QPainter) -> None:
         gradient = QLinearGradient(0, 0, 0, self.height())
-        gradient.setColorAt(0, QColor("#171b22"))
-        gradient.setColorAt(1, QColor("#101317"))
+        gradient.setColorAt(0, QColor(theme.face.ground_top))
+        gradient.setColorAt(1, QColor(theme.face.ground_bottom))
         painter.setPen(QPen(QColor(theme.LINE), 1))
         painter.setBrush(gradient)
         painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, 6)
@@ -262,7 +266,7 @@ class StringView(QWidget):
         assert self._trained is not None
         low, high = self._trained
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(0, 0, 0, 70))
+        painter.setBrush(theme.translucent(theme.face.shade, theme.face.shade_alpha))
         left = QRectF(self._x(0), top, self._x(low) - self._x(0), bottom - top)
         right = QRectF(self._x(high), top, self._x(1) - self._x(high), bottom - top)
         for area in (left, right):

@@ -1,25 +1,131 @@
-"""Colours, fonts and the style sheet: one dark face for every view."""
+"""Colours, fonts and the style sheet: a dark face and a light one, with the same roles.
+
+Read the colours as `theme.TEXT` when painting; never import one by name, for they change with the face. Plots, which
+keep the pens that they were made with, are told by `app.views.recolour`.
+"""
 
 from __future__ import annotations
 
-import pyqtgraph as pg
+from dataclasses import dataclass
+from typing import Literal
+
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication
 
-BACKGROUND = "#0d0f13"
-PANEL = "#14171d"
-RAISED = "#1d2129"
-LINE = "#2b313c"
-TEXT = "#d8dde6"
-FAINT = "#8a93a3"
-MODEL = "#ffb03a"  # what the model says is amber, everywhere
-TRUTH = "#4cc3e8"  # and the physics blue
-WARNING = "#ff6b5e"
-GOOD = "#58c98b"
+FaceChoice = Literal["system", "dark", "light"]
 
+
+@dataclass(frozen=True)
+class Face:
+    """One colour a role."""
+
+    background: str
+    panel: str
+    raised: str
+    line: str
+    text: str
+    faint: str
+    disabled: str
+    model: str  # what the model says is amber, everywhere
+    truth: str  # and the physics blue
+    warning: str
+    good: str
+    ground_top: str  # behind the string, from here
+    ground_bottom: str  # to here
+    shade: str  # over what the model was not trained on
+    shade_alpha: int
+
+
+DARK = Face(
+    background="#0d0f13",
+    panel="#14171d",
+    raised="#1d2129",
+    line="#2b313c",
+    text="#d8dde6",
+    faint="#8a93a3",
+    disabled="#555d6b",
+    model="#ffb03a",
+    truth="#4cc3e8",
+    warning="#ff6b5e",
+    good="#58c98b",
+    ground_top="#171b22",
+    ground_bottom="#101317",
+    shade="#000000",
+    shade_alpha=70,
+)
+LIGHT = Face(
+    background="#eceef2",
+    panel="#fafbfc",
+    raised="#ffffff",
+    line="#c6ccd6",
+    text="#1b2029",
+    faint="#596272",
+    disabled="#9aa2b0",
+    model="#a05a00",
+    truth="#00698f",
+    warning="#b3261e",
+    good="#1a7044",
+    ground_top="#fdfdfe",
+    ground_bottom="#f3f5f8",
+    shade="#4a5568",
+    shade_alpha=26,
+)
+
+_SCHEMES: dict[FaceChoice, Qt.ColorScheme] = {
+    "system": Qt.ColorScheme.Unknown,
+    "dark": Qt.ColorScheme.Dark,
+    "light": Qt.ColorScheme.Light,
+}
+
+face = DARK
+BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT = (
+    DARK.background,
+    DARK.panel,
+    DARK.raised,
+    DARK.line,
+    DARK.text,
+    DARK.faint,
+)
+MODEL, TRUTH, WARNING, GOOD = DARK.model, DARK.truth, DARK.warning, DARK.good
 SOURCE_COLOURS = {"model": MODEL, "truth": TRUTH}
 
-_STYLE = f"""
+
+class _Changes(QObject):
+    face_changed = Signal(Face, Face)  # from, to
+
+
+changes = _Changes()
+
+
+def use(new: Face) -> None:
+    """Makes `new` the present face and tells of it; the application's style sheet is `apply_theme`'s business."""
+    global face, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, MODEL, TRUTH, WARNING, GOOD
+    old, face = face, new
+    BACKGROUND, PANEL, RAISED, LINE = new.background, new.panel, new.raised, new.line
+    TEXT, FAINT, WARNING, GOOD = new.text, new.faint, new.warning, new.good
+    MODEL, TRUTH = new.model, new.truth
+    SOURCE_COLOURS.update(model=MODEL, truth=TRUTH)
+    if new != old:
+        changes.face_changed.emit(old, new)
+
+
+def contrast(one: str, other: str) -> float:
+    """WCAG's ratio of two colours, 1 … 21; text needs 4.5, large text and signs 3."""
+    low, high = sorted(_luminance(QColor(colour)) for colour in (one, other))
+    return (high + 0.05) / (low + 0.05)
+
+
+def _luminance(colour: QColor) -> float:
+    linear = [
+        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+        for c in (colour.redF(), colour.greenF(), colour.blueF())
+    ]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def _style_sheet() -> str:
+    return f"""
 QWidget {{ color: {TEXT}; font-size: 12px; }}
 QMainWindow, QDialog {{ background: {BACKGROUND}; }}
 QFrame#rule {{ background: {LINE}; }}
@@ -29,20 +135,24 @@ QLabel#faint {{ color: {FAINT}; }}
 QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
 QLabel#badge {{
     color: {FAINT}; background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 8px; }}
+QLabel#badge[fault="true"] {{ color: {WARNING}; border-color: {WARNING}; }}
 QLabel#warning {{ color: {WARNING}; }}
+QLabel#good {{ color: {GOOD}; }}
+QLabel#title {{ font-size: 15px; font-weight: 600; }}
 QPushButton, QToolButton {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 6px 12px; }}
 QPushButton:hover, QToolButton:hover {{ border-color: {FAINT}; }}
 QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {TEXT}; }}
-QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus
+QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus, QCheckBox:focus,
+QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, QMenuBar:focus
     {{ border: 1px solid {TEXT}; }}
-QPushButton:disabled, QToolButton:disabled {{ color: {LINE}; }}
+QPushButton:disabled, QToolButton:disabled, QComboBox:disabled {{ color: {face.disabled}; }}
 QPushButton#model:checked {{ background: {MODEL}; color: {BACKGROUND}; border-color: {MODEL}; font-weight: 600; }}
 QPushButton#truth:checked {{ background: {TRUTH}; color: {BACKGROUND}; border-color: {TRUTH}; font-weight: 600; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
 QToolButton::menu-indicator {{ image: none; }}
-QComboBox, QLineEdit, QDoubleSpinBox {{
+QComboBox, QLineEdit, QDoubleSpinBox, QPlainTextEdit, QTextBrowser, QListWidget {{
     background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;
     selection-background-color: {TRUTH}; selection-color: {BACKGROUND}; }}
 QComboBox::drop-down {{ border: none; width: 22px; }}
@@ -55,18 +165,24 @@ QSlider::handle:horizontal:focus {{ background: {TRUTH}; }}
 QProgressBar {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; text-align: center; }}
 QProgressBar::chunk {{ background: {TRUTH}; }}
 QTabWidget::pane {{ border: none; }}
-QTabBar {{ background: transparent; }}
+QTabBar {{ background: transparent; qproperty-drawBase: 0; }}
 QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 2px solid transparent; }}
 QTabBar::tab:hover {{ color: {TEXT}; }}
 QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
 QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}
+QScrollBar {{ background: transparent; border: none; }}
+QScrollBar:horizontal {{ height: 9px; }}
+QScrollBar:vertical {{ width: 9px; }}
+QScrollBar::handle {{
+    background: {face.disabled}; border-radius: 3px; margin: 1px; min-width: 24px; min-height: 24px; }}
+QScrollBar::handle:hover {{ background: {FAINT}; }}
+QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
+QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
 QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; }}
 """
 
 
-def apply_theme(app: QApplication) -> None:
-    """Fusion with our dark palette, for the whole application."""
-    app.setStyle("Fusion")
+def _palette() -> QPalette:
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in {
@@ -82,11 +198,22 @@ def apply_theme(app: QApplication) -> None:
         roles.ToolTipText: TEXT,
         roles.Highlight: TRUTH,
         roles.HighlightedText: BACKGROUND,
+        roles.Link: TRUTH,
     }.items():
         palette.setColor(role, QColor(colour))
-    app.setPalette(palette)
-    app.setStyleSheet(_STYLE)
-    pg.setConfigOptions(antialias=True, background=PANEL, foreground=FAINT, useOpenGL=False)
+    return palette
+
+
+def apply_theme(app: QApplication, choice: FaceChoice = "dark") -> None:
+    """Fusion with our palette, for the whole application; "system" follows the desktop."""
+    if app.style().name() != "fusion":
+        app.setStyle("Fusion")
+    hints = app.styleHints()
+    hints.setColorScheme(_SCHEMES[choice])  # the window's frame and the file dialogs follow
+    light = choice == "light" or (choice == "system" and hints.colorScheme() == Qt.ColorScheme.Light)
+    use(LIGHT if light else DARK)
+    app.setPalette(_palette())
+    app.setStyleSheet(_style_sheet())
 
 
 def small_font(size: int = 11, bold: bool = False) -> QFont:

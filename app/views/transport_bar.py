@@ -68,7 +68,7 @@ class TransportBar(QFrame):
         self.meter = Meter()
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
-        row.setSpacing(10)
+        row.setSpacing(8)
         row.addLayout(self._build_transport())
         row.addWidget(vertical_rule())
         row.addLayout(self._build_sources())

@@ -35,12 +35,12 @@ class WaveformView(pg.PlotWidget):
         super().__init__(parent)
         self.setAccessibleName("Waveform")
         self.setToolTip("Click moves the playhead; the wheel zooms in time; double-click shows all")
-        self.setMinimumHeight(150)
+        self.setMinimumHeight(84)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         item = self.getPlotItem()
         item.setLabel("bottom", "time", units="s", siPrefix=False)
         item.getAxis("bottom").enableAutoSIPrefix(False)
-        item.setLabel("left", "displacement (mm)")
+        item.setLabel("left", "mm")
         item.showGrid(x=True, y=True, alpha=0.18)
         item.setMenuEnabled(False)
         item.hideButtons()
@@ -57,7 +57,7 @@ class WaveformView(pg.PlotWidget):
             1,
             pen=pg.mkPen(theme.WARNING, width=1, style=Qt.PenStyle.DashLine),
             label="end of training",
-            labelOpts={"color": theme.WARNING, "position": 0.93, "anchors": [(0, 0.5), (0, 0.5)]},
+            labelOpts={"color": theme.WARNING, "position": 0.86, "anchors": [(0, 0.5), (0, 0.5)]},
         )
         self._playhead = pg.InfiniteLine(0, pen=pg.mkPen(theme.TEXT, width=1))
         for thing in (self._untrained, self._horizon, self._playhead):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 from torch import Tensor
 
 from engine.reference.state import ModalState
@@ -27,6 +26,8 @@ def solve_dop853(
     Raises:
         RuntimeError: the integrator gave up on a trajectory.
     """
+    from scipy.integrate import solve_ivp  # slow to load, and only the oracle needs it
+
     modes = state.modes
     stiffness = string.undamped_frequencies(modes).square().numpy()
     friction = 2 * string.decay_rates(modes).numpy()

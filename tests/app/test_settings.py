@@ -5,7 +5,16 @@ from pathlib import Path
 import pytest
 
 from app.session import Choices
-from app.settings import DeviceChoice, ExportChoices, Settings, load_settings, save_settings, settings_file
+from app.settings import (
+    DeviceChoice,
+    ExportChoices,
+    Look,
+    Settings,
+    SoundChoice,
+    load_settings,
+    save_settings,
+    settings_file,
+)
 
 
 def test_round_trip(tmp_path: Path) -> None:
@@ -14,6 +23,8 @@ def test_round_trip(tmp_path: Path) -> None:
         choices=Choices(position=0.7, heard="truth", loop=True),
         export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
+        sound=SoundChoice(rate_hz=44_100, buffer=512),
+        look=Look(face="light", size_percent=125),
         window_geometry="AdnQyw==",
     )
     save_settings(path, settings)
@@ -45,6 +56,26 @@ def test_a_broken_file_is_set_aside_and_told(tmp_path: Path, text: str, names: s
     assert "settings.broken.json" in notice
     assert (tmp_path / "settings.broken.json").read_text() == text
     assert load_settings(path) == (Settings(), "")
+
+
+def test_a_wrong_field_does_not_lose_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text(
+        '{"choices": {"position": 9, "listen": 0.2}, "sound": {"buffer": 3, "rate_hz": 96000}, "look": 7,'
+        ' "colour": 1, "device": {"name": "Loud"}, "export": {"bits": "32f"}}'
+    )
+    settings, notice = load_settings(path)
+    assert settings == Settings(
+        choices=Choices(listen=0.2), sound=SoundChoice(rate_hz=96_000), export=ExportChoices(bits="32f")
+    )
+    assert "choices.position" in notice
+    assert "settings.broken.json" in notice
+
+
+def test_a_file_of_the_first_version_still_loads(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text('{"version": 1, "choices": {"loop": true}, "device": null, "window_geometry": ""}')
+    assert load_settings(path) == (Settings(choices=Choices(loop=True)), "")
 
 
 def test_the_place_can_be_given(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ class FakeSoundDevice(SimpleNamespace):
                 "max_output_channels": channels,
                 "default_samplerate": 48_000.0,
                 "default_high_output_latency": 0.035,
+                "default_low_output_latency": 0.01,
             }
             for name, api, channels in self.entries
         ]
@@ -87,6 +88,8 @@ def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSou
     assert options["latency"] == 0.05
     open_device(wanted, 0.02, 256, lambda *_: None)
     assert sounddevice.opened[1]["latency"] == 0.035
+    open_device(wanted, 0.005, 256, lambda *_: None)
+    assert sounddevice.opened[2]["latency"] == 0.01  # asked to be prompt
 
 
 def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> None:

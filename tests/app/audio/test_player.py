@@ -11,7 +11,7 @@ import pytest
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Mixer, Player, ProblemKind, Track
 from app.audio import player as player_module
 from app.audio import stream as stream_module
-from app.audio.problems import no_device
+from app.audio.problems import no_device, vanished
 from app.audio.stream import OutputStream
 
 RATE_HZ = 48_000
@@ -40,6 +40,7 @@ class Bench:
         self.problems: list[AudioProblem] = []
         self.devices: dict[str, AudioDevice] = {}
         self.refusal: AudioUnavailable | None = None
+        self.accepted_hz = 0  # in spite of the refusal
         self.raw_streams = raw_streams
         self._open_fake = open_fake
         self.player = Player(self.problems.append, look_up=self._look_up, open_output=self._open)
@@ -69,7 +70,7 @@ class Bench:
         return next(iter(self.devices.values())) if device is None else self.devices[device.name]
 
     def _open(self, device: AudioDevice, buffer_s: float) -> OutputStream:
-        if self.refusal is not None:
+        if self.refusal is not None and device.default_rate_hz != self.accepted_hz:
             raise self.refusal
         return OutputStream(device, buffer_s, BLOCK_FRAMES, self._open_fake)
 
@@ -217,6 +218,79 @@ def test_another_buffer_opens_the_device_again(bench: Bench) -> None:
     assert old.calls == ["start", "abort", "close"]
     assert bench.hear(bench.raw_streams[1], 40).any()
     assert bench.problems == []
+
+
+def test_a_chosen_rate_and_buffer_open_the_device_again(bench: Bench) -> None:
+    bench.add("Speakers")
+    bench.open(None)
+    bench.player.open(None, rate_hz=96_000, buffer_frames=128)
+    wait_until(lambda: bench.player.rate_hz == 96_000)
+    assert bench.raw_streams[0].calls == ["start", "abort", "close"]
+    assert bench.raw_streams[1].shape == (64, 2)  # two blocks are the buffer
+    assert bench.problems == []
+
+
+def test_a_refused_rate_leaves_the_device_as_it_was(bench: Bench) -> None:
+    speakers = bench.add("Speakers")
+    bench.open(None)
+    bench.player.load(make_track())
+    bench.player.play()
+    bench.refusal = AudioUnavailable(AudioProblem(ProblemKind.RATE_REFUSED, "No 96 kHz.", "Choose another."))
+    bench.accepted_hz = RATE_HZ
+    bench.player.open(None, rate_hz=96_000)
+    wait_until(lambda: bench.player.status().changes_done == 2)
+    status = bench.player.status()
+    assert (status.device, status.rate_hz) == (speakers, RATE_HZ)
+    assert status.problem == "No 96 kHz. Choose another."
+    assert bench.hear(bench.raw_streams[-1], 20).any()
+
+
+def test_looking_for_new_devices_finds_one_and_keeps_the_present(bench: Bench) -> None:
+    bench.add("Speakers")
+    bench.open(None)
+    bench.player.load(make_track())
+    bench.player.play()
+    bench.player.open(None, rescan=True)
+    wait_until(lambda: len(bench.raw_streams) == 2 and bench.player.status().changes_done == 2)
+    assert bench.hear(bench.raw_streams[-1], 20).any()
+    assert bench.problems == []
+
+
+def test_a_device_that_is_missing_at_the_start_is_taken_when_it_comes(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(player_module, "TRY_AGAIN_S", 0.05)
+
+    def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
+        if "Headphones" not in bench.devices:
+            raise vanished("Headphones")
+        return bench.devices["Headphones"]
+
+    bench.player._look_up = look_up
+    bench.player.open(AudioDevice("Headphones", "Test API"), rate_hz=44_100)
+    wait_until(lambda: bench.problems != [])
+    bench.add("Headphones")
+    wait_until(lambda: bench.player.status().device is not None)
+    assert bench.player.rate_hz == 44_100
+    assert len(bench.problems) == 1
+
+
+@pytest.mark.parametrize(("side", "silent"), [("left", 1), ("right", 0)])
+def test_the_tone_sounds_on_its_side_alone(bench: Bench, side: Any, silent: int) -> None:
+    bench.add("Headphones")
+    raw = bench.open(None)
+    bench.player.sound_tone(side)
+    output = raw.callback.__self__
+    heard = []
+    for _ in range(240):
+        wait_until(lambda: output.frames_queued - output.frames_written >= 4 * BLOCK_FRAMES)
+        heard.append(raw.tick())
+    both = np.concatenate(heard)
+    assert not both[:, silent].any()
+    assert np.abs(both[:, 1 - silent]).max() == pytest.approx(0.1, rel=0.01)
+    assert not both[-BLOCK_FRAMES:].any()
+    crossings = np.count_nonzero(np.diff(np.signbit(both[:, 1 - silent])))
+    assert crossings == pytest.approx(880, abs=3)
 
 
 def test_a_device_of_another_rate_unloads_the_track(bench: Bench) -> None:

@@ -1,0 +1,136 @@
+"""The sound output as the user has chosen it: opening it, its dialog, its faults, the badge in the header.
+
+A choice is saved once the device plays with it: one that was refused must not leave the next start without sound.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject
+
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, PlayerStatus, output_devices
+from app.main_window import MainWindow
+from app.settings import Buffer, DeviceChoice, SoundChoice
+from app.views.audio_dialog import AudioDialog, AudioState
+
+if TYPE_CHECKING:
+    from app.rendering import Take
+
+# of sound ahead: medium has room for a busy interpreter, and still a prompt pluck
+LATENCY_S: dict[Buffer, float] = {"low": 0.015, "medium": 0.05, "high": 0.15}
+EVERY = 30  # moments between two looks at the list of devices
+
+
+class AudioControl(QObject):
+    """`device` and `sound` are to be saved."""
+
+    def __init__(self, window: MainWindow, player: Player, device: DeviceChoice | None, sound: SoundChoice) -> None:
+        super().__init__(window)
+        self.device, self.sound = device, sound
+        self._wish = (device, sound)
+        self._window, self._player = window, player
+        self._changes = 0
+        self._notice = ""
+        self._underruns_before = 0  # the user's zero
+        self._listed: list[DeviceChoice] | None = None
+        self._moments = 0
+        self._dialog: AudioDialog | None = None
+        window.audio_asked.connect(self.show_dialog)
+
+    def open(self, rescan: bool = False) -> None:
+        """Opens what is wished for."""
+        device, sound = self._wish
+        self._changes += 1
+        self._player.open(
+            AudioDevice(device.name, device.host_api) if device else None,
+            LATENCY_S.get(sound.buffer, LATENCY_S["medium"]),
+            sound.rate_hz,
+            sound.buffer if isinstance(sound.buffer, int) else 0,
+            rescan,
+        )
+
+    def tell(self, problem: AudioProblem) -> None:
+        """A fault, with what it means for now."""
+        device = self._player.status().device
+        meanwhile = f"“{device.name}” plays on." if device else "The app goes on without sound."
+        self._notice = f"{problem} {meanwhile}"
+        self._window.notices.tell(self._notice, problem.detail)
+
+    def show(self, status: PlayerStatus, take: Take | None) -> None:
+        """The present state, sixty times a second."""
+        if status.problem is None:
+            if self._notice:
+                self._window.notices.withdraw(self._notice)  # the sound is back
+                self._notice = ""
+            if status.changes_done == self._changes and status.device is not None:
+                self.device, self.sound = self._wish
+        if status.underruns < self._underruns_before:  # another stream
+            self._underruns_before = 0
+        if take is not None:
+            self._show_badge(status, take.info.rate_hz)
+        if self._dialog is not None and self._dialog.isVisible():
+            self._moments += 1
+            self._dialog.show_state(_state(status, self._underruns_before))
+            if self._moments % EVERY == 0 and self._listed is not None:
+                self._list_devices()
+
+    def show_dialog(self) -> None:
+        if self._dialog is None:
+            self._dialog = dialog = AudioDialog(self._window)
+            dialog.choice_made.connect(self._choose)
+            dialog.retry_asked.connect(self.open)
+            dialog.rescan_asked.connect(lambda: self.open(rescan=True))
+            dialog.tone_asked.connect(self._player.sound_tone)
+            dialog.underruns_reset.connect(self._reset_underruns)
+        self._listed = None
+        self._list_devices()
+        self._dialog.show_sound(self._wish[1])
+        self._dialog.show_state(_state(self._player.status(), self._underruns_before))
+        self._dialog.show()
+        self._dialog.raise_()
+
+    def _choose(self, device: DeviceChoice | None, sound: SoundChoice) -> None:
+        self._wish = (device, sound)
+        self.open()
+
+    def _reset_underruns(self) -> None:
+        self._underruns_before = self._player.status().underruns
+
+    def _list_devices(self) -> None:
+        """Fills the list when it has changed. Without PortAudio it is asked once only: asking takes long then."""
+        first = self._listed is None
+        try:
+            found = output_devices(rescan=first and self._player.status().device is None)
+        except AudioUnavailable:
+            found, listed = [], None
+        else:
+            listed = [DeviceChoice(name=device.name, host_api=device.host_api) for device in found]
+        if self._dialog is not None and (first or listed != self._listed):
+            self._dialog.show_devices(listed or [], self._wish[0])
+        self._listed = listed
+
+    def _show_badge(self, status: PlayerStatus, model_rate_hz: int) -> None:
+        label = self._window.rate_label
+        model = f"{model_rate_hz / 1000:g}"
+        fault = status.device is None
+        text = f"{model} kHz  ·  no sound" if fault else f"{model} → {status.rate_hz / 1000:g} kHz"
+        if label.text() != text:
+            label.setText(text)
+            label.setToolTip(
+                f"{status.problem or 'No sound output'}\nAudio settings: Ctrl+,"
+                if fault
+                else "The model's rate, converted to the sound device's rate"
+            )
+            label.setProperty("fault", fault)
+            label.style().polish(label)
+
+
+def _state(status: PlayerStatus, underruns_before: int) -> AudioState:
+    device = status.device
+    return AudioState(
+        f"“{device.name}” ({device.host_api})" if device else "",
+        f"{status.rate_hz / 1000:g} kHz, latency {1000 * status.latency_s:.0f} ms",
+        status.problem or "",
+        status.underruns - underruns_before,
+    )

@@ -1,0 +1,94 @@
+"""What all plots share: their ground and axes, and how they take on another face.
+
+A plot keeps the pens and brushes that it was made with. When the face changes, every colour of the old one is
+exchanged for the same role's in the new one, with its alpha, so that no view needs to know of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtGui import QBrush, QColor, QPen
+from PySide6.QtWidgets import QApplication
+
+from app.views import theme
+
+
+def dress_plots() -> None:
+    """For all plots that are made from now on; and they follow the face. To be called once."""
+    pg.setConfigOptions(antialias=True, useOpenGL=False)
+    _set_ground()
+    theme.changes.face_changed.connect(recolour)
+
+
+def recolour(old: theme.Face, new: theme.Face) -> None:
+    """Exchanges the colours of every plot there is."""
+    _set_ground()
+    swap = _Swap(old, new)
+    for view in QApplication.allWidgets():
+        if isinstance(view, pg.GraphicsView):
+            view.setBackground("default")
+            for item in view.scene().items():
+                _recolour_item(item, swap)
+
+
+def _set_ground() -> None:
+    pg.setConfigOptions(background=theme.PANEL, foreground=theme.FAINT)
+
+
+class _Swap:
+    """Colours of one face for those of another; any other colour stays."""
+
+    def __init__(self, old: theme.Face, new: theme.Face) -> None:
+        pairs = zip(astuple(old), astuple(new), strict=True)
+        self._colours = {QColor(a).rgb(): QColor(b) for a, b in pairs if isinstance(a, str)}
+
+    def colour(self, given: QColor) -> QColor:
+        opaque = QColor(given)
+        opaque.setAlpha(255)
+        swapped = QColor(self._colours.get(opaque.rgb(), given))
+        swapped.setAlpha(given.alpha())
+        return swapped
+
+    def pen(self, given: Any) -> QPen:
+        pen = QPen(pg.mkPen(given))
+        pen.setColor(self.colour(pen.color()))
+        return pen
+
+    def brush(self, given: Any) -> QBrush:
+        brush = QBrush(pg.mkBrush(given))
+        brush.setColor(self.colour(brush.color()))
+        return brush
+
+
+def _recolour_item(item: Any, swap: _Swap) -> None:
+    match item:
+        case pg.PlotDataItem():
+            item.setPen(swap.pen(item.opts["pen"]))
+            if item.opts["fillBrush"] is not None:
+                item.setFillBrush(swap.brush(item.opts["fillBrush"]))
+            item.setSymbolPen(swap.pen(item.opts["symbolPen"]))
+            item.setSymbolBrush(swap.brush(item.opts["symbolBrush"]))
+        case pg.PlotCurveItem() if not isinstance(item.parentItem(), pg.PlotDataItem):
+            item.setPen(swap.pen(item.opts["pen"]))
+            if item.opts["brush"] is not None:
+                item.setBrush(swap.brush(item.opts["brush"]))
+        case pg.ScatterPlotItem() if not isinstance(item.parentItem(), pg.PlotDataItem):
+            item.setPen(swap.pen(item.opts["pen"]))
+            item.setBrush(swap.brush(item.opts["brush"]))
+        case pg.InfiniteLine():
+            item.setPen(swap.pen(item.pen))
+            item.setHoverPen(swap.pen(item.hoverPen))
+        case pg.LinearRegionItem():
+            item.setBrush(swap.brush(item.brush))
+            item.setHoverBrush(swap.brush(item.hoverBrush))
+        case pg.TextItem():
+            item.setColor(swap.colour(item.color))
+        case pg.AxisItem():
+            item.setPen(swap.pen(item.pen()))
+            item.setTextPen(swap.pen(item.textPen()))
+        case pg.BarGraphItem():
+            item.setOpts(**{k: swap.brush(v) for k, v in item.opts.items() if k == "brush" and v is not None})
+    item.update()

@@ -1,0 +1,154 @@
+"""The window as a place: it fits small screens, is walked through with Tab, and needs no engine to be seen."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMenu, QTabBar, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.appearance import Appearance
+from app.controller import Controller
+from app.main_window import KEYS, MainWindow
+from app.settings import Look
+from app.views import theme
+from app.views.focus_ring import FocusRing
+
+ROOT = Path(__file__).parents[2]
+
+
+def stops(window: MainWindow) -> list[QWidget]:
+    """What the Tab key can reach, as far as it can be seen."""
+    return [
+        widget
+        for widget in window.findChildren(QWidget)
+        if widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and widget.focusProxy() is None
+        and widget.isEnabled()
+        and widget.isVisibleTo(window)
+        and widget.window() is window
+    ]
+
+
+def walk(window: MainWindow, start: QWidget) -> list[QWidget]:
+    """Where Tab leads from `start` until it comes back, or to a place where it has been."""
+    wanted = set(stops(window))
+    visited = [start]
+    widget = start.nextInFocusChain()
+    while widget not in visited:
+        if widget in wanted:
+            visited.append(widget)
+        widget = widget.nextInFocusChain()
+        if widget is start:
+            break
+    return visited
+
+
+def test_the_window_shows_without_the_engine() -> None:
+    code = (
+        "import sys, app.main, app.main_window, app.appearance, app.audio_control\n"
+        "assert not {'torch', 'scipy', 'numba', 'pyqtgraph'} & set(sys.modules), 'too much'"
+    )
+    if sys.platform != "win32":  # there torch must come before Qt
+        done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+def test_it_waits_until_its_parts_are_there(qtbot: QtBot) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    with qtbot.waitSignal(window.first_painted):
+        window.show()
+    assert not window.transport.isEnabled()
+    window.show_string(QWidget())
+    assert window.transport.isEnabled()
+
+
+def test_everything_that_tab_reaches_has_a_name(controller: Controller) -> None:
+    found = stops(controller.window)
+    assert len(found) > 15
+    for widget in found:
+        text = widget.text() if isinstance(widget, QAbstractButton) else ""
+        assert widget.accessibleName() or text, widget
+        assert widget.toolTip() or isinstance(widget, QTabBar), widget
+
+
+def test_tab_visits_everything_and_returns(controller: Controller) -> None:
+    window = controller.window
+    window.notices.tell("Something to dismiss.")
+    visited = walk(window, window.presets.findChildren(QAbstractButton)[0])
+    assert set(visited) == set(stops(window))
+    assert len(visited) == len(set(visited))
+
+
+def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
+    window = controller.window
+    window.notices.tell("Something to dismiss.")
+    visited = walk(window, window.presets.findChildren(QAbstractButton)[0])
+    string = next(panel.view for panel in controller.panels if panel.key == "string")
+    parts = [window.presets, window.notices.bell, window.notices, string, window.left, window.right, window.transport]
+    met = [
+        number
+        for widget in visited
+        for number, part in enumerate(parts)
+        if widget is part or part.isAncestorOf(widget)
+    ]
+    assert met == sorted(met)
+    assert set(met) == set(range(len(parts)))
+
+
+def test_the_plot_that_has_the_keyboard_is_ringed(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    (ring,) = window.findChildren(FocusRing)
+    plot = window.right.currentWidget()
+    plot.setFocus()
+    qtbot.waitUntil(ring.isVisible)
+    assert ring.geometry().size() == plot.size()
+    window.resize(window.width() - 100, window.height())
+    qtbot.waitUntil(lambda: ring.geometry().size() == plot.size())
+    window.transport.knobs["width"].setFocus()
+    qtbot.waitUntil(lambda: not ring.isVisible())
+
+
+def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    window.notices.tell("A fault in words that are long enough for two lines where the window is narrow. " * 2)
+    for width, height in ((1024, 560), (800, 480)):
+        window.resize(width, height)
+        qtbot.wait(20)
+        least = window.centralWidget().minimumSizeHint()
+        assert (window.width(), window.height()) == (width, height)
+        assert least.width() <= width
+        assert least.height() <= height
+
+
+def test_every_key_has_its_signal_and_words() -> None:
+    assert len({key for key, _, _ in KEYS}) == len(KEYS)
+    for _, signal, what in KEYS:
+        assert hasattr(MainWindow, signal)
+        assert what
+
+
+def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    style, palette = qapp.styleSheet(), qapp.palette()
+    made = Appearance(window, Look(face="dark"))
+    try:
+        actions = {action.text(): action for menu in window.menu.findChildren(QMenu) for action in menu.actions()}
+        assert actions["Dark"].isChecked()
+        actions["Light"].trigger()
+        assert made.look.face == "light"
+        assert theme.face == theme.LIGHT
+        assert actions["Light"].isChecked()
+        actions["150 %"].trigger()
+        assert made.look.size_percent == 150
+        assert "next start" in window.notices.text
+    finally:
+        theme.apply_theme(qapp, "dark")
+        qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
+        qapp.setStyleSheet(style)
+        qapp.setPalette(palette)

@@ -1,0 +1,97 @@
+"""Both faces can be read, and a plot that was made under one takes on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pyqtgraph as pg
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.views import theme
+from app.views.plots import recolour
+from app.views.string_view import StringView
+from app.views.waveform_view import WaveformView
+
+
+@pytest.fixture
+def dark_again() -> Iterator[None]:
+    yield
+    theme.use(theme.DARK)
+
+
+@pytest.mark.parametrize("face", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
+def test_text_can_be_read_on_every_ground(face: theme.Face) -> None:
+    for ground in (face.background, face.panel, face.raised, face.ground_top, face.ground_bottom):
+        for text in (face.text, face.faint, face.model, face.truth, face.warning, face.good):
+            assert theme.contrast(text, ground) >= 4.5, (text, ground)
+    for filled in (face.model, face.truth, face.good):  # the text of a checked button
+        assert theme.contrast(face.background, filled) >= 4.5
+
+
+@pytest.mark.parametrize("face", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
+def test_no_two_roles_share_a_colour(face: theme.Face) -> None:
+    """Else a plot could not know which role to take on."""
+    colours = [value for value in vars(face).values() if isinstance(value, str)]
+    assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
+
+
+def test_contrast_is_that_of_the_standard() -> None:
+    assert theme.contrast("#000000", "#ffffff") == pytest.approx(21)
+    assert theme.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
+
+
+def test_the_names_are_those_of_the_present_face(dark_again: None) -> None:
+    theme.use(theme.LIGHT)
+    assert (theme.LIGHT.model, theme.LIGHT.text) == (theme.MODEL, theme.TEXT)
+    assert {"model": theme.LIGHT.model, "truth": theme.LIGHT.truth} == theme.SOURCE_COLOURS
+
+
+def test_plots_take_on_another_face_and_come_back(
+    qtbot: QtBot, dark_again: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
+    view = WaveformView()
+    qtbot.addWidget(view)
+    view.set_heard("truth")
+    curve, line = view._curves["model"], view._playhead
+    faint = curve.opts["pen"].color().alpha()
+    stranger = pg.PlotDataItem(pen=pg.mkPen("#123456"))
+    view.addItem(stranger)
+    for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
+        theme.use(new)
+        recolour(old, new)
+        assert curve.opts["pen"].color() == theme.translucent(new.model, faint)
+        assert line.pen.color() == QColor(new.text)
+        assert view._horizon.label.color == QColor(new.warning)
+        assert view._untrained.brush.color() == theme.translucent(new.warning, 18)
+        assert view.backgroundBrush().color() == QColor(new.panel)
+        assert view.getPlotItem().getAxis("left").textPen().color() == QColor(new.faint)
+        assert stranger.opts["pen"].color() == QColor("#123456")
+
+
+def test_a_painted_view_reads_the_face_when_it_paints(qtbot: QtBot, dark_again: None) -> None:
+    view = StringView()
+    qtbot.addWidget(view)
+    view.resize(600, 260)
+    dark = view.grab().toImage().pixelColor(300, 60)
+    theme.use(theme.LIGHT)
+    light = view.grab().toImage().pixelColor(300, 60)
+    assert dark.lightness() < 60 < 200 < light.lightness()
+
+
+@pytest.mark.parametrize(("choice", "face"), [("light", theme.LIGHT), ("dark", theme.DARK)])
+def test_the_choice_is_put_on(
+    qapp: QApplication, dark_again: None, choice: theme.FaceChoice, face: theme.Face
+) -> None:
+    style, palette = qapp.styleSheet(), qapp.palette()
+    theme.apply_theme(qapp, choice)
+    assert theme.face == face
+    assert face.panel in qapp.styleSheet()
+    assert qapp.palette().window().color() == QColor(face.background)
+    qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
+    qapp.setStyleSheet(style)
+    qapp.setPalette(palette)
