@@ -132,6 +132,7 @@ class MainWindow(QMainWindow):
             self,
             "Keys",
             f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
+            "On a plot over time: arrow keys move the playhead, + and − or the wheel zoom, 0 shows all.<br>"
             "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
         )
 
