@@ -75,4 +75,4 @@ class ErrorTimePanel(Panel):
                     text += f"{here['level_db']:+.2f} dB" if math.isfinite(here["level_db"]) else "silent"
                 else:
                     text += f"RMSE {percent(here['rmse'])}   MAE {percent(here['mae'])}"
-        self.view.show_readout(text)
+        self.view.readout.tell(text)

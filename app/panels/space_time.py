@@ -31,8 +31,6 @@ class SpaceTimePanel(Panel):
         self._envelopes: Envelopes | None = None
         self._moments = 0
         self._shown: tuple[object, ...] = ()
-        self._caption = ""
-        self._hovering = False
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "listen" in names:
@@ -68,9 +66,7 @@ class SpaceTimePanel(Panel):
             view.show_nothing()
             return
         view.show_picture(made.displacement_m * MM, made.start_s, made.stop_s, self._typical_mm(envelopes, times_s))
-        self._caption = _caption(made)
-        if not self._hovering:
-            view.show_readout(self._caption)
+        view.readout.rest(_caption(made))
 
     def _typical_mm(self, envelopes: Envelopes, times_s: tuple[float, float]) -> float:
         """Of the displacement in view, for model and truth alike, or of the error."""
@@ -78,22 +74,21 @@ class SpaceTimePanel(Panel):
         return max(envelopes.typical_m(name, times_s) for name in names) * MM
 
     def _tell(self, time_s: float, place: float) -> None:
-        self._hovering = math.isfinite(time_s) and 0 <= place <= 1
-        text = self._caption
-        if self._hovering and self._envelopes is not None:
+        text = ""
+        if math.isfinite(time_s) and 0 <= place <= 1 and self._envelopes is not None:
             take = self._envelopes.take
             frame = round(time_s * take.info.rate_hz)
             if 0 <= frame < take.ready_frames:
                 point = round(place * (take.info.grid_points - 1))
                 here_mm = float(motion_of(take, self.view.quantity, frame, frame + 1)[0, point]) * MM
                 text = f"{time_s:.4f} s   place {place:.2f}   {here_mm:+.4f} mm"
-        self.view.show_readout(text)
+        self.view.readout.tell(text)
 
 
 def _caption(made: Picture) -> str:
     column_ms = 1000 * (made.stop_s - made.start_s) / made.displacement_m.shape[1]
     return {
         "frames": "every frame",
-        "extremes": f"extremes in {column_ms:.2g} ms",
-        "envelope": f"largest magnitude in {column_ms:.2g} ms; zoom in for the motion",
+        "extremes": f"extremes of {column_ms:.2g} ms",
+        "envelope": f"peaks of {column_ms:.2g} ms, without sign; zoom in for motion",
     }[made.detail]

@@ -80,4 +80,4 @@ class SpectrogramPanel(Panel):
             levels_db = spectrogram.levels_db[self.view.quantity][: spectrogram.ready]
             if 0 <= column < len(levels_db) and 0 <= row < levels_db.shape[1]:
                 text = f"{time_s:.3f} s   {frequency_hz:.0f} Hz   {levels_db[column, row]:.1f} dB"
-        self.view.show_readout(text)
+        self.view.readout.tell(text)

@@ -65,11 +65,11 @@ class SpectrumPanel(Panel):
     def _tell(self) -> None:
         """The frequency under the mouse, its levels, and the nearest partial of the string at rest."""
         frequency_hz, partial_hz = self._hovered_hz, None
-        levels = "  ".join(f"{name} {level:.1f} dB" for name, level in self.view.levels_db(frequency_hz).items())
-        text = f"{frequency_hz:.1f} Hz   {levels}"
+        levels = "  ".join(f"{name} {level:.1f}" for name, level in self.view.levels_db(frequency_hz).items())
+        text = f"{frequency_hz:.1f} Hz   {levels} dB"
         if len(self._partials_hz):
             nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
             partial_hz = float(self._partials_hz[nearest])
             cents = 1200 * math.log2(frequency_hz / partial_hz)
-            text += f"   partial {nearest + 1} at {partial_hz:.1f} Hz ({cents:+.0f} cents)"
+            text += f"   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+.0f} cents)"
         self.view.show_readout(text, partial_hz)

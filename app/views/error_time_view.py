@@ -8,10 +8,11 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.views import theme
 from app.views.parts import tool_button
+from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
 
@@ -40,8 +41,7 @@ class ErrorTimeView(QWidget):
         )
         self.longer.setStyleSheet(f"QToolButton {{{SMALL}}} QToolButton:disabled {{color: {theme.FAINT};}}")
         self.longer.clicked.connect(self.longer_asked)
-        self.readout = QLabel()
-        self.readout.setObjectName("faint")
+        self.readout = Readout()
         self.plot = TimePlot(
             "Error over time",
             "Click moves the playhead; the wheel zooms in time, the right button pans; double-click shows all.\n"
@@ -64,7 +64,6 @@ class ErrorTimeView(QWidget):
         self._horizon_s = 1.0
         self._range: tuple[float, float] | None = None
         self.quantities.chosen.connect(self._choose)
-        self._legend = QLabel()
         self._lay_out()
         self._choose()
 
@@ -74,9 +73,7 @@ class ErrorTimeView(QWidget):
         row.setSpacing(8)
         row.addWidget(self.quantities)
         row.addWidget(self.longer)
-        row.addWidget(self._legend)
-        row.addStretch(1)
-        row.addWidget(self.readout)
+        row.addWidget(self.readout, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -117,10 +114,6 @@ class ErrorTimeView(QWidget):
             self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
         self._fit(list(drawn.values()))
 
-    def show_readout(self, text: str) -> None:
-        if text != self.readout.text():
-            self.readout.setText(text)
-
     def _choose(self) -> None:
         level = self.quantity == "level"
         for name, curve in self._curves.items():
@@ -160,14 +153,12 @@ class ErrorTimeView(QWidget):
 
     def _tell_legend(self) -> None:
         if self.quantity == "level":
-            self._legend.setText("")
+            self.readout.rest("")
             return
-        parts = []
-        for name, colour in (("rmse", RMSE), ("mae", MAE)):
-            stored = self._stored_errors.get(name)
-            note = f" <span style='color:{theme.FAINT}'>(⋯ validation {percent(stored)})</span>" if stored else ""
-            parts.append(f"<span style='color:{colour}'>— {name.upper()}</span>{note}")
-        self._legend.setText("&nbsp;&nbsp;".join(parts))
+        drawn = (("rmse", RMSE), ("mae", MAE))
+        text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
+        stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
+        self.readout.rest(f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}" if stored else text)
 
 
 def percent(error: float) -> str:

@@ -6,11 +6,12 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.views import theme
 from app.views.colour_maps import displacement_map, error_map
 from app.views.parts import combo_box
+from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
 
@@ -41,8 +42,7 @@ class SpaceTimeView(QWidget):
             "Auto fits what is in view for most of the time; model and truth always have the same scale"
         )
         self.gains.setStyleSheet(SMALL)
-        self.readout = QLabel()
-        self.readout.setObjectName("faint")
+        self.readout = Readout()
         self.plot = TimePlot(
             "Space–time",
             "Click: see and hear this moment; with Shift also listen at this place of the string.\n"
@@ -80,8 +80,7 @@ class SpaceTimeView(QWidget):
         row.setSpacing(8)
         row.addWidget(self.quantities)
         row.addWidget(self.gains)
-        row.addStretch(1)
-        row.addWidget(self.readout)
+        row.addWidget(self.readout, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -124,10 +123,6 @@ class SpaceTimeView(QWidget):
     def show_nothing(self) -> None:
         """Nothing is there yet of the times in view."""
         self._image.clear()
-
-    def show_readout(self, text: str) -> None:
-        if text != self.readout.text():
-            self.readout.setText(text)
 
     @property
     def _fitting_gain(self) -> int:

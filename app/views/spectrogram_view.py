@@ -8,10 +8,11 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.views.colour_maps import level_map
 from app.views.parts import combo_box
+from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
 
@@ -38,8 +39,7 @@ class SpectrogramView(QWidget):
         self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), 90)
         self.ranges.setToolTip("How far below full scale levels are told apart, the same for every source")
         self.ranges.setStyleSheet(SMALL)
-        self.readout = QLabel()
-        self.readout.setObjectName("faint")
+        self.readout = Readout()
         self.plot = TimePlot(
             "Spectrogram",
             "The sound at the listening point over time. Click moves the playhead; the wheel zooms in time,\n"
@@ -70,8 +70,7 @@ class SpectrogramView(QWidget):
         row.setSpacing(8)
         for control in (self.quantities, self.scales, self.ranges):
             row.addWidget(control)
-        row.addStretch(1)
-        row.addWidget(self.readout)
+        row.addWidget(self.readout, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -120,10 +119,6 @@ class SpectrogramView(QWidget):
         self._drawn = first + len(levels_db)
         self._levels_db[first : self._drawn] = levels_db
         self._colour(first)
-
-    def show_readout(self, text: str) -> None:
-        if text != self.readout.text():
-            self.readout.setText(text)
 
     def _colour(self, first: int) -> None:
         """Levels as colours, from a column on."""

@@ -9,10 +9,11 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.views import theme
 from app.views.parts import combo_box
+from app.views.readout import Readout
 from app.views.segments import SMALL
 
 FLOOR_DB, CEILING_DB = -130.0, 0.0
@@ -71,8 +72,7 @@ class SpectrumView(QWidget):
         self.ranges.setToolTip("How far below full scale the axis reaches, the same for model and truth")
         self.ranges.setStyleSheet(SMALL)
         self.ranges.activated.connect(self._fit)
-        self.readout = QLabel()
-        self.readout.setObjectName("faint")
+        self.readout = Readout()
         item = self.plot.getPlotItem()
         item.setLogMode(x=True)
         item.setLabel("bottom", "frequency", units="Hz", siPrefix=False)
@@ -104,8 +104,7 @@ class SpectrumView(QWidget):
         row.setContentsMargins(4, 2, 4, 0)
         row.setSpacing(8)
         row.addWidget(self.ranges)
-        row.addStretch(1)
-        row.addWidget(self.readout)
+        row.addWidget(self.readout, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -145,7 +144,7 @@ class SpectrumView(QWidget):
 
     def show_readout(self, text: str, partial_hz: float | None = None) -> None:
         """Text beside the axes, and a line at a partial."""
-        self.readout.setText(text)
+        self.readout.tell(text)
         self._partial.setVisible(partial_hz is not None)
         if partial_hz is not None:
             self._partial.setValue(math.log10(partial_hz))

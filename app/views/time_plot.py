@@ -17,6 +17,7 @@ SEEK_STEP_S = 0.1
 SEEK_STEP_SHARE = 0.05  # of what is in view, where that is less
 ZOOM_STEP = 1.25
 SHORTEST_VIEW_S = 0.002
+LABELLED_HEIGHT = 170  # in pixels: where there is less, the picture needs the room of the word "time"
 _PAN_BUTTONS = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
 
 
@@ -26,7 +27,6 @@ class TimePlot(pg.PlotWidget):
     seek_asked = Signal(float)
     pointed = Signal(float, float)  # a press with Shift: time in s, place on the upright axis
     hovered = Signal(float, float)  # the same, of the mouse; not a number where it has left
-    view_changed = Signal()  # other times are in view, or there is more or less room for them
 
     def __init__(self, name: str, tip: str, parent: QWidget | None = None, *, shaded: bool = True) -> None:
         """`shaded`: what lies past training; not under a picture, which would hide it as far as it reaches."""
@@ -65,7 +65,6 @@ class TimePlot(pg.PlotWidget):
             thing.setZValue(depth)
             item.addItem(thing, ignoreBounds=True)
         item.setXRange(0, self._seconds, padding=0)
-        item.vb.sigXRangeChanged.connect(self.view_changed)
 
     def set_times(self, seconds: float, horizon_s: float) -> None:
         """The whole of a take of `seconds` of a model that was trained for `horizon_s`.
@@ -183,8 +182,9 @@ class TimePlot(pg.PlotWidget):
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:
         super().resizeEvent(event)
-        if hasattr(self, "_playhead"):  # Qt also resizes while this is being made
-            self.view_changed.emit()
+        item = self.getPlotItem()
+        if item is not None:  # as it is while the plot is being made, and when it has been closed
+            item.getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
 
     def _follow(self, event: QMouseEvent) -> None:
         point = self._point_at(event.position())

@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.controller import Controller
 from app.library import Library
-from app.panels import ErrorTimePanel, Moment, Panel, SpaceTimePanel, SpectrogramPanel, SpectrumPanel
+from app.panels import ErrorTimePanel, Moment, Panel, SpaceTimePanel, SpectrogramPanel, SpectrumPanel, WaveformPanel
 from app.rendering import Take
 from app.session import Choices, Session
 from app.views.space_time_view import AUTO
@@ -77,7 +77,7 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
     view = panel.view
     watch(qtbot, panel, take, lambda: panel._envelopes is not None and panel._envelopes.complete)
     view.plot.show_times(0.0, 0.02)
-    watch(qtbot, panel, take, lambda: panel._caption == "every frame")
+    watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
     assert view._image.image.shape[0] == 101
     assert view._image.image.max() == pytest.approx(1.01 * 4, rel=1e-3)
     assert view._bar.levels() == (-4, 4)
@@ -181,6 +181,9 @@ def test_the_error_over_time(qtbot: QtBot, make: Make, take: Take) -> None:
     assert "+0.09 dB" in view.readout.text()
     view.plot.hovered.emit(float("nan"), 0.0)
     assert view.readout.text() == ""
+    view.quantities.show_key("relative")
+    view.quantities.chosen.emit("relative")
+    assert "validation 70.7 %, 25 %" in view.readout.text()
 
 
 def test_ten_seconds_are_asked_for_with_a_button(qtbot: QtBot, make: Make) -> None:
@@ -196,7 +199,7 @@ def test_the_spectrum_tells_level_and_nearest_partial(qtbot: QtBot, make: Make, 
     watch(qtbot, panel, take, lambda: bool(panel.view._levels_db))
     second_hz = float(take.info.string.undamped_frequencies(2)[1]) / (2 * np.pi)
     panel.view.hovered.emit(second_hz * 2 ** (10 / 1200))
-    assert f"partial 2 at {second_hz:.1f} Hz (+10 cents)" in panel.view.readout.text()
+    assert f"partial 2: {second_hz:.1f} Hz (+10 cents)" in panel.view.readout.text()
     assert "model" in panel.view.readout.text()
     assert 10 ** panel.view._partial.value() == pytest.approx(second_hz)
     panel.view.hovered.emit(float("nan"))
@@ -212,6 +215,18 @@ def test_the_spectrums_range_is_one_for_both_sources(make: Make, take: Take) -> 
         view.set_heard(source)
         view.set_rate(16_000)
         assert view.plot.getPlotItem().vb.viewRange()[1] == pytest.approx([-60, 0])
+
+
+def test_the_waveform_is_that_of_the_listening_point(qtbot: QtBot, make: Make, take: Take) -> None:
+    panel = make(WaveformPanel)
+    for listen in (0.37, 0.8):
+        panel.session.update(listen=listen)
+        watch(qtbot, panel, take, lambda listen=listen: panel._shown[1:3] == (FRAMES, listen))
+        time_s, drawn_mm = panel.view._curves["model"].getData()
+        signal_mm = 1000 * take.signal_m("model", listen)
+        assert drawn_mm.max() == pytest.approx(signal_mm.max(), rel=1e-5)
+        assert drawn_mm.min() == pytest.approx(signal_mm.min(), rel=1e-5)
+        assert time_s[-1] == pytest.approx(1.0, abs=0.001)
 
 
 def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Controller) -> None:
