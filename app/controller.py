@@ -24,7 +24,16 @@ from app.audio import AudioProblem, Player, Track
 from app.audio_control import AudioControl
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import KEYS, MainWindow
-from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
+from app.panels import (
+    ErrorTimePanel,
+    Moment,
+    Panel,
+    SpaceTimePanel,
+    SpectrogramPanel,
+    SpectrumPanel,
+    StringPanel,
+    WaveformPanel,
+)
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import Settings, save_settings
@@ -35,8 +44,8 @@ from app.views.help_dialog import HelpDialog
 from engine.metrics import ErrorSums
 from engine.preset import SHIPPED
 
-LEFT: tuple[type[Panel], ...] = (SpectrumPanel,)
-RIGHT: tuple[type[Panel], ...] = (WaveformPanel,)
+LEFT: tuple[type[Panel], ...] = (SpectrumPanel, SpectrogramPanel)
+RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel)
 
 FRAME_MS = 16
 ProblemListener = Callable[[AudioProblem], None]

@@ -4,8 +4,20 @@
 """
 
 from app.panels.base import Moment, Panel
+from app.panels.error_time import ErrorTimePanel
+from app.panels.space_time import SpaceTimePanel
+from app.panels.spectrogram import SpectrogramPanel
 from app.panels.spectrum import SpectrumPanel
 from app.panels.string import StringPanel
 from app.panels.waveform import WaveformPanel
 
-__all__ = ["Moment", "Panel", "SpectrumPanel", "StringPanel", "WaveformPanel"]
+__all__ = [
+    "ErrorTimePanel",
+    "Moment",
+    "Panel",
+    "SpaceTimePanel",
+    "SpectrogramPanel",
+    "SpectrumPanel",
+    "StringPanel",
+    "WaveformPanel",
+]

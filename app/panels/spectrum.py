@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from app.library import Library
 from app.panels.base import Moment, Panel
 from app.rendering import SOURCES, Take
@@ -26,6 +30,9 @@ class SpectrumPanel(Panel):
         self.view = SpectrumView()
         self._moments = 0
         self._shown: tuple[object, ...] = ()
+        self._partials_hz = np.zeros(0)
+        self._hovered_hz = math.nan
+        self.view.hovered.connect(self._hover)
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "heard" in names:
@@ -34,6 +41,7 @@ class SpectrumPanel(Panel):
     def take_started(self, take: Take) -> None:
         if take.info.rate_hz != self.view.analyser.rate_hz:
             self.view.set_rate(take.info.rate_hz)
+        self._partials_hz = take.info.string.undamped_frequencies(take.info.modes).numpy() / (2 * np.pi)
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1
@@ -48,3 +56,24 @@ class SpectrumPanel(Panel):
         first = round(moment.position_s * take.info.rate_hz)
         last = first + self.view.analyser.window_frames
         self.view.show_signals({name: take.signal_m(name, listen, first, last) / FULL_SCALE_M for name in SOURCES})
+        if math.isfinite(self._hovered_hz):
+            self._tell()
+
+    def _hover(self, frequency_hz: float) -> None:
+        self._hovered_hz = frequency_hz
+        if math.isfinite(frequency_hz):
+            self._tell()
+        else:
+            self.view.show_readout("")
+
+    def _tell(self) -> None:
+        """The frequency under the mouse, its levels, and the nearest partial of the string at rest."""
+        frequency_hz, partial_hz = self._hovered_hz, None
+        levels = "  ".join(f"{name} {level:.1f}" for name, level in self.view.levels_db(frequency_hz).items())
+        text = f"{frequency_hz:.1f} Hz   {levels} dB"
+        if len(self._partials_hz):
+            nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
+            partial_hz = float(self._partials_hz[nearest])
+            cents = 1200 * math.log2(frequency_hz / partial_hz)
+            text += f"   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+.0f} cents)"
+        self.view.show_readout(text, partial_hz)

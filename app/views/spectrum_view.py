@@ -8,14 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.views import theme
+from app.views.parts import combo_box
+from app.views.readout import Readout
+from app.views.segments import SMALL
 
 FLOOR_DB, CEILING_DB = -130.0, 0.0
 LOWEST_HZ = 50.0
 WINDOW_S = 0.18
 COLUMNS = 480
+RANGES_DB = (60, 90, 130)
 
 
 @dataclass(frozen=True)
@@ -52,15 +57,23 @@ class Analyser:
         return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
 
 
-class SpectrumView(pg.PlotWidget):
-    """Two curves on locked axes; the heard source is on top."""
+class SpectrumView(QWidget):
+    """Two curves on one locked pair of axes; the heard source is on top. The mouse reads a frequency."""
+
+    hovered = Signal(float)  # a frequency in Hz; not a number where the mouse has left
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setAccessibleName("Spectrum")
-        self.setToolTip("The spectrum at the listening point, at the playhead")
         self.setMinimumHeight(84)
-        item = self.getPlotItem()
+        self.plot = pg.PlotWidget()
+        self.plot.setAccessibleName("Spectrum")
+        self.plot.setToolTip("The spectrum at the listening point, at the playhead; 0 dB is a sine of full scale")
+        self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), RANGES_DB[-1])
+        self.ranges.setToolTip("How far below full scale the axis reaches, the same for model and truth")
+        self.ranges.setStyleSheet(SMALL)
+        self.ranges.activated.connect(self._fit)
+        self.readout = Readout()
+        item = self.plot.getPlotItem()
         item.setLogMode(x=True)
         item.setLabel("bottom", "frequency", units="Hz", siPrefix=False)
         item.setLabel("left", "dB")
@@ -76,20 +89,41 @@ class SpectrumView(pg.PlotWidget):
             name: item.plot(pen=pg.mkPen(theme.SOURCE_COLOURS[name], width=1)) for name in ("truth", "model")
         }
         self._fill(self._curves["truth"])
+        self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
+        self._partial.hide()
+        item.addItem(self._partial, ignoreBounds=True)
+        self._levels_db: dict[str, NDArray[np.float64]] = {}
         self._analyser = Analyser(16_000)
         self.set_rate(16_000)
         self.set_heard("model")
+        self.plot.viewport().installEventFilter(self)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout()
+        row.setContentsMargins(4, 2, 4, 0)
+        row.setSpacing(8)
+        row.addWidget(self.ranges)
+        row.addWidget(self.readout, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(self.plot, 1)
 
     @property
     def analyser(self) -> Analyser:
         return self._analyser
 
+    @property
+    def range_db(self) -> int:
+        return int(self.ranges.currentData())
+
     def set_rate(self, rate_hz: int) -> None:
         """Fits the frequency axis to a model's rate."""
         self._analyser = Analyser(rate_hz)
-        self.getPlotItem().setRange(
-            xRange=(math.log10(LOWEST_HZ), math.log10(rate_hz / 2)), yRange=(FLOOR_DB, CEILING_DB), padding=0
-        )
+        self._levels_db = {}
+        self._fit()
 
     def set_heard(self, source: str) -> None:
         for name, curve in self._curves.items():
@@ -100,7 +134,41 @@ class SpectrumView(pg.PlotWidget):
     def show_signals(self, signals: dict[str, NDArray[np.float32]]) -> None:
         """Signals in units of full scale, at least a window each."""
         for name, signal in signals.items():
-            self._curves[name].setData(self._analyser.column_hz, self._analyser.level_db(signal))
+            self._levels_db[name] = self._analyser.level_db(signal)
+            self._curves[name].setData(self._analyser.column_hz, self._levels_db[name])
+
+    def levels_db(self, frequency_hz: float) -> dict[str, float]:
+        """What is drawn at a frequency, by source."""
+        column = int(np.abs(np.log(self._analyser.column_hz / frequency_hz)).argmin())
+        return {name: float(levels[column]) for name, levels in self._levels_db.items()}
+
+    def show_readout(self, text: str, partial_hz: float | None = None) -> None:
+        """Text beside the axes, and a line at a partial."""
+        self.readout.tell(text)
+        self._partial.setVisible(partial_hz is not None)
+        if partial_hz is not None:
+            self._partial.setValue(math.log10(partial_hz))
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.MouseMove:
+            place = event.position()  # type: ignore[attr-defined]
+            self.hovered.emit(self._frequency_at(place))
+        elif event.type() == QEvent.Type.Leave:
+            self.hovered.emit(math.nan)
+        return super().eventFilter(watched, event)
+
+    def _frequency_at(self, place: QPointF) -> float:
+        box = self.plot.getPlotItem().vb
+        scene = self.plot.mapToScene(place.toPoint())
+        inside = box.sceneBoundingRect().contains(scene)
+        return float(10 ** box.mapSceneToView(scene).x()) if inside else math.nan
+
+    def _fit(self) -> None:
+        self.plot.getPlotItem().setRange(
+            xRange=(math.log10(LOWEST_HZ), math.log10(self._analyser.rate_hz / 2)),
+            yRange=(CEILING_DB - self.range_db, CEILING_DB),
+            padding=0,
+        )
 
     @staticmethod
     def _fill(curve: pg.PlotDataItem) -> None:

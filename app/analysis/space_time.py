@@ -1,0 +1,127 @@
+"""Displacement over time and place as a picture, at any zoom without aliasing.
+
+Where a pixel's column is less than a frame, every frame is drawn. Where it is many, but a small part of a period,
+each place shows its extreme in the column. Where it is more, signs would be moiré: each place shows its largest
+magnitude, from envelopes that were computed once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.analysis.growing import BLOCK_FRAMES
+from app.rendering import SOURCES, Take
+
+QUANTITIES = (*SOURCES, "error")
+STRIDE_S = 0.001  # of the envelopes
+LARGEST_SHARE = 1 / 12  # of the fundamental's period that a column may be, where signs are drawn
+
+Detail = Literal["frames", "extremes", "envelope"]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Displacement in m, float32 (places, columns), of the times start_s … stop_s.
+
+    Attributes:
+        detail: what a column is: a frame, the extreme of its frames, or the largest magnitude of its frames.
+    """
+
+    displacement_m: NDArray[np.float32]
+    start_s: float
+    stop_s: float
+    detail: Detail
+
+
+def motion_of(take: Take, quantity: str, first: int, last: int) -> NDArray[np.float32]:
+    """Frames first … last (frames, places) of "model", "truth" or "error": model − truth, in m."""
+    if quantity == "error":
+        return take.motion_m("model")[first:last] - take.motion_m("truth")[first:last]
+    return take.motion_m(quantity)[first:last]
+
+
+class Envelopes:
+    """The largest magnitude of each place in each millisecond of a take. A `Growing`."""
+
+    def __init__(self, take: Take) -> None:
+        self.take = take
+        self.stride = max(round(STRIDE_S * take.info.rate_hz), 1)  # frames
+        self.ready = 0
+        columns = take.frames // self.stride  # what is left at the end is less than a pixel
+        self._largest_m = {name: np.empty((columns, take.info.grid_points), np.float32) for name in QUANTITIES}
+        self._peaks_m = {name: np.empty(columns, np.float32) for name in QUANTITIES}  # of all places
+        self._columns = columns
+
+    @property
+    def complete(self) -> bool:
+        return self.ready == self._columns
+
+    def advance(self) -> bool:
+        most = max(BLOCK_FRAMES // self.stride, 1)
+        count = min(self.take.ready_frames // self.stride - self.ready, self._columns - self.ready, most)
+        if count <= 0:
+            return False
+        start, stop = self.ready * self.stride, (self.ready + count) * self.stride
+        for name, largest in self._largest_m.items():
+            frames = motion_of(self.take, name, start, stop).reshape(count, self.stride, -1)
+            here = slice(self.ready, self.ready + count)
+            largest[here] = np.maximum(frames.max(axis=1), -frames.min(axis=1))
+            self._peaks_m[name][here] = largest[here].max(axis=1)
+        self.ready += count
+        return True
+
+    def largest_m(self, quantity: str) -> NDArray[np.float32]:
+        """What is ready, (columns, places)."""
+        return self._largest_m[quantity][: self.ready]
+
+    def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
+        """Half as much again as the median over these times of the string's peak, as far as it is ready."""
+        column_s = self.stride / self.take.info.rate_hz
+        first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
+        peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]
+        return 1.5 * float(np.median(peaks_m)) if len(peaks_m) else 0.0
+
+
+def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], columns: int) -> Picture | None:
+    """What there is so far of the times in view, in about `columns` columns; None where there is nothing yet."""
+    take = envelopes.take
+    rate_hz = take.info.rate_hz
+    detail = detail_for(take, times_s, columns)
+    stride = envelopes.stride if detail == "envelope" else 1
+    ready = envelopes.ready if detail == "envelope" else take.ready_frames
+    first = int(times_s[0] * rate_hz) // stride
+    last = int(np.ceil(times_s[1] * rate_hz / stride)) + 1
+    edges = np.arange(first, last + 1) if last - first <= columns else _edges(first, last, columns)
+    edges = edges[edges <= ready]  # a column is drawn when all of it is there: what has been drawn stays
+    if len(edges) < 2:
+        return None
+    begin, end = int(edges[0]), int(edges[-1])
+    if detail == "envelope":
+        values = np.maximum.reduceat(envelopes.largest_m(quantity)[begin:end], edges[:-1] - begin)
+    else:
+        values = motion_of(take, quantity, begin, end)
+        if len(edges) <= end - begin:
+            values = _extremes(values, edges[:-1] - begin)
+    return Picture(np.ascontiguousarray(values.T), begin * stride / rate_hz, end * stride / rate_hz, detail)
+
+
+def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail:
+    """What a column can show of `times_s`."""
+    column_s = (times_s[1] - times_s[0]) / columns
+    if column_s * take.info.rate_hz <= 1:
+        return "frames"
+    return "extremes" if column_s * take.fundamental_hz <= LARGEST_SHARE else "envelope"
+
+
+def _edges(first: int, last: int, columns: int) -> NDArray[np.int64]:
+    return np.linspace(first, last, columns + 1).astype(np.int64)
+
+
+def _extremes(motion: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
+    """The value furthest from 0, with its sign, in each stretch (stretches, places)."""
+    highest, lowest = np.maximum.reduceat(motion, starts), np.minimum.reduceat(motion, starts)
+    return np.where(highest >= -lowest, highest, lowest)

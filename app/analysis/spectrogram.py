@@ -1,0 +1,107 @@
+"""Levels over time and frequency at the listening point, by short-time Fourier transforms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.rendering import Take
+
+FLOOR_DB = -150.0
+WINDOW_PERIODS = 7.0  # of the fundamental: the fewest that tell partials apart with a Hann window, and some more
+OVERLAP = 8  # windows at any time
+COLUMNS_AT_A_TIME = 32
+
+
+class Spectrogram:
+    """Model, truth and error in dB, 0 dB for a sine of `full_scale_m`. A `Growing`.
+
+    Column k is of the window around the time k·hop_s; the last one ends with the take. Before the take lies its
+    mirror: a string that is let go from rest has moved so, and a sudden start would be a click that nobody hears.
+
+    Attributes:
+        ready: columns so far.
+        levels_db: (columns, bins) each, for "model", "truth" and "error": model − truth, of the signals.
+    """
+
+    def __init__(self, take: Take, listen: float, full_scale_m: float) -> None:
+        self.take, self.listen = take, listen
+        rate_hz = take.info.rate_hz
+        self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
+        self.hop = self.window_frames // OVERLAP
+        self.ready = 0
+        self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
+        self._window *= np.float32(2 / self._window.sum() / full_scale_m)
+        self.columns = self._columns_of(take.frames)
+        shape = (self.columns, self.window_frames // 2 + 1)
+        self.levels_db = {name: np.empty(shape, np.float32) for name in ("model", "truth", "error")}
+
+    @property
+    def complete(self) -> bool:
+        return self.ready == self.columns
+
+    @property
+    def hop_s(self) -> float:
+        return self.hop / self.take.info.rate_hz
+
+    @property
+    def bin_hz(self) -> float:
+        """The distance of two bins."""
+        return self.take.info.rate_hz / self.window_frames
+
+    def advance(self) -> bool:
+        count = min(self._possible() - self.ready, COLUMNS_AT_A_TIME)
+        if count <= 0:
+            return False
+        model, truth = (self._transforms(name, count) for name in ("model", "truth"))
+        for name, bins in (("model", model), ("truth", truth), ("error", model - truth)):
+            magnitude = np.maximum(np.abs(bins), 10 ** (FLOOR_DB / 20))
+            self.levels_db[name][self.ready : self.ready + count] = 20 * np.log10(magnitude)
+        self.ready += count
+        return True
+
+    def _possible(self) -> int:
+        """Columns whose window has been rendered whole."""
+        return self._columns_of(self.take.ready_frames)
+
+    def _columns_of(self, frames: int) -> int:
+        half = self.window_frames // 2
+        return (frames - half - 1) // self.hop + 1 if frames > half else 0
+
+    def _transforms(self, source: str, count: int) -> NDArray[np.complexfloating]:
+        """(count, bins) of the next columns."""
+        first = self.ready * self.hop - self.window_frames // 2
+        last = first + (count - 1) * self.hop + self.window_frames
+        signal = self.take.signal_m(source, self.listen, max(first, 0), last)
+        if first < 0:
+            mirror = self.take.signal_m(source, self.listen, 1, 1 - first)[::-1]
+            signal = np.concatenate([mirror, signal])
+        windows = np.lib.stride_tricks.sliding_window_view(signal, self.window_frames)[:: self.hop]
+        return np.fft.rfft(windows * self._window, axis=1)
+
+
+class FrequencyRows:
+    """Levels of bins as levels of a picture's rows, from `lowest_hz` up to half the rate.
+
+    Where rows are wider than bins, a row is the loudest of its bins, so that no partial falls between two rows;
+    where they are narrower, it is interpolated.
+    """
+
+    def __init__(self, bins: int, bin_hz: float, rows: int, lowest_hz: float, logarithmic: bool) -> None:
+        highest_hz = (bins - 1) * bin_hz
+        space = np.geomspace if logarithmic else np.linspace
+        edges = space(lowest_hz, highest_hz, rows + 1) / bin_hz
+        middle = np.sqrt(edges[1:] * edges[:-1]) if logarithmic else (edges[1:] + edges[:-1]) / 2
+        self._below = np.minimum(middle.astype(int), bins - 2)
+        self._share = (middle - self._below).astype(np.float32)
+        starts = np.ceil(edges[:-1] - 0.5).astype(int).clip(0, bins - 1)
+        self._starts = starts
+        self._wide = np.diff(starts, append=bins) > 1
+
+    def of(self, levels_db: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(columns, bins) → (columns, rows)."""
+        between = levels_db[:, self._below] * (1 - self._share) + levels_db[:, self._below + 1] * self._share
+        loudest = np.maximum.reduceat(levels_db, self._starts, axis=1)
+        return np.where(self._wide, np.maximum(loudest, between), between)

@@ -1,0 +1,39 @@
+"""Perceptually uniform colour maps (P. Kovesi's, from pyqtgraph) whose ground is that of our panels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtGui import QColor
+
+from app.views import theme
+
+_COLOURS = 511  # odd: one of them is zero
+
+
+def displacement_map() -> pg.ColorMap:
+    """Down blue, up red, at rest the ground."""
+    return _grounded("CET-D4", 0.5)
+
+
+def error_map() -> pg.ColorMap:
+    """Amber where the model lies above the truth, blue where the truth lies above the model."""
+    return _grounded("CET-D6", 0.5)
+
+
+def level_map() -> pg.ColorMap:
+    """From the ground by violet and amber to white."""
+    return _grounded("inferno", 0.0)
+
+
+def _grounded(name: str, ground_at: float) -> pg.ColorMap:
+    """A map moved in colour such that its dark place is the panels' ground; its bright ends stay."""
+    places = np.linspace(0, 1, _COLOURS)
+    source = pg.colormap.get(name)
+    colours = np.asarray(source.map(places, mode="float"))[:, :3]
+    panel = QColor(theme.PANEL)
+    ground = np.array([panel.redF(), panel.greenF(), panel.blueF()])
+    dark = np.asarray(source.map(ground_at, mode="float"))[:3]
+    nearness = 1 - np.abs(places - ground_at) / max(ground_at, 1 - ground_at)
+    moved = np.clip(colours + (ground - dark) * nearness[:, None], 0, 1)
+    return pg.ColorMap(places, (255 * moved).round().astype(np.uint8))

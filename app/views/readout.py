@@ -1,0 +1,30 @@
+"""What the mouse is over, in words: a faint line that takes the room it is given and never asks for more."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+
+
+class Readout(QLabel):
+    """Shows the `resting` text while there is nothing to tell."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("faint")
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._resting = ""
+        self._told = ""
+
+    def rest(self, text: str) -> None:
+        self._resting = text
+        self.tell(self._told)
+
+    def tell(self, text: str) -> None:
+        """Nothing: back to the resting text."""
+        self._told = text
+        text = text or self._resting
+        if text != self.text():
+            self.setText(text)
+            self.setToolTip(text)  # where there is too little room for it

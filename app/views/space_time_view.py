@@ -1,0 +1,150 @@
+"""The whole string over time: displacement, or its error, as colour over time and place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QRectF, Signal
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.views import theme
+from app.views.colour_maps import displacement_map, error_map
+from app.views.parts import combo_box
+from app.views.readout import Readout
+from app.views.segments import SMALL, Segments
+from app.views.time_plot import TimePlot
+
+GAINS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
+AUTO = 0  # the largest of them at which what is given as typical is within the scale
+QUANTITIES = (
+    ("model", "Model", "What the model says"),
+    ("truth", "Truth", "What the physics says"),
+    ("error", "Error", "Model − truth"),
+)
+PLACES = (0, 0.25, 0.5, 0.75, 1)
+
+
+class SpaceTimeView(QWidget):
+    """Each of displacement and error keeps its own gain. Positions are in lengths of the string."""
+
+    listening_point_moved = Signal(float)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.quantities = Segments("Shown", QUANTITIES)
+        self.gains = combo_box(
+            "Gain of the colours", [("auto", AUTO), *((f"× {gain}", gain) for gain in GAINS)], AUTO
+        )
+        self.gains.setMinimumContentsLength(12)
+        self.gains.setToolTip(
+            "How far the colours are magnified: the bar beside the picture tells the mm.\n"
+            "Auto fits what is in view for most of the time; model and truth always have the same scale"
+        )
+        self.gains.setStyleSheet(SMALL)
+        self.readout = Readout()
+        self.plot = TimePlot(
+            "Space–time",
+            "Click: see and hear this moment; with Shift also listen at this place of the string.\n"
+            "The wheel zooms in time, down to single frames; the right button pans; double-click shows all.\n"
+            "Arrow keys move the playhead, + and − zoom",
+            shaded=False,
+        )
+        self._gain = {"displacement": AUTO, "error": AUTO}
+        self._typical_mm = 1.0
+        self._full_scale_mm = 1.0
+        self._listen = 0.0
+        item = self.plot.getPlotItem()
+        item.setLabel("left", "place")
+        item.getAxis("left").setTicks([[(place, f"{place:g}") for place in PLACES]])
+        item.setYRange(0, 1, padding=0)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        item.addItem(self._image, ignoreBounds=True)
+        self._listening = pg.InfiniteLine(0, angle=0, pen=pg.mkPen(theme.translucent(theme.TEXT, 90), width=1))
+        self._listening.setZValue(15)
+        item.addItem(self._listening, ignoreBounds=True)
+        self._bar = pg.ColorBarItem(
+            values=(-1, 1), width=10, label="mm", colorMap=displacement_map(), interactive=False
+        )
+        self._bar.setImageItem(self._image, insert_in=item)
+        self._maps = {"displacement": displacement_map(), "error": error_map()}
+        self._map_shown = "displacement"
+        self.quantities.chosen.connect(self._choose_quantity)
+        self.gains.activated.connect(self._choose_gain)
+        self.plot.pointed.connect(lambda _, place: self.listening_point_moved.emit(min(max(place, 0.0), 1.0)))
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout()
+        row.setContentsMargins(4, 2, 4, 0)
+        row.setSpacing(8)
+        row.addWidget(self.quantities)
+        row.addWidget(self.gains)
+        row.addWidget(self.readout, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(row)
+        column.addWidget(self.plot, 1)
+        self.setTabOrder(self.gains, self.plot)
+
+    @property
+    def quantity(self) -> str:
+        """ "model", "truth" or "error"."""
+        return self.quantities.key
+
+    @property
+    def scale_mm(self) -> float:
+        """The displacement of the brightest colours."""
+        return self._full_scale_mm / (self._gain[self._kind] or self._fitting_gain)
+
+    def set_take(self, seconds: float, horizon_s: float, full_scale_mm: float) -> None:
+        """`full_scale_mm`: the displacement of the brightest colours at a gain of 1."""
+        self._full_scale_mm = max(full_scale_mm, 1e-3)
+        self.plot.set_times(seconds, horizon_s)
+        self._image.clear()
+        self._show_scale()
+
+    def set_listening_point(self, listen: float) -> None:
+        if listen != self._listen:
+            self._listen = listen
+            self._listening.setValue(listen)
+
+    def show_picture(
+        self, displacement_mm: NDArray[np.float32], start_s: float, stop_s: float, typical_mm: float
+    ) -> None:
+        """Displacement (places, columns) of the times start_s … stop_s; an automatic gain fits `typical_mm`."""
+        self._typical_mm = typical_mm
+        self._show_scale()
+        half = 0.5 / (len(displacement_mm) - 1)  # the grid's points are the middles of their rows
+        self._image.setImage(displacement_mm, autoLevels=False)
+        self._image.setRect(QRectF(start_s, -half, stop_s - start_s, 1 + 2 * half))
+
+    def show_nothing(self) -> None:
+        """Nothing is there yet of the times in view."""
+        self._image.clear()
+
+    @property
+    def _fitting_gain(self) -> int:
+        return max((gain for gain in GAINS if gain * self._typical_mm <= self._full_scale_mm), default=GAINS[0])
+
+    @property
+    def _kind(self) -> str:
+        return "error" if self.quantity == "error" else "displacement"
+
+    def _choose_quantity(self) -> None:
+        self.gains.setCurrentIndex(self.gains.findData(self._gain[self._kind]))
+        self._show_scale()
+
+    def _choose_gain(self) -> None:
+        self._gain[self._kind] = self.gains.currentData()
+        self._show_scale()
+
+    def _show_scale(self) -> None:
+        if self._map_shown != self._kind:
+            self._map_shown = self._kind
+            self._bar.setColorMap(self._maps[self._kind])
+        limits = (-self.scale_mm, self.scale_mm)
+        if limits != self._bar.levels():
+            self._bar.setLevels(limits)
+            self.gains.setItemText(0, f"auto (× {self._fitting_gain})")

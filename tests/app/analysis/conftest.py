@@ -1,0 +1,29 @@
+"""Takes of known motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.rendering import Take
+from engine.pluck import Pluck
+from engine.preset import read_info
+
+MakeTake = Callable[..., Take]
+
+
+@pytest.fixture
+def make_take(small_preset: Path) -> MakeTake:
+    """A take of given motions (frames, 101), of which the first `ready` frames are there; at 4 kHz."""
+
+    def make(model_m: NDArray[np.float32], truth_m: NDArray[np.float32], ready: int | None = None) -> Take:
+        info = read_info(small_preset)
+        take = Take("small", info, Pluck(0.35, 4.0, "gaussian", 0.06), (len(truth_m) - 1) / info.rate_hz)
+        take.append(model_m[:ready], truth_m[:ready])
+        return take
+
+    return make

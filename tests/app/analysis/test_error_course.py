@@ -1,0 +1,45 @@
+"""Windows of the error are those of the engine's metrics, however the take grows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.analysis.error_course import ErrorCourse
+from app.rendering import Take
+
+random = np.random.default_rng(3)
+TRUTH = random.standard_normal((1501, 101)).astype(np.float32)
+MODEL = TRUTH + 0.1 * random.standard_normal((1501, 101)).astype(np.float32)
+
+
+def test_windows_are_the_engines_however_the_take_grows(make_take: Callable[..., Take]) -> None:
+    take = make_take(MODEL, TRUTH, 1)
+    course = ErrorCourse(take)
+    assert not course.advance()
+    for stop in (7, 33, 34, 900, 1501):
+        take.append(MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
+        while course.advance():
+            pass
+    assert course.complete
+    edges_s = np.arange(course.windows + 1) * course.window_s
+    expected = take.error_sums().windows(take.info.rate_hz, list(edges_s))
+    assert course.curves["mae"] == pytest.approx([window.rel_mae for window in expected])
+    assert course.curves["rmse"] == pytest.approx([window.rel_mse**0.5 for window in expected])
+    assert course.middle_s[-1] < take.seconds
+
+
+def test_a_model_twice_as_loud(make_take: Callable[..., Take]) -> None:
+    course = ErrorCourse(make_take(2 * TRUTH, TRUTH))
+    course.advance()
+    assert course.curves["level_db"][0] == pytest.approx(20 * np.log10(2))
+    assert course.curves["rmse"][0] == course.curves["mae"][0] == pytest.approx(1)
+
+
+def test_a_silent_model_has_no_level(make_take: Callable[..., Take]) -> None:
+    course = ErrorCourse(make_take(0 * TRUTH, TRUTH))
+    course.advance()
+    assert np.isnan(course.curves["level_db"][0])
+    assert course.curves["mae"][0] == 1
