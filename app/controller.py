@@ -20,15 +20,25 @@ from PySide6.QtGui import QAction
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
-from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
+from app.panels import (
+    ComparePanel,
+    EigenvaluesPanel,
+    ErrorPlanePanel,
+    Moment,
+    Panel,
+    PartialsPanel,
+    SpectrumPanel,
+    StringPanel,
+    WaveformPanel,
+)
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
 from app.views.export_dialog import ExportDialog
 from engine.metrics import ErrorSums
 
-LEFT: tuple[type[Panel], ...] = (SpectrumPanel,)
-RIGHT: tuple[type[Panel], ...] = (WaveformPanel,)
+LEFT: tuple[type[Panel], ...] = (SpectrumPanel, EigenvaluesPanel, PartialsPanel, ErrorPlanePanel)
+RIGHT: tuple[type[Panel], ...] = (WaveformPanel, ComparePanel)
 
 BUFFER_S = 0.05  # of sound ahead: room for a busy interpreter, and still a prompt pluck
 FRAME_MS = 16

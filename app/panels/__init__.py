@@ -4,8 +4,22 @@
 """
 
 from app.panels.base import Moment, Panel
+from app.panels.compare import ComparePanel
+from app.panels.eigenvalues import EigenvaluesPanel
+from app.panels.error_plane import ErrorPlanePanel
+from app.panels.partials import PartialsPanel
 from app.panels.spectrum import SpectrumPanel
 from app.panels.string import StringPanel
 from app.panels.waveform import WaveformPanel
 
-__all__ = ["Moment", "Panel", "SpectrumPanel", "StringPanel", "WaveformPanel"]
+__all__ = [
+    "ComparePanel",
+    "EigenvaluesPanel",
+    "ErrorPlanePanel",
+    "Moment",
+    "Panel",
+    "PartialsPanel",
+    "SpectrumPanel",
+    "StringPanel",
+    "WaveformPanel",
+]

@@ -60,6 +60,14 @@ QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 
 QTabBar::tab:hover {{ color: {TEXT}; }}
 QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
 QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}
+QTableView {{ background: {PANEL}; border: none; selection-background-color: {LINE}; selection-color: {TEXT}; }}
+QHeaderView {{ background: {PANEL}; border: none; }}
+QHeaderView::section {{
+    background: {PANEL}; color: {FAINT}; border: none; border-bottom: 1px solid {LINE}; padding: 4px 8px; }}
+QTableView QScrollBar {{ background: {PANEL}; border: none; width: 8px; height: 8px; }}
+QTableView QScrollBar::handle {{ background: {LINE}; border-radius: 4px; min-width: 24px; min-height: 24px; }}
+QTableView QScrollBar::add-line, QTableView QScrollBar::sub-line {{ width: 0; height: 0; }}
+QTableView QScrollBar::add-page, QTableView QScrollBar::sub-page {{ background: none; }}
 QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; }}
 """
 

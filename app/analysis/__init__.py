@@ -1,0 +1,1 @@
+"""What views show of model and truth, computed without a window."""
