@@ -70,15 +70,16 @@ class ErrorPlane:
     error: Array = field(default_factory=lambda: np.full(FINEST, math.nan))
 
     @property
-    def complete(self) -> bool:
-        return not np.isnan(self.error).any()
+    def spacing(self) -> int | None:
+        """Of the finest level that is whole; None before the coarsest is."""
+        whole = [stride for stride in STRIDES if not np.isnan(self.error[::stride, ::stride]).any()]
+        return whole[-1] if whole else None
 
     def picture(self) -> PlanePicture | None:
         """None before the coarsest grid is there."""
-        whole = [stride for stride in STRIDES if not np.isnan(self.error[::stride, ::stride]).any()]
-        if not whole:
+        spacing = self.spacing
+        if spacing is None:
             return None
-        spacing = whole[-1]
         shown = np.exp(refine(np.log(np.maximum(self.error[::spacing, ::spacing], 1e-9)), spacing))
         return PlanePicture(shown, spacing, self._share)
 
@@ -94,16 +95,16 @@ class ErrorPlane:
             ValueError: the model needs more than a string at rest.
         """
         errors = error_of_plucks(preset)
-        if (picture := self.picture()) is not None:
-            job.report(self._share, picture)
+        spacing = self.spacing
+        if spacing is not None:
+            job.report(self._share, self.picture())
         for places in self._missing():
             plucks = [pluck.moved(position=POSITIONS[x], amplitude_mm=AMPLITUDES_MM[y]) for x, y in places]
             for place, error in zip(places, errors(plucks, job), strict=True):
                 self.error[place] = error
-            newer = self.picture()
-            is_finer = newer is not None and (picture is None or newer.spacing < picture.spacing)
-            job.report(self._share, newer if is_finer else None)
-            picture = newer
+            is_finer, spacing = self.spacing != spacing, self.spacing
+            job.report(self._share, self.picture() if is_finer else None)
+        picture = self.picture()
         assert picture is not None
         return picture
 

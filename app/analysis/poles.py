@@ -1,7 +1,8 @@
 """A model's learned eigenvalues beside the string's own, as a musician reads them: frequencies and decay times.
 
-An eigenvalue tells a frequency up to multiples of the sample rate and its sign. It belongs to the mode whose own
-frequency is nearest to one of these, and is compared with it there.
+An eigenvalue tells a frequency up to multiples of the sample rate and its sign. It belongs to the mode that is
+nearest to one of these, and is compared with it there. Decay counts a little, for it tells a mode that is folded back
+from the one that it is folded on.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from engine.models.learned_eigenvalues import VANISHED, model_log_eigenvalues
 from engine.preset import Preset, PresetInfo
 
 NEPERS_OF_60_DB = math.log(1000)
+
+BELIEVABLE_S = (1e-3, 100.0)  # decay times beyond these count as these
+DECAY_WEIGHT = 0.25  # of an octave of decay time, against a fundamental's width of frequency
 
 QUIET = "of a quiet string: louder, its network shifts them"
 _NOTES = {
@@ -85,7 +89,8 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
     with np.errstate(divide="ignore"):
         t60_s = np.where(log.real < 0, NEPERS_OF_60_DB / (-log.real * info.rate_hz), math.inf)
     modes_hz = info.string.eigenvalues(info.modes).imag.numpy() / (2 * math.pi)
-    mode, mode_hz = _nearest(folded_hz, modes_hz, info.rate_hz)
+    modes_s = NEPERS_OF_60_DB / info.string.decay_rates(info.modes).numpy()
+    mode, mode_hz = _nearest(folded_hz, modes_hz, info.rate_hz, _octaves(t60_s)[:, None] - _octaves(modes_s))
     with np.errstate(divide="ignore"):
         cents = 1200 * np.log2(np.maximum(mode_hz, 0) / modes_hz[mode])
     return Poles(np.log(np.exp(log.real)) + 1j * angle, folded_hz, t60_s, mode + 1, mode_hz, cents, layer)
@@ -100,8 +105,16 @@ def _upper_half(log: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return upper[~(lower & paired)]
 
 
-def _nearest(folded_hz: Array, modes_hz: Array, rate_hz: int) -> tuple[NDArray[np.int64], Array]:
-    """Places of the nearest modes, and of each frequency what is nearest to it of ±f + k · rate."""
+def _octaves(t60_s: Array) -> Array:
+    return np.log2(np.clip(t60_s, *BELIEVABLE_S))
+
+
+def _nearest(folded_hz: Array, modes_hz: Array, rate_hz: int, octaves_off: Array) -> tuple[NDArray[np.int64], Array]:
+    """Places of the nearest modes, and of each frequency what is nearest to it of ±f + k · rate.
+
+    Args:
+        octaves_off: (eigenvalues, modes), of decay times.
+    """
     candidates = []
     for signed in (folded_hz, -folded_hz):
         turns = np.round((modes_hz[None] - signed[:, None]) / rate_hz)
@@ -109,5 +122,5 @@ def _nearest(folded_hz: Array, modes_hz: Array, rate_hz: int) -> tuple[NDArray[n
     off = np.abs(np.stack(candidates) - modes_hz)
     side = off.argmin(0)
     alias_hz = np.where(side == 0, *candidates)
-    place = off.min(0).argmin(1) if len(modes_hz) else np.zeros(len(folded_hz), np.int64)
+    place = np.hypot(off.min(0) / modes_hz[0], DECAY_WEIGHT * octaves_off).argmin(1)
     return place, alias_hz[np.arange(len(folded_hz)), place]

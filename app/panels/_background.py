@@ -1,14 +1,13 @@
 """A panel's own thread for what takes longer than a few milliseconds.
 
 It does the latest job alone: asking for another abandons the one under way. What it says reaches the window's thread
-through queued signals, and nothing of an abandoned job arrives any more. It gives way to sound and picture: a low
-priority where the system has one for threads, one core, and the interpreter free between the pieces of a job.
+through queued signals, and nothing of an abandoned job arrives any more. It gives way to sound and picture: it
+computes on one core, mostly without the interpreter's lock, and rests between the pieces of a job. Its priority is not
+lowered: on a busy machine such a thread would hold the lock while it waits for a core, and the sound would wait too.
 """
 
 from __future__ import annotations
 
-import os
-import sys
 import threading
 import time
 import traceback
@@ -23,7 +22,6 @@ from PySide6.QtCore import QObject, Qt, Signal, Slot
 from app.analysis.job import Cancelled, Job
 from engine.preset import PresetError
 
-NICENESS = 10
 BREATH_S = 0.001  # between pieces of a job
 REPORT_EVERY_S = 0.1  # shares of progress; results are told at once
 
@@ -122,7 +120,6 @@ class Background(QObject):
             self._said.emit(number, "progressed", (share, so_far))
 
     def _run(self) -> None:
-        _lower_priority()
         while True:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._task is not None or self._closing)
@@ -167,8 +164,3 @@ class _OneCore:
                 _OneCore._holders -= 1
                 if _OneCore._holders == 0:
                     torch.set_num_threads(self._usual)
-
-
-def _lower_priority() -> None:
-    if sys.platform == "linux":  # elsewhere a priority is the whole process's
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)

@@ -37,6 +37,7 @@ class EigenvaluesPanel(Panel):
         entry = self.library.find(self.session.choices.preset)
         if entry is not None and entry.path != self._asked:
             path = self._asked = entry.path
+            self.view.show_figure(None, "reading the preset …")
 
             def work(job: Job) -> PoleFigure:
                 return pole_figure(load_preset(path))

@@ -20,6 +20,7 @@ from app.views import theme
 from app.views.parts import combo_box
 
 NEAR_PIXELS = 16
+CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
 TIP_MS = 3000  # it hides what is pointed at
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
@@ -184,6 +185,7 @@ class _Plane(pg.PlotWidget):
         for layer in (self._learned, self._string, self._ring):
             item.addItem(layer)
         self._places = np.empty((0, 2))
+        self._learned_count = 0
         self._at = -1
         self._pressed: QPointF | None = None
 
@@ -197,6 +199,7 @@ class _Plane(pg.PlotWidget):
     ) -> None:
         """Places (points, 2) of both kinds; `alone` are those of the mode that is heard alone."""
         self._places, self._at = np.concatenate([learned, string]), -1
+        self._learned_count = len(learned)
         self._ring.setData([], [])
         heard = np.ones(len(self._places), bool) if alone is None else alone
         pens = [
@@ -233,7 +236,7 @@ class _Plane(pg.PlotWidget):
         if self._musical:
             low, high = places[:, 1].min() - 0.15, places[:, 1].max() + 0.15
             item.setRange(
-                xRange=(0, min(1.06 * places[:, 0].max(), self._rate_hz / 2)), yRange=(low, high), padding=0
+                xRange=(0, min(1.06 * places[:, 0].max(), 0.51 * self._rate_hz)), yRange=(low, high), padding=0
             )
         else:
             (left, bottom), (right, top) = places.min(0), places.max(0)
@@ -289,16 +292,14 @@ class _Plane(pg.PlotWidget):
             super().keyPressEvent(event)
 
     def _nearest(self, at: QPointF) -> int:
-        """The point nearest to a place of the widget, or -1 where none is near."""
+        """The point nearest to a place of the widget, a learned one where both lie there; -1 where none is near."""
         if not len(self._places):
             return -1
         box = self.getPlotItem().vb
-        rectangle, view = box.sceneBoundingRect(), box.viewRect()
-        scene = self.mapToScene(at.toPoint())
-        across = (self._places[:, 0] - view.left()) / view.width() * rectangle.width() + rectangle.left()
-        down = rectangle.bottom() - (self._places[:, 1] - view.top()) / view.height() * rectangle.height()
-        off = np.hypot(across - scene.x(), down - scene.y())
-        point = int(off.argmin())
+        here = box.mapSceneToView(self.mapToScene(at.toPoint()))
+        wide, high = box.viewPixelSize()
+        off = np.hypot((self._places[:, 0] - here.x()) / wide, (self._places[:, 1] - here.y()) / high)
+        point = int((off + CLOSER_PIXELS * (np.arange(len(off)) >= self._learned_count)).argmin())
         return point if off[point] <= NEAR_PIXELS else -1
 
     def _point_at(self, point: int) -> None:

@@ -15,15 +15,22 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPalette
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QWidget,
+)
 
 from app.views import theme
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
 RIGHT_ALIGNED = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-WIDEST_PIXELS = 260
+NARROWEST_PIXELS, WIDEST_PIXELS = 46, 260
 ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
@@ -65,6 +72,7 @@ class FiguresTable(QTableView):
         self._sorted = _NoneLast()
         self._sorted.setSourceModel(self._rows)
         self.setModel(self._sorted)
+        self.setItemDelegate(_OwnColours(self))
         self.setSortingEnabled(True)
         self.sortByColumn(0, Qt.SortOrder.AscendingOrder)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -76,6 +84,7 @@ class FiguresTable(QTableView):
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(22)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setMinimumSectionSize(NARROWEST_PIXELS)
         self.horizontalHeader().setMaximumSectionSize(WIDEST_PIXELS)
         self.horizontalHeader().setStretchLastSection(True)
         self.horizontalHeader().setHighlightSections(False)
@@ -198,6 +207,15 @@ class _Rows(QAbstractTableModel):
 
     def _alignment(self, column: int) -> Qt.AlignmentFlag:
         return LEFT_ALIGNED if self.columns[column].text is str else RIGHT_ALIGNED
+
+
+class _OwnColours(QStyledItemDelegate):
+    """Keeps the colours of the columns in a chosen row."""
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
+        super().initStyleOption(option, index)
+        colour = index.data(Qt.ItemDataRole.ForegroundRole)
+        option.palette.setColor(QPalette.ColorRole.HighlightedText, colour)
 
 
 class _NoneLast(QSortFilterProxyModel):

@@ -13,6 +13,7 @@ from app.views import theme
 from app.views.figures_table import Column, FiguresTable, TableRow
 from app.views.parts import combo_box, tool_button
 from app.views.progress_strip import ProgressStrip
+from engine.partials import LEAST_DECAY_DB
 
 
 def hertz(value: float) -> str:
@@ -26,18 +27,20 @@ def seconds(value: float) -> str:
 def signed(value: float, digits: int = 1) -> str:
     if math.isinf(value):
         return "+∞" if value > 0 else "−∞"
-    return f"{value:+.{digits}f}".replace("-", "−")
+    rounded = round(value, digits) or 0.0  # no minus before a zero
+    return f"{rounded:+.{digits}f}".replace("-", "−")
 
 
+_NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
 COLUMNS = (
     Column("n", "The mode: so many half waves along the string", lambda n: f"{n}"),
     Column("truth Hz", "Frequency of the truth in Hz, its mean over the window", hertz, theme.TRUTH),
     Column("model Hz", "Frequency of the model in Hz", hertz, theme.MODEL),
     Column("cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
-    Column("truth T60", "Time in s in which the truth decays by 60 dB", seconds, theme.TRUTH),
-    Column("model T60", "Time in s in which the model decays by 60 dB", seconds, theme.MODEL),
-    Column("T60 %", "Error of the model's decay time in %", signed),
     Column("level dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
+    Column("truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, theme.TRUTH),
+    Column("model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, theme.MODEL),
+    Column("T60 %", "Error of the model's decay time in %", signed),
     Column("note", "Why a row is grey"),
 )
 
@@ -99,10 +102,10 @@ class PartialsView(QWidget):
             row.truth_hz,
             row.model_hz,
             row.cents,
+            row.level_db,
             row.truth_t60_s,
             row.model_t60_s,
             row.t60_error_percent,
-            row.level_db,
             row.note,
         )
         return TableRow(row.mode, values, grey=bool(row.note), tip=row.note)

@@ -60,10 +60,12 @@ QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 
 QTabBar::tab:hover {{ color: {TEXT}; }}
 QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
 QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}
-QTableView {{ background: {PANEL}; border: none; selection-background-color: {LINE}; selection-color: {TEXT}; }}
+QTableView {{ background: {PANEL}; border: none; selection-background-color: {LINE}; }}
 QHeaderView {{ background: {PANEL}; border: none; }}
 QHeaderView::section {{
-    background: {PANEL}; color: {FAINT}; border: none; border-bottom: 1px solid {LINE}; padding: 4px 8px; }}
+    background: {PANEL}; color: {FAINT}; border: none; border-bottom: 1px solid {LINE}; padding: 6px 6px 4px 6px; }}
+QHeaderView::up-arrow, QHeaderView::down-arrow {{
+    subcontrol-origin: border; subcontrol-position: top center; width: 8px; height: 6px; }}
 QTableView QScrollBar {{ background: {PANEL}; border: none; width: 8px; height: 8px; }}
 QTableView QScrollBar::handle {{ background: {LINE}; border-radius: 4px; min-width: 24px; min-height: 24px; }}
 QTableView QScrollBar::add-line, QTableView QScrollBar::sub-line {{ width: 0; height: 0; }}
