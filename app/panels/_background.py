@@ -2,8 +2,8 @@
 
 It does the latest job alone: asking for another abandons the one under way. What it says reaches the window's thread
 through queued signals, and nothing of an abandoned job arrives any more. It gives way to sound and picture: it
-computes on one core, mostly without the interpreter's lock, and rests between the pieces of a job. Its priority is not
-lowered: on a busy machine such a thread would hold the lock while it waits for a core, and the sound would wait too.
+computes on one core, mostly without the interpreter's lock, and rests between the pieces of a job. Its priority is
+not lowered: on a busy machine such a thread would hold the lock while it waits for a core, and the sound with it.
 """
 
 from __future__ import annotations

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QMenu, QToolButton, QVBoxLayout, QWidget
 
 from app.analysis.comparison import ComparedRow
 from app.library import PresetEntry
 from app.views.figures_table import Column, FiguresTable, TableRow
-from app.views.parts import tool_button
+from app.views.parts import tool_button, words_label
 from app.views.progress_strip import ProgressStrip
 
 
@@ -71,8 +71,7 @@ class CompareView(QWidget):
         presets = tool_button("Presets ▾", "Presets to compare", "Choose the presets that are compared")
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
-        self._words = QLabel()
-        self._words.setObjectName("faint")
+        self._words = words_label()
         self._stop = tool_button(
             "Stop", "Stop comparing", "Stop computing; or compute what is missing, or all of it again"
         )

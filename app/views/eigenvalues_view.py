@@ -13,18 +13,17 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.poles import PoleFigure, Poles
 from app.views import theme
-from app.views.parts import combo_box
+from app.views.parts import ENTER_KEYS, combo_box, keeps_enter, words_label
 
 NEAR_PIXELS = 16
 CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
 TIP_MS = 3000  # it hides what is pointed at
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
-ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 AXES = {"musical": "frequency and decay", "complex": "complex plane"}
 
 Array = NDArray[np.float64]
@@ -49,8 +48,7 @@ class EigenvaluesView(QWidget):
         self._layer.setToolTip("Which layer's eigenvalues are shown")
         self._layer.activated.connect(lambda _: self._draw())
         self._layer.hide()
-        self._words = QLabel()
-        self._words.setObjectName("faint")
+        self._words = words_label()
         self.plane = _Plane()
         self.plane.pointed.connect(self._tell)
         self.plane.taken.connect(self._take)
@@ -73,9 +71,9 @@ class EigenvaluesView(QWidget):
         """The eigenvalues of a preset; None, with words that say why, while there is nothing to show."""
         if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
             self._layer.clear()
-            self._layer.addItem("all layers", None)
             for layer in range(figure.layers):
                 self._layer.addItem("first layer" if layer == 0 else f"layer {layer + 1}", layer)
+            self._layer.addItem("all layers", None)
         self._figure = figure
         self._layer.setVisible(figure is not None and figure.layers > 1)
         self._draw()
@@ -203,7 +201,9 @@ class _Plane(pg.PlotWidget):
         self._ring.setData([], [])
         heard = np.ones(len(self._places), bool) if alone is None else alone
         pens = [
-            pg.mkPen(theme.translucent(theme.MODEL if first else theme.FAINT, 230 if loud else 60), width=2)
+            pg.mkPen(
+                theme.translucent(theme.MODEL if first else theme.FAINT, 230 if loud else 60), width=2 if first else 1
+            )
             for first, loud in zip(first_layer, heard, strict=False)
         ]
         brushes = [pg.mkBrush(theme.translucent(theme.TRUTH, 255 if loud else 80)) for loud in heard[len(learned) :]]
@@ -272,10 +272,7 @@ class _Plane(pg.PlotWidget):
 
     def event(self, event: QEvent) -> bool:
         """Enter is the plane's own while it has the keyboard, whatever the window's shortcuts say."""
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in ENTER:
-            event.accept()
-            return True
-        return bool(super().event(event))
+        return keeps_enter(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()))
@@ -283,7 +280,7 @@ class _Plane(pg.PlotWidget):
             order = np.lexsort((self._places[:, 1], self._places[:, 0] if self._musical else -self._places[:, 0]))
             here = int(np.nonzero(order == self._at)[0][0]) if self._at >= 0 else (-1 if step > 0 else 0)
             self._point_at(int(order[(here + step) % len(order)]))
-        elif event.key() in ENTER:
+        elif event.key() in ENTER_KEYS:
             if self._at >= 0:
                 self.taken.emit(self._at)
         elif event.key() == Qt.Key.Key_Escape:

@@ -11,16 +11,16 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, PlanePicture, nearest_cell, refine
 from app.views import theme
+from app.views.parts import ENTER_KEYS, keeps_enter, words_label
 from app.views.progress_strip import ProgressStrip
 
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
 TIP_MS = 3000  # it hides what is pointed at
 SMOOTHER = 4  # pixels of the picture to a step of the finest grid
-ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _STEP_X = POSITIONS[1] - POSITIONS[0]
@@ -42,8 +42,7 @@ class ErrorPlaneView(QWidget):
         super().__init__(parent)
         self.setAccessibleName("Error map")
         self.setMinimumHeight(150)
-        self._words = QLabel()
-        self._words.setObjectName("faint")
+        self._words = words_label()
         self.progress = ProgressStrip("Progress of the error map")
         self.map = _Map()
         self.map.pointed.connect(self._tell)
@@ -192,10 +191,7 @@ class _Map(pg.PlotWidget):
 
     def event(self, event: QEvent) -> bool:
         """Enter is the map's own while it has the keyboard, whatever the window's shortcuts say."""
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in ENTER:
-            event.accept()
-            return True
-        return bool(super().event(event))
+        return keeps_enter(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {
@@ -209,7 +205,7 @@ class _Map(pg.PlotWidget):
             x = min(max(x + step[0], 0), len(POSITIONS) - 1)
             y = min(max(y + step[1], 0), len(AMPLITUDES_MM) - 1)
             self._point_at((float(POSITIONS[x]), float(AMPLITUDES_MM[y])))
-        elif event.key() in ENTER:
+        elif event.key() in ENTER_KEYS:
             if self.cursor is not None:
                 self.taken.emit(*self.cursor)
         elif event.key() == Qt.Key.Key_Escape:

@@ -26,12 +26,12 @@ from PySide6.QtWidgets import (
 )
 
 from app.views import theme
+from app.views.parts import ENTER_KEYS, keeps_enter
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
 RIGHT_ALIGNED = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 NARROWEST_PIXELS, WIDEST_PIXELS = 46, 260
-ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -128,15 +128,12 @@ class FiguresTable(QTableView):
 
     def event(self, event: QEvent) -> bool:
         """Enter is the table's own while it has the keyboard, whatever the window's shortcuts say."""
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in ENTER:
-            event.accept()
-            return True
-        return super().event(event)
+        return keeps_enter(event) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Copy):
             self.copy()
-        elif event.key() in ENTER:
+        elif event.key() in ENTER_KEYS:
             if self.currentIndex().isValid():
                 self.row_entered.emit(self.chosen_key)
         elif event.key() == Qt.Key.Key_Delete:

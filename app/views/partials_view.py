@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.take_partials import WINDOWS, PartialRow
 from app.views import theme
 from app.views.figures_table import Column, FiguresTable, TableRow
-from app.views.parts import combo_box, tool_button
+from app.views.parts import combo_box, tool_button, words_label
 from app.views.progress_strip import ProgressStrip
 from engine.partials import LEAST_DECAY_DB
 
@@ -38,9 +38,9 @@ COLUMNS = (
     Column("model Hz", "Frequency of the model in Hz", hertz, theme.MODEL),
     Column("cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
     Column("level dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
+    Column("T60 %", "Error of the model's decay time in %", signed),
     Column("truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, theme.TRUTH),
     Column("model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, theme.MODEL),
-    Column("T60 %", "Error of the model's decay time in %", signed),
     Column("note", "Why a row is grey"),
 )
 
@@ -59,8 +59,7 @@ class PartialsView(QWidget):
         self._window = combo_box("Window of time", [(text, key) for key, text in WINDOWS.items()])
         self._window.setToolTip("Which part of the pluck the figures are of")
         self._window.activated.connect(lambda _: self.window_chosen.emit(self.window_key))
-        self._words = QLabel()
-        self._words.setObjectName("faint")
+        self._words = words_label()
         self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
         copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
@@ -103,9 +102,9 @@ class PartialsView(QWidget):
             row.model_hz,
             row.cents,
             row.level_db,
+            row.t60_error_percent,
             row.truth_t60_s,
             row.model_t60_s,
-            row.t60_error_percent,
             row.note,
         )
         return TableRow(row.mode, values, grey=bool(row.note), tip=row.note)
