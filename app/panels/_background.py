@@ -1,9 +1,11 @@
 """A panel's own thread for what takes longer than a few milliseconds.
 
 It does the latest job alone: asking for another abandons the one under way. What it says reaches the window's thread
-through queued signals, and nothing of an abandoned job arrives any more. It gives way to sound and picture: it
-computes on one core, mostly without the interpreter's lock, and rests between the pieces of a job. Its priority is
-not lowered: on a busy machine such a thread would hold the lock while it waits for a core, and the sound with it.
+through queued signals, and nothing of an abandoned job arrives any more.
+
+It gives way to sound and picture: it computes on one core, mostly without the interpreter's lock, and rests between
+the pieces of a job and while a pluck is rendered. Its priority is not lowered: on a busy machine a thread of low
+priority would hold the lock while it waits for a core, and the sound with it.
 """
 
 from __future__ import annotations
@@ -20,9 +22,12 @@ import torch
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from app.analysis.job import Cancelled, Job
+from app.rendering import Take
 from engine.preset import PresetError
 
 BREATH_S = 0.001  # between pieces of a job
+LOOK_AGAIN_S = 0.02
+GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
 REPORT_EVERY_S = 0.1  # shares of progress; results are told at once
 
 Work = Callable[[Job], object]
@@ -42,6 +47,7 @@ class _Task:
 
     def report(self, share: float, so_far: object = None) -> None:
         time.sleep(BREATH_S)
+        self.owner.give_way(self)
         self.check()
         self.owner.tell_progress(self.number, share, so_far)
 
@@ -65,8 +71,13 @@ class Background(QObject):
         self._closing = False
         self._thread: threading.Thread | None = None
         self._last_report_s = 0.0
+        self._growing: Take | None = None
         self._threads = _OneCore(torch.get_num_threads())
         self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
+
+    def give_way_to(self, take: Take) -> None:
+        """Lets jobs rest while this take is rendered: sound comes first."""
+        self._growing = take
 
     @property
     def busy(self) -> bool:
@@ -112,6 +123,18 @@ class Background(QObject):
 
     def is_abandoned(self, number: int) -> bool:
         return number != self._number
+
+    def give_way(self, task: _Task) -> None:
+        """Returns when no pluck is being rendered, or the job is abandoned."""
+        ready_frames, since_s = -1, time.monotonic()
+        while (take := self._growing) is not None and not take.complete and not self.is_abandoned(task.number):
+            now_s = time.monotonic()
+            if take.ready_frames != ready_frames:
+                ready_frames, since_s = take.ready_frames, now_s
+            elif now_s - since_s > GIVEN_UP_S:  # its rendering was abandoned, or failed
+                self._growing = None if self._growing is take else self._growing
+                return
+            time.sleep(LOOK_AGAIN_S)
 
     def tell_progress(self, number: int, share: float, so_far: object) -> None:
         now_s = time.monotonic()

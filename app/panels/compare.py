@@ -6,6 +6,7 @@ from app.analysis.comparison import ComparedRow, Trial, compare, same_string
 from app.library import Library, PresetEntry
 from app.panels._background import Background
 from app.panels.base import Moment, Panel
+from app.rendering import Take
 from app.session import Session
 from app.views.compare_view import CompareView
 
@@ -45,6 +46,9 @@ class ComparePanel(Panel):
                 self.view.set_computing(None)
                 self._stopped = False
             self._show()
+
+    def take_started(self, take: Take) -> None:
+        self._background.give_way_to(take)
 
     def show_moment(self, moment: Moment) -> None:
         self._unchanged_s += moment.elapsed_s

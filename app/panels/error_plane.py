@@ -10,6 +10,7 @@ from app.analysis.job import Job
 from app.library import Library
 from app.panels._background import Background
 from app.panels.base import Moment, Panel
+from app.rendering import Take
 from app.session import Session
 from app.views.error_plane_view import ErrorPlaneView
 from engine.pluck import Pluck
@@ -52,6 +53,9 @@ class ErrorPlanePanel(Panel):
             self.view.progress.show_share(None)
             self.view.set_words("")
 
+    def take_started(self, take: Take) -> None:
+        self._background.give_way_to(take)
+
     def show_moment(self, moment: Moment) -> None:
         self._unchanged_s += moment.elapsed_s
         entry = self.library.find(self.session.choices.preset)
@@ -85,7 +89,7 @@ class ErrorPlanePanel(Panel):
         self.told.emit(message, details)
 
     def _audition(self, position: float, amplitude_mm: float) -> None:
-        self.session.move_pluck(position, amplitude_mm)
+        self.session.move_pluck(round(position, 3), round(amplitude_mm, 2))
         self.pluck_asked.emit()
 
 

@@ -84,10 +84,10 @@ class ErrorPlaneView(QWidget):
             self._words.setText(self._resting)
             return
         error = self._picture.at(position, amplitude_mm)
-        text = "runs away" if math.isinf(error) else f"error {100 * error:.3g} %"
         about = "" if self._picture.spacing == 1 else "about "
+        text = "runs away" if math.isinf(error) else f"error {about}{100 * error:.3g} %"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the trained range"
-        self._words.setText(f"pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {about}{text}{trained}")
+        self._words.setText(f"pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
 
 class _Map(pg.PlotWidget):

@@ -79,6 +79,39 @@ def test_what_was_said_before_a_cancel_does_not_arrive(qtbot: QtBot, background:
     qtbot.waitUntil(lambda: heard == ["another"], timeout=10_000)
 
 
+def test_a_job_rests_while_a_pluck_is_rendered(qtbot: QtBot, background: Background) -> None:
+    class Growing:
+        complete = False
+        looked = 0
+
+        @property
+        def ready_frames(self) -> int:
+            self.looked += 1
+            self.complete = self.looked >= 5
+            return self.looked
+
+    take, done = Growing(), []
+    background.give_way_to(take)  # type: ignore[arg-type]
+
+    def work(job: Job) -> None:
+        job.report(0.5)
+        done.append(take.complete)
+
+    with qtbot.waitSignal(background.finished):
+        background.start(work)
+    assert done == [True]
+
+
+def test_a_take_that_no_longer_grows_is_not_waited_for(qtbot: QtBot, background: Background) -> None:
+    class Abandoned:
+        complete = False
+        ready_frames = 100
+
+    background.give_way_to(Abandoned())  # type: ignore[arg-type]
+    with qtbot.waitSignal(background.finished, timeout=10_000):
+        background.start(lambda job: job.report(0.5))
+
+
 @pytest.mark.parametrize(
     ("error", "message", "has_details"),
     [(PresetError("x: broken"), "x: broken", False), (ZeroDivisionError("none"), "Computing failed: none", True)],
