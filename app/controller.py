@@ -25,9 +25,13 @@ from app.audio_control import AudioControl
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import KEYS, MainWindow
 from app.panels import (
+    ComparePanel,
+    EigenvaluesPanel,
+    ErrorPlanePanel,
     ErrorTimePanel,
     Moment,
     Panel,
+    PartialsPanel,
     SpaceTimePanel,
     SpectrogramPanel,
     SpectrumPanel,
@@ -44,8 +48,8 @@ from app.views.help_dialog import HelpDialog
 from engine.metrics import ErrorSums
 from engine.preset import SHIPPED
 
-LEFT: tuple[type[Panel], ...] = (SpectrumPanel, SpectrogramPanel)
-RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel)
+LEFT: tuple[type[Panel], ...] = (SpectrumPanel, SpectrogramPanel, EigenvaluesPanel, PartialsPanel, ErrorPlanePanel)
+RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel, ComparePanel)
 
 FRAME_MS = 16
 ProblemListener = Callable[[AudioProblem], None]

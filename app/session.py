@@ -35,6 +35,7 @@ class Choices(BaseModel):
     loop: bool = False
     volume_db: float = Field(0.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
     speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
+    solo: int = Field(0, ge=0, le=1000)  # the mode that is heard alone; 0: all of them
     left_view: str = "spectrum"  # keys of panels
     right_view: str = "waveform"
 

@@ -20,7 +20,6 @@ from engine.partials import (
     PartialErrors,
     PartialTrack,
     partial_errors,
-    phasors,
     segment_frames,
     track_partials,
 )
@@ -28,13 +27,13 @@ from engine.pluck import DEFAULT_LISTEN
 from engine.reference import ModalState, SplittingSolver
 from engine.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
 from engine.spectra import spectral_distances
+from engine.true_partials import true_phasors
 from training.configuration import DatasetConfiguration
 from training.dataset import Dataset, draw_initial, split_rows
 from training.losses import KoopmanModel
 
 TRAJECTORIES_AT_ONCE = 10
 FRAMES_AT_ONCE = 1000
-OVERSAMPLING = 4  # of the truth whose phasors are wanted
 
 Windows = Sequence[tuple[float, float]]  # (start, stop) of each, in s
 
@@ -171,9 +170,16 @@ def evaluate_partials(
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
             state, tracks = model.release((initial[rows] @ synthesis).float().to(device)), []
-            for first, truth in zip(
-                range(0, steps, block), _true_phasors(c, initial[rows], steps, block), strict=True
-            ):
+            true = true_phasors(
+                c.string,
+                initial[rows],
+                c.rate_hz,
+                steps,
+                block,
+                tension_modulated=c.tension_modulated,
+                substeps=c.substeps,
+            )
+            for first, truth in zip(range(0, steps, block), true, strict=True):
                 predicted, state = model.advance(state, truth.shape[1], analysis)
                 tracks.append(track_partials(predicted.cpu() * dataset.scale_m, truth, length))
                 report((part + (first + truth.shape[1]) / steps) / len(parts))
@@ -216,23 +222,8 @@ def _simulated(solver: SplittingSolver, initial: Tensor, steps: int, block: int)
         yield frames
 
 
-def _true_phasors(c: DatasetConfiguration, initial: Tensor, steps: int, block: int) -> Iterator[Tensor]:
-    """Phasors of frames 1 … steps, complex128 (batch, up to `block`, modes)."""
-    solver, state = _solver(c, OVERSAMPLING), ModalState.at_rest(initial)
-    for first in range(0, steps, block):
-        samples, state = solver.advance(state, OVERSAMPLING * min(block, steps - first))
-        beyond, _ = solver.advance(state, 1)
-        before, now, after = (
-            torch.cat([samples, beyond], dim=1)[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1)
-        )
-        count = now.shape[1]
-        yield phasors(before[:, :count], now, after, 1 / solver.rate_hz, c.string, c.tension_modulated)
-
-
-def _solver(c: DatasetConfiguration, oversampling: int = 1) -> SplittingSolver:
-    substeps = None if c.substeps is None else -(-c.substeps // oversampling)
-    rate_hz = c.rate_hz * oversampling
-    return SplittingSolver(c.string, c.modes, rate_hz, tension_modulated=c.tension_modulated, substeps=substeps)
+def _solver(c: DatasetConfiguration) -> SplittingSolver:
+    return SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated, substeps=c.substeps)
 
 
 def _mean_distance(of_parts: Sequence[tuple[Tensor, Tensor]]) -> SpectralDistance:

@@ -1,4 +1,5 @@
-"""What the views over time show, computed from a take: arrays in, arrays out, no window.
+"""What views show of model and truth, computed without a window: arrays in, arrays out.
 
-What takes longer grows with its take: `advance` computes a little more. See `growing.py`.
+What grows with a take computes a little more at each call (`growing.py`); what takes long is a job that reports and
+can be cancelled (`job.py`).
 """

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QToolButton
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QSizePolicy, QToolButton
+
+ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 def tool_button(text: str, name: str = "", tip: str = "") -> QToolButton:
@@ -25,6 +28,23 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
         box.addItem(text, data)
     box.setCurrentIndex(max(0, box.findData(chosen)))
     return box
+
+
+def words_label() -> QLabel:
+    """A faint line of words that takes the room there is: what it says never moves what is beside it."""
+    label = QLabel()
+    label.setObjectName("faint")
+    label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+    return label
+
+
+def keeps_enter(event: QEvent) -> bool:
+    """True, and the event accepted, where it asks whether Enter is the focused widget's own or a shortcut's."""
+    asks = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
+    if asks and event.key() in ENTER_KEYS:  # type: ignore[attr-defined]
+        event.accept()
+        return True
+    return False
 
 
 def vertical_rule() -> QFrame:

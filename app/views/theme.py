@@ -178,6 +178,12 @@ QScrollBar::handle {{
 QScrollBar::handle:hover {{ background: {FAINT}; }}
 QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
 QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
+QTableView {{ background: {PANEL}; border: none; selection-background-color: {LINE}; }}
+QHeaderView {{ background: {PANEL}; border: none; }}
+QHeaderView::section {{
+    background: {PANEL}; color: {FAINT}; border: none; border-bottom: 1px solid {LINE}; padding: 6px 6px 4px 6px; }}
+QHeaderView::up-arrow, QHeaderView::down-arrow {{
+    subcontrol-origin: border; subcontrol-position: top center; width: 8px; height: 6px; }}
 QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; }}
 """
 

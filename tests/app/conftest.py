@@ -12,6 +12,8 @@ from pytestqt.qtbot import QtBot
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, ProblemKind
 
+OWN_THREADS = ("render-worker", "audio-feeder", "eigenvalues", "partials", "error-map", "compare")
+
 
 def no_device(*_: object) -> AudioDevice:
     raise AudioUnavailable(AudioProblem(ProblemKind.NO_DEVICE, "No sound output here.", "Connect one."))
@@ -47,5 +49,5 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
     qtbot.waitExposed(window)
     yield made
     window.close()
-    left = [t.name for t in threading.enumerate() if t.name in ("render-worker", "audio-feeder")]
+    left = [t.name for t in threading.enumerate() if t.name in OWN_THREADS]
     assert left == []

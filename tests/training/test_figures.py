@@ -16,6 +16,7 @@ from matplotlib.image import imread
 from engine.metrics import ErrorSums
 from engine.models import build_model
 from engine.models.base import Physics
+from engine.models.learned_eigenvalues import model_log_eigenvalues
 from engine.preset import Preset, PresetError, PresetInfo, TrainedRange
 from engine.reference import ModalState, SplittingSolver
 from engine.schema import write
@@ -23,7 +24,7 @@ from engine.sine_transform import listening_weights, to_grid
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.dataset import draw_initial
 from training.figures import evolution, extrapolation, motions, spectrum, style
-from training.figures.eigenvalues import eigenvalues, model_log_eigenvalues
+from training.figures.eigenvalues import eigenvalues
 from training.figures.error import error, smoothed
 from training.run_plot import plot_run, read_log, run_figure
 

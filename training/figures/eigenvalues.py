@@ -3,43 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import torch
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engine.models import DMD, StringModel
-from engine.models.ssm import DiagonalSSM
+from engine.models.learned_eigenvalues import VANISHED, model_log_eigenvalues
 from engine.preset import Preset, PresetError
 from training.figures import motions, style
 
-VANISHED = 1e-12  # |λ| of a state that is gone after a sample: an unused mode of a fit
 REFERENCE = "#222222"
-
-
-def model_log_eigenvalues(model: StringModel[Any]) -> list[torch.Tensor]:
-    """log λ per sample, complex128, a tensor each layer; empty where a model has no linear dynamics.
-
-    Of `koopman_integrated` those of a quiet string: they change with the energy.
-    """
-    with torch.no_grad():
-        if isinstance(model, DMD):
-            return [torch.complex(model.magnitude_log.double(), model.angle.double())]
-        layers = [_layer_log_eigenvalues(module) for module in model.modules() if isinstance(module, DiagonalSSM)]
-        if layers:
-            return layers
-        nu_log, theta_log = getattr(model, "nu_log", None), getattr(model, "theta_log", None)
-        if isinstance(nu_log, torch.Tensor) and isinstance(theta_log, torch.Tensor):
-            return [torch.complex(-nu_log.double().exp(), theta_log.double().exp())]
-    return []
-
-
-def _layer_log_eigenvalues(layer: DiagonalSSM) -> torch.Tensor:
-    """With both of a conjugate pair, of which a layer may store one."""
-    stored = layer.log_eigenvalues()
-    return torch.cat([stored, stored.conj()]) if layer.conjugates == 2 else stored
 
 
 def eigenvalues(presets: Sequence[Preset]) -> Figure:

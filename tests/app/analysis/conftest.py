@@ -1,4 +1,4 @@
-"""Takes of known motion."""
+"""Takes of known motion, and what computations are given in place of a thread's job."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from app.analysis.job import Cancelled
 from app.rendering import Take
 from engine.pluck import Pluck
 from engine.preset import read_info
@@ -27,3 +28,27 @@ def make_take(small_preset: Path) -> MakeTake:
         return take
 
     return make
+
+
+class RecordingJob:
+    """Remembers what it is told, and cancels after so many reports."""
+
+    def __init__(self) -> None:
+        self.shares: list[float] = []
+        self.results: list[object] = []
+        self.cancel_after: int | None = None
+
+    def check(self) -> None:
+        if self.cancel_after is not None and len(self.shares) >= self.cancel_after:
+            raise Cancelled
+
+    def report(self, share: float, so_far: object = None) -> None:
+        self.check()
+        self.shares.append(share)
+        if so_far is not None:
+            self.results.append(so_far)
+
+
+@pytest.fixture
+def job() -> RecordingJob:
+    return RecordingJob()

@@ -1,0 +1,161 @@
+"""Several presets on one pluck: their errors, what is left of the sound, their speed and size."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from app.analysis.job import Cancelled, Job
+from app.library import PresetEntry
+from app.rendering.worker import BLOCK_FRAMES
+from engine.metrics import NULL_FLOOR_DB, ErrorSums
+from engine.pluck import Pluck
+from engine.preset import PresetInfo, load_preset
+from engine.sine_transform import listening_weights, synthesis_matrix, to_modes
+from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
+
+FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
+WARM_UP_FRAMES = 64  # compilation and caches are no part of a model's speed
+
+
+@dataclass(frozen=True)
+class ComparedRow:
+    """One preset; None: no such figure, or not yet.
+
+    Attributes:
+        mse, mae: relative, over the whole string, of the trained horizon.
+        past_mse, past_mae: of all that comes after it; infinite where the output ran away.
+        null_db: what is left of the sound at the listening point where model and truth are subtracted, over the whole
+            pluck.
+        real_time: seconds of sound in a second of rendering the whole string on one core.
+        note: why there are no figures, or what to know of them.
+    """
+
+    name: str
+    title: str
+    model: str
+    rate_hz: int
+    parameters: int
+    mse: float | None = None
+    mae: float | None = None
+    past_mse: float | None = None
+    past_mae: float | None = None
+    null_db: float | None = None
+    real_time: float | None = None
+    note: str = ""
+
+    @classmethod
+    def of(cls, entry: PresetEntry) -> ComparedRow:
+        """What is known without computing."""
+        return cls(entry.name, entry.info.title, entry.info.model, entry.info.rate_hz, entry.parameters)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What the presets are compared on: a pluck, for how long, and where it is heard."""
+
+    pluck: Pluck
+    seconds: float
+    listen: float
+
+
+def compare(entries: list[PresetEntry], trial: Trial, job: Job) -> None:
+    """Reports a `ComparedRow` for each preset, one after the other. A preset that fails has a row that says why."""
+    truths = _Truths(trial)
+    for done, entry in enumerate(entries):
+        try:
+            row = _compare_one(entry, trial, truths, done / len(entries), 1 / len(entries), job)
+        except Cancelled:
+            raise
+        except Exception as error:  # one preset's row: the others are still to come
+            row = replace(ComparedRow.of(entry), note=str(error) or type(error).__name__)
+        job.report((done + 1) / len(entries), row)
+
+
+def same_string(info: PresetInfo, other: PresetInfo) -> bool:
+    """Whether two presets learned one string, at whatever rate."""
+    return (info.string, info.tension_modulated) == (other.string, other.tension_modulated)
+
+
+class _Truths:
+    """The true motion of the pluck as modal amplitudes, once for each string and rate."""
+
+    def __init__(self, trial: Trial) -> None:
+        self._trial = trial
+        self._known: dict[tuple[object, ...], Tensor] = {}
+
+    def amplitudes(self, info: PresetInfo, job: Job) -> Tensor:
+        """float32 (frames, modes) in m, of the frames after the first."""
+        key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
+        if key not in self._known:
+            blocks = []
+            for block, _ in _frames(TruthSource(info), self._trial, info, job):
+                blocks.append(to_modes(block[0], info.modes).float())
+            self._known[key] = torch.cat(blocks)
+        return self._known[key]
+
+
+def _compare_one(
+    entry: PresetEntry, trial: Trial, truths: _Truths, before: float, share: float, job: Job
+) -> ComparedRow:
+    preset = load_preset(entry.path)
+    info = preset.info
+    source = ModelSource(preset)
+    job.check()
+    true = truths.amplitudes(info, job)
+    synthesis = synthesis_matrix(info.grid_points, info.modes).float()
+    ear = listening_weights(torch.tensor([trial.listen]), info.grid_points).float()
+    steps = len(true)
+    string, sound = ErrorSums(steps), ErrorSums(steps)
+    first, work_s, note = 0, 0.0, ""
+    try:
+        _warm_up(source, trial, info)
+        for predicted, spent_s in _frames(source, trial, info, job):
+            block = (true[first : first + predicted.shape[1]] @ synthesis)[None]
+            string.add(predicted.float(), block, first)
+            sound.add(predicted.float() @ ear, block @ ear, first)
+            first, work_s = first + predicted.shape[1], work_s + spent_s
+            job.report(before + share * first / steps)
+    except Runaway as error:
+        note = f"runs away {error.time_s:.2f} s after the pluck"
+        for start in range(first, steps, FRAMES_AT_ONCE):
+            block = (true[start : start + FRAMES_AT_ONCE] @ synthesis)[None]
+            string.add(torch.full_like(block, torch.nan), block, start)
+            sound.add(torch.full_like(block @ ear, torch.nan), block @ ear, start)
+    end_s = max(steps / info.rate_hz, info.horizon_s)
+    windows = string.windows(info.rate_hz, (0.0, info.horizon_s, end_s))
+    past = windows[1] if len(windows) > 1 else None
+    null_db = sound.total().null_depth_db
+    return replace(
+        ComparedRow.of(entry),
+        mse=windows[0].rel_mse,
+        mae=windows[0].rel_mae,
+        past_mse=past.rel_mse if past else None,
+        past_mae=past.rel_mae if past else None,
+        null_db=None if null_db == NULL_FLOOR_DB and trial.pluck.amplitude_mm == 0 else null_db,
+        real_time=first / info.rate_hz / work_s if work_s > 0 else None,
+        note=note,
+    )
+
+
+def _frames(source: StringSource, trial: Trial, info: PresetInfo, job: Job) -> Iterator[tuple[Tensor, float]]:
+    """Blocks (1, frames, grid_points) in m, and the seconds that this thread worked on each."""
+    state = source.start(_initial(trial, info))
+    steps = max(1, round(trial.seconds * info.rate_hz))
+    for first in range(0, steps, FRAMES_AT_ONCE):
+        started_s = time.thread_time()  # what others do meanwhile does not count
+        block, state = source.advance(state, min(FRAMES_AT_ONCE, steps - first))
+        yield block, time.thread_time() - started_s
+        job.check()
+
+
+def _warm_up(source: StringSource, trial: Trial, info: PresetInfo) -> None:
+    source.advance(source.start(_initial(trial, info)), WARM_UP_FRAMES)
+
+
+def _initial(trial: Trial, info: PresetInfo) -> Tensor:
+    return project(trial.pluck.displacement(info.grid_points), info.modes)[None]

@@ -1,0 +1,158 @@
+"""The error of a model over all places and amplitudes of a pluck, coarse first, then ever finer.
+
+The grid of each level holds all points of the one before, so that nothing is computed twice. A plane that was left
+unfinished goes on where it was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.analysis.job import Job
+from engine.metrics import ErrorSums
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
+from engine.preset import Preset
+from engine.reference import default_substeps
+from engine.sources import TruthSource, project
+
+SMALLEST_AMPLITUDE_MM = 0.5
+STRIDES = (8, 4, 2, 1)  # of the finest grid, level by level
+FINEST = (49, 33)  # positions, amplitudes: a multiple of the coarsest stride, and one
+PLUCKS_AT_ONCE = 4
+FRAMES_AT_ONCE = 1000
+COARSER = 4  # sub-steps of the truth against its default's: an error of 1e-5, far below any that is shown
+
+POSITIONS = np.linspace(*POSITION_RANGE, FINEST[0])
+AMPLITUDES_MM = np.geomspace(SMALLEST_AMPLITUDE_MM, LARGEST_AMPLITUDE_MM, FINEST[1])
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlanePicture:
+    """What can be shown of a plane so far.
+
+    Attributes:
+        error: relative MAE over the trained horizon, (positions, amplitudes) of the finest grid; between the points
+            of the finest level that is whole by interpolation of its logarithm.
+        spacing: of that level's points, in steps of the finest grid.
+        share: of all points that are known, 0 … 1.
+    """
+
+    error: Array
+    spacing: int
+    share: float
+
+    def at(self, position: float, amplitude_mm: float) -> float:
+        """The error at the grid's point nearest to a pluck."""
+        return float(self.error[nearest_cell(position, amplitude_mm)])
+
+
+def nearest_cell(position: float, amplitude_mm: float) -> tuple[int, int]:
+    """The place in the finest grid of a pluck, which may lie beyond its edges."""
+    amplitude_log = math.log(max(amplitude_mm, 1e-6))
+    return (
+        int(np.abs(POSITIONS - position).argmin()),
+        int(np.abs(np.log(AMPLITUDES_MM) - amplitude_log).argmin()),
+    )
+
+
+@dataclass
+class ErrorPlane:
+    """The errors known so far, NaN elsewhere: one thread computes, and takes pictures of it for others."""
+
+    error: Array = field(default_factory=lambda: np.full(FINEST, math.nan))
+
+    @property
+    def spacing(self) -> int | None:
+        """Of the finest level that is whole; None before the coarsest is."""
+        whole = [stride for stride in STRIDES if not np.isnan(self.error[::stride, ::stride]).any()]
+        return whole[-1] if whole else None
+
+    def picture(self) -> PlanePicture | None:
+        """None before the coarsest grid is there."""
+        spacing = self.spacing
+        if spacing is None:
+            return None
+        shown = np.exp(refine(np.log(np.maximum(self.error[::spacing, ::spacing], 1e-9)), spacing))
+        return PlanePicture(shown, spacing, self._share)
+
+    @property
+    def _share(self) -> float:
+        return float((~np.isnan(self.error)).mean())
+
+    def compute(self, preset: Preset, pluck: Pluck, job: Job) -> PlanePicture:
+        """Computes what is not known yet, of plucks with the shape and width of `pluck`.
+
+        Raises:
+            Cancelled: the job was; what is known stays.
+            ValueError: the model needs more than a string at rest.
+        """
+        errors = error_of_plucks(preset)
+        spacing = self.spacing
+        if spacing is not None:
+            job.report(self._share, self.picture())
+        for places in self._missing():
+            plucks = [pluck.moved(position=POSITIONS[x], amplitude_mm=AMPLITUDES_MM[y]) for x, y in places]
+            for place, error in zip(places, errors(plucks, job), strict=True):
+                self.error[place] = error
+            is_finer, spacing = self.spacing != spacing, self.spacing
+            job.report(self._share, self.picture() if is_finer else None)
+        picture = self.picture()
+        assert picture is not None
+        return picture
+
+    def _missing(self) -> Iterator[list[tuple[int, int]]]:
+        """Points in the order of computing, some at a time."""
+        for stride in STRIDES:
+            rows, columns = np.nonzero(np.isnan(self.error[::stride, ::stride]))
+            places = [(int(x) * stride, int(y) * stride) for x, y in zip(rows, columns, strict=True)]
+            for first in range(0, len(places), PLUCKS_AT_ONCE):
+                yield places[first : first + PLUCKS_AT_ONCE]
+
+
+def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
+    """What computes relative MAEs (plucks,) over the preset's horizon, infinite where the output is not finite."""
+    info, model = preset.info, preset.model
+    truth = TruthSource(info, -(-default_substeps(info.string, info.modes, info.rate_hz) // COARSER))
+
+    @torch.inference_mode()
+    def errors(plucks: list[Pluck], job: Job) -> Array:
+        initial = project(torch.stack([pluck.displacement(info.grid_points) for pluck in plucks]), info.modes)
+        state = model.release((initial / info.scale_m).float())
+        true_state = truth.start(initial)
+        sums, first = ErrorSums(info.horizon_steps), 0
+        while first < info.horizon_steps:
+            steps = min(FRAMES_AT_ONCE, info.horizon_steps - first)
+            predicted, state = model.advance(state, steps)
+            true, true_state = truth.advance(true_state, steps)
+            sums.add(predicted * info.scale_m, true, first)
+            first += steps
+            job.check()
+        return sums.per_trajectory()[1]
+
+    return errors
+
+
+def refine(coarse: Array, factor: int) -> Array:
+    """Bilinear interpolation of `coarse` (m, n) to ((m - 1) factor + 1, (n - 1) factor + 1) points."""
+    fine = coarse
+    for axis in (0, 1):
+        moved = np.moveaxis(fine, axis, 0)
+        places = np.arange((len(moved) - 1) * factor + 1) / factor
+        before = np.minimum(places.astype(int), max(len(moved) - 2, 0))
+        share = (places - before)[:, None]
+        after = np.minimum(before + 1, len(moved) - 1)
+        # an infinite error next to a finite one stays infinite only at its own point
+        with np.errstate(invalid="ignore"):
+            mixed = moved[before] * (1 - share) + moved[after] * share
+        fine = np.moveaxis(
+            np.where(np.isnan(mixed), np.where(share < 0.5, moved[before], moved[after]), mixed), 0, axis
+        )
+    return fine

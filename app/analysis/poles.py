@@ -1,0 +1,126 @@
+"""A model's learned eigenvalues beside the string's own, as a musician reads them: frequencies and decay times.
+
+An eigenvalue tells a frequency up to multiples of the sample rate and its sign. It belongs to the mode that is
+nearest to one of these, and is compared with it there. Decay counts a little, for it tells a mode that is folded back
+from the one that it is folded on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.models.learned_eigenvalues import VANISHED, model_log_eigenvalues
+from engine.preset import Preset, PresetInfo
+
+NEPERS_OF_60_DB = math.log(1000)
+
+BELIEVABLE_S = (1e-3, 100.0)  # decay times beyond these count as these
+DECAY_WEIGHT = 0.25  # of an octave of decay time, against a fundamental's width of frequency
+
+QUIET = "of a quiet string: louder, its network shifts them"
+_NOTES = {
+    "koopman_integrated": QUIET,
+    "koopman_var": "before the multiplier, which changes phases and levels with the energy",
+    "lru": "layers follow one another: only the first one's need be the string's",
+    "s5": "layers follow one another: only the first one's need be the string's",
+}
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Poles:
+    """Eigenvalues, one element each.
+
+    Attributes:
+        log: log λ per sample, the imaginary part in 0 … π: a real string has both of each pair.
+        folded_hz: the frequency that is heard, 0 … half the rate.
+        t60_s: infinite where it does not decay.
+        mode: the nearest of the string's modes, from 1.
+        mode_hz: the frequency, as near to that mode's as one that sounds the same can be.
+        cents: of that over the mode's own.
+        layer: of the model, from 0.
+    """
+
+    log: NDArray[np.complex128]
+    folded_hz: Array
+    t60_s: Array
+    mode: NDArray[np.int64]
+    mode_hz: Array
+    cents: Array
+    layer: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.log)
+
+
+@dataclass(frozen=True)
+class PoleFigure:
+    """What the view shows of a preset; `learned` is empty where the model has none, and `note` says why."""
+
+    rate_hz: int
+    learned: Poles
+    string: Poles
+    layers: int
+    note: str
+
+
+def pole_figure(preset: Preset) -> PoleFigure:
+    """The eigenvalues of a preset's model, and those of its string when it is quiet."""
+    info = preset.info
+    own = (info.string.eigenvalues(info.modes) / info.rate_hz).numpy().astype(np.complex128)
+    found = [log.numpy() for log in model_log_eigenvalues(preset.model)]
+    note = _NOTES.get(info.model, "")
+    if not found:
+        note = f"a {info.model} has no eigenvalues: its whole field goes through a network at every sample"
+    return PoleFigure(info.rate_hz, _poles(found, info), _poles([own], info), len(found), note)
+
+
+def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
+    kept = [_upper_half(log[log.real > math.log(VANISHED)]) for log in layers]
+    log = np.concatenate([*kept, np.empty(0, complex)])
+    layer = np.repeat(np.arange(len(kept)), [len(one) for one in kept])
+    angle = np.abs(np.angle(np.exp(1j * log.imag)))
+    folded_hz = angle * info.rate_hz / (2 * math.pi)
+    with np.errstate(divide="ignore"):
+        t60_s = np.where(log.real < 0, NEPERS_OF_60_DB / (-log.real * info.rate_hz), math.inf)
+    modes_hz = info.string.eigenvalues(info.modes).imag.numpy() / (2 * math.pi)
+    modes_s = NEPERS_OF_60_DB / info.string.decay_rates(info.modes).numpy()
+    mode, mode_hz = _nearest(folded_hz, modes_hz, info.rate_hz, _octaves(t60_s)[:, None] - _octaves(modes_s))
+    with np.errstate(divide="ignore"):
+        cents = 1200 * np.log2(np.maximum(mode_hz, 0) / modes_hz[mode])
+    return Poles(np.log(np.exp(log.real)) + 1j * angle, folded_hz, t60_s, mode + 1, mode_hz, cents, layer)
+
+
+def _upper_half(log: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """One of each pair λ, λ̄."""
+    turned = np.angle(np.exp(1j * log.imag))
+    upper = log.real + 1j * np.abs(turned)
+    lower = turned < 0
+    paired = np.array([bool(np.isclose(upper[~lower], one, rtol=0, atol=1e-9).any()) for one in upper], bool)
+    return upper[~(lower & paired)]
+
+
+def _octaves(t60_s: Array) -> Array:
+    return np.log2(np.clip(t60_s, *BELIEVABLE_S))
+
+
+def _nearest(folded_hz: Array, modes_hz: Array, rate_hz: int, octaves_off: Array) -> tuple[NDArray[np.int64], Array]:
+    """Places of the nearest modes, and of each frequency what is nearest to it of ±f + k · rate.
+
+    Args:
+        octaves_off: (eigenvalues, modes), of decay times.
+    """
+    candidates = []
+    for signed in (folded_hz, -folded_hz):
+        turns = np.round((modes_hz[None] - signed[:, None]) / rate_hz)
+        candidates.append(signed[:, None] + turns * rate_hz)
+    off = np.abs(np.stack(candidates) - modes_hz)
+    side = off.argmin(0)
+    alias_hz = np.where(side == 0, *candidates)
+    place = np.hypot(off.min(0) / modes_hz[0], DECAY_WEIGHT * octaves_off).argmin(1)
+    return place, alias_hz[np.arange(len(folded_hz)), place]

@@ -1,0 +1,120 @@
+"""The partials of a take, mode by mode: what a table says of them, and why of some it says nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from app.analysis.job import Job
+from app.rendering import Take
+from engine.partials import (
+    LEAST_SEGMENTS,
+    MOST_SIMILAR,
+    PartialErrors,
+    PartialTrack,
+    partial_errors,
+    segment_frames,
+    track_partials,
+)
+from engine.pluck import Pluck
+from engine.sine_transform import to_modes
+from engine.sources import project
+from engine.true_partials import true_phasors
+
+FRAMES_AT_ONCE = 2000
+WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}
+
+
+@dataclass(frozen=True)
+class PartialRow:
+    """One mode in one window; None: there is no such figure. Signs: the model's minus the truth's.
+
+    Attributes:
+        note: why the row is grey, in a few words; empty for a mode that can be heard and compared.
+    """
+
+    mode: int
+    truth_hz: float | None
+    model_hz: float | None
+    cents: float | None
+    truth_t60_s: float | None
+    model_t60_s: float | None
+    t60_error_percent: float | None
+    level_db: float | None
+    note: str
+
+
+def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
+    """Rows by window (`WINDOWS`); a window of which the take has too little is left out.
+
+    The truth is simulated again, more densely: its phasors need what lies between the take's frames.
+    """
+    info = take.info
+    last = take.frames - 1 if take.model_ends_s is None else round(take.model_ends_s * info.rate_hz)
+    modes_hz = info.string.eigenvalues(info.modes).imag.numpy() / (2 * math.pi)
+    length = segment_frames(info.rate_hz, modes_hz[0])
+    if last < length:
+        return {}
+    model = torch.from_numpy(take.motion_m("model"))
+    block = max(1, FRAMES_AT_ONCE // length) * length
+    tracks, first = [], 0
+    true = true_phasors(
+        info.string,
+        _initial(take.pluck, info.grid_points, info.modes),
+        info.rate_hz,
+        last,
+        block,
+        tension_modulated=info.tension_modulated,
+    )
+    for truth in true:
+        frames = model[None, first + 1 : first + 1 + truth.shape[1]].double()
+        tracks.append(track_partials(to_modes(frames, info.modes), truth, length))
+        first += truth.shape[1]
+        job.report(first / last)
+    track = PartialTrack.join(tracks)
+    end_s, seconds = (last + 1) / info.rate_hz, LEAST_SEGMENTS * length / info.rate_hz
+    spans = {"trained": (0.0, min(info.horizon_s, end_s)), "past": (info.horizon_s, end_s), "all": (0.0, end_s)}
+    spans = {name: span for name, span in spans.items() if span[1] - span[0] >= seconds}
+    errors = partial_errors(track, info.rate_hz, modes_hz.tolist(), list(spans.values()))
+    similar = (track.square.abs().sum(1) >= MOST_SIMILAR * track.power.sum(1))[0].numpy()
+    rows: dict[str, list[PartialRow]] = {}
+    for window, name in enumerate(spans):
+        rows[name] = [
+            _row(mode + 1, errors, window, _note(float(modes_hz[mode]), info.rate_hz, bool(similar[mode])))
+            for mode in range(info.modes)
+        ]
+    return rows
+
+
+def _row(mode: int, errors: PartialErrors, window: int, note: str) -> PartialRow:
+    truth_hz, level_db, cents, t60_s, t60_error_percent = (
+        _figure(values[0, window, mode - 1])
+        for values in (errors.frequency_hz, errors.level_db, errors.cents, errors.t60_s, errors.t60_error_percent)
+    )
+    if truth_hz is None and not note:
+        note = "not heard: 60 dB below the loudest"
+    elif level_db is not None and level_db < -60:
+        note = note or "the model has next to none of it"
+    model_hz = truth_hz * 2 ** (cents / 1200) if truth_hz is not None and cents is not None else None
+    model_t60_s = t60_s * (1 + t60_error_percent / 100) if t60_s and t60_error_percent is not None else None
+    return PartialRow(mode, truth_hz, model_hz, cents, t60_s, model_t60_s, t60_error_percent, level_db, note)
+
+
+def _note(mode_hz: float, rate_hz: int, similar: bool) -> str:
+    if similar:
+        return "not resolved: at half the sample rate"
+    if mode_hz > rate_hz / 2:
+        folded_hz = abs(mode_hz - rate_hz * round(mode_hz / rate_hz))
+        return f"above half the sample rate: heard at {folded_hz:.0f} Hz"
+    return ""
+
+
+def _initial(pluck: Pluck, grid_points: int, modes: int) -> torch.Tensor:
+    return to_modes(project(pluck.displacement(grid_points), modes)[None].double(), modes)
+
+
+def _figure(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)

@@ -1,0 +1,34 @@
+"""How far a computation is, in two pixels: a thin line that is there only while something is computed."""
+
+from __future__ import annotations
+
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QWidget
+
+from app.views import theme
+
+
+class ProgressStrip(QWidget):
+    """See the module."""
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setFixedHeight(2)
+        self._share: float | None = None
+
+    @property
+    def share(self) -> float | None:
+        return self._share
+
+    def show_share(self, share: float | None) -> None:
+        """0 … 1, or None where nothing is computed."""
+        if share != self._share:
+            self._share = share
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self._share is not None:
+            painter = QPainter(self)
+            painter.fillRect(self.rect(), QColor(theme.LINE))
+            painter.fillRect(0, 0, round(self._share * self.width()), self.height(), QColor(theme.TRUTH))

@@ -1,0 +1,96 @@
+"""Presets on one pluck: figures against the plain definition, one truth a string, and rows of presets that fail."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from app.analysis import comparison
+from app.analysis.comparison import ComparedRow, Trial, compare, same_string
+from app.analysis.job import Cancelled
+from app.library import PresetEntry, list_presets
+from engine.pluck import Pluck
+from engine.preset import load_preset, save_preset
+from engine.sine_transform import listening_weights
+from engine.sources import ModelSource, TruthSource, project
+
+TRIAL = Trial(Pluck(0.35, 4.0), 0.3, 0.37)
+
+
+@pytest.fixture
+def entries(small_preset: Path, tmp_path: Path) -> list[PresetEntry]:
+    for name in ("first", "second"):
+        shutil.copy(small_preset, tmp_path / f"{name}.safetensors")
+    return list_presets(tmp_path)[0]
+
+
+def test_figures_are_those_of_the_definition(entries: list[PresetEntry], job: Any) -> None:
+    compare(entries[:1], TRIAL, job)
+    (row,) = job.results
+    preset = load_preset(entries[0].path)
+    initial = project(TRIAL.pluck.displacement(101), 10)[None]
+    model, truth = (
+        source.advance(source.start(initial), 1200)[0].double()[0]
+        for source in (ModelSource(preset), TruthSource(preset.info))
+    )
+    error = model - truth
+    for part, mae, mse in (
+        (slice(400), row.mae, row.mse),
+        (slice(400, None), row.past_mae, row.past_mse),
+    ):
+        assert mae == pytest.approx(float(error[part].abs().sum() / truth[part].abs().sum()), rel=1e-3)
+        assert mse == pytest.approx(float(error[part].square().sum() / truth[part].square().sum()), rel=1e-3)
+    ear = listening_weights(torch.tensor([TRIAL.listen]), 101)
+    heard = (error @ ear).square().sum() / (truth @ ear).square().sum()
+    assert row.null_db == pytest.approx(10 * float(heard.log10()), abs=0.01)
+    assert row.real_time > 0
+    assert row.note == ""
+    assert job.shares[-1] == 1
+
+
+def test_one_truth_for_presets_of_one_string_and_rate(
+    entries: list[PresetEntry], job: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    monkeypatch.setattr(comparison, "TruthSource", lambda info: made.append(info) or TruthSource(info))
+    compare(entries, TRIAL, job)
+    assert [row.name for row in job.results] == ["first", "second"]
+    assert len(made) == 1
+
+
+def test_a_bad_preset_is_a_row_and_the_next_one_follows(entries: list[PresetEntry], job: Any) -> None:
+    entries[0].path.write_bytes(b"damaged")
+    compare(entries, TRIAL, job)
+    bad, good = job.results
+    assert "first.safetensors" in bad.note
+    assert bad.mae is None
+    assert good.mae is not None
+
+
+def test_a_model_that_runs_away_has_infinite_errors_and_says_when(entries: list[PresetEntry], job: Any) -> None:
+    preset = load_preset(entries[0].path)
+    with torch.no_grad():
+        preset.model.decoder.bias.fill_(1e6)  # type: ignore[operator,union-attr]
+    save_preset(entries[0].path, preset.info, preset.model)
+    compare(entries[:1], TRIAL, job)
+    (row,) = job.results
+    assert "runs away" in row.note
+    assert row.mae == row.past_mae == float("inf")
+
+
+def test_it_stops_between_blocks(entries: list[PresetEntry], job: Any) -> None:
+    job.cancel_after = 1
+    with pytest.raises(Cancelled):
+        compare(entries, TRIAL, job)
+    assert job.results == []
+
+
+def test_what_is_known_without_computing(entries: list[PresetEntry]) -> None:
+    row = ComparedRow.of(entries[0])
+    assert (row.name, row.model, row.rate_hz) == ("first", "koopman_var", 4000)
+    assert row.parameters == entries[0].parameters
+    assert same_string(entries[0].info, entries[1].info)

@@ -1,0 +1,98 @@
+"""The map of errors: its order, that nothing is computed twice, and its figures against the plain definition."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from app.analysis import error_plane
+from app.analysis.error_plane import (
+    AMPLITUDES_MM,
+    FINEST,
+    POSITIONS,
+    STRIDES,
+    ErrorPlane,
+    error_of_plucks,
+    nearest_cell,
+    refine,
+)
+from app.analysis.job import Cancelled
+from engine.metrics import relative_error
+from engine.pluck import Pluck
+from engine.preset import load_preset
+from engine.sources import ModelSource, TruthSource, project
+
+
+def test_levels_are_nested_in_the_finest() -> None:
+    assert all((points - 1) % STRIDES[0] == 0 for points in FINEST)
+    assert (len(POSITIONS), len(AMPLITUDES_MM)) == FINEST
+
+
+def test_interpolation_keeps_its_points_and_is_linear_between() -> None:
+    coarse = np.array([[0.0, 4.0], [8.0, 12.0], [8.0, math.inf]])
+    fine = refine(coarse, 4)
+    assert fine.shape == (9, 5)
+    np.testing.assert_array_equal(fine[::4, ::4], coarse)
+    np.testing.assert_allclose(fine[2], [4, 5, 6, 7, 8])
+    assert np.isfinite(fine[:5]).all()
+    assert not np.isnan(fine).any()
+
+
+def test_the_cell_of_a_pluck() -> None:
+    assert nearest_cell(0.5, 0.5) == (24, 0)
+    assert nearest_cell(2.0, 0.0) == (48, 0)
+    assert nearest_cell(POSITIONS[7] + 0.005, AMPLITUDES_MM[20] * 1.01) == (7, 20)
+
+
+def test_coarse_first_and_nothing_twice(monkeypatch: pytest.MonkeyPatch, job: object) -> None:
+    asked: list[tuple[int, int]] = []
+
+    def fake(preset: object) -> object:
+        def errors(plucks: list[Pluck], job: object) -> np.ndarray:
+            asked.extend(nearest_cell(p.position, p.amplitude_mm) for p in plucks)
+            return np.array([p.position * p.amplitude_mm for p in plucks])
+
+        return errors
+
+    monkeypatch.setattr(error_plane, "error_of_plucks", fake)
+    plane = ErrorPlane()
+    assert plane.picture() is None
+    job.cancel_after = 40  # type: ignore[attr-defined]
+    with pytest.raises(Cancelled):
+        plane.compute(None, Pluck(), job)  # type: ignore[arg-type]
+    assert asked[:35] == [(x, y) for x in range(0, 49, 8) for y in range(0, 33, 8)]
+    picture = plane.picture()
+    assert picture is not None
+    assert picture.spacing == 4
+    job.cancel_after = None  # type: ignore[attr-defined]
+    whole = plane.compute(None, Pluck(), job)  # type: ignore[arg-type]
+    assert len(asked) == len(set(asked)) == 49 * 33
+    assert (whole.spacing, whole.share) == (1, 1.0)
+    np.testing.assert_allclose(whole.error, POSITIONS[:, None] * AMPLITUDES_MM, rtol=1e-9)
+    assert whole.at(POSITIONS[3], AMPLITUDES_MM[5]) == pytest.approx(POSITIONS[3] * AMPLITUDES_MM[5])
+    spacings = [found.spacing for found in job.results]  # type: ignore[attr-defined]
+    assert spacings == [8, 4, 4, 2, 1]  # the second 4 is what the second computation found there
+
+
+def test_errors_are_those_of_the_sources(small_preset: Path, job: object) -> None:
+    preset = load_preset(small_preset)
+    plucks = [Pluck(0.3, 2.0), Pluck(0.62, 9.0, "triangular")]
+    found = error_of_plucks(preset)(plucks, job)  # type: ignore[arg-type]
+    for pluck, error in zip(plucks, found, strict=True):
+        initial = project(pluck.displacement(101), 10)[None]
+        model, truth = (
+            source.advance(source.start(initial), 400)[0]
+            for source in (ModelSource(preset), TruthSource(preset.info))
+        )
+        assert error == pytest.approx(relative_error(model.double(), truth).rel_mae, rel=1e-3)
+
+
+def test_output_that_is_not_finite_is_an_infinite_error(small_preset: Path, job: object) -> None:
+    preset = load_preset(small_preset)
+    with torch.no_grad():
+        next(preset.model.parameters()).fill_(math.inf)
+    assert np.isinf(error_of_plucks(preset)([Pluck()], job)).all()  # type: ignore[arg-type]

@@ -1,0 +1,91 @@
+"""The table of partials of takes whose model is the truth, changed in a known way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from app.analysis.job import Cancelled, Job
+from app.analysis.take_partials import take_partials
+from app.rendering import Take
+from engine.pluck import Pluck
+from engine.preset import PresetInfo, read_info
+from engine.sine_transform import to_grid, to_modes
+from engine.sources import TruthSource, project
+
+
+@pytest.fixture
+def info(small_preset: object) -> PresetInfo:
+    return replace(read_info(small_preset), tension_modulated=False)  # type: ignore[arg-type]
+
+
+def take_of(
+    info: PresetInfo, pluck: Pluck, gains: list[float], sharp_cents: float = 0.0, seconds: float = 0.5
+) -> Take:
+    """A linear string, and beside it one with modes of other levels and, where asked, a higher tension."""
+    take = Take("take", info, pluck, seconds)
+    initial = project(pluck.displacement(info.grid_points), info.modes)[None]
+    tighter = replace(info.string, tension_n=info.string.tension_n * 2 ** (2 * sharp_cents / 1200))
+    motions = []
+    for string in (replace(info, string=tighter), info):
+        source = TruthSource(string)
+        frames, _ = source.advance(source.start(initial), take.frames - 1)
+        motions.append(torch.cat([initial, frames[0]]))
+    changed = to_modes(motions[0], info.modes) * torch.tensor(gains, dtype=torch.float64)
+    take.append(to_grid(changed, info.grid_points).float().numpy(), motions[1].float().numpy())
+    return take
+
+
+def test_levels_and_decay_times_mode_by_mode(info: PresetInfo, job: Job) -> None:
+    gains = [0.5] + [1.0] * 9
+    rows = take_partials(take_of(info, Pluck(0.37, 4.0), gains), job)
+    assert set(rows) == {"trained", "past", "all"}
+    one, two = rows["all"][:2]
+    assert one.level_db == pytest.approx(-6.02, abs=0.01)
+    assert two.level_db == pytest.approx(0, abs=0.01)
+    own = info.string.eigenvalues(10)
+    assert two.truth_hz == pytest.approx(float(own[1].imag) / (2 * math.pi), rel=1e-4)
+    assert two.cents == pytest.approx(0, abs=0.02)
+    assert two.truth_t60_s == pytest.approx(math.log(1000) / -float(own[1].real), rel=1e-2)
+    assert two.model_t60_s == pytest.approx(two.truth_t60_s, rel=1e-2)
+
+
+def test_a_tighter_string_is_sharp(info: PresetInfo, job: Job) -> None:
+    rows = take_partials(take_of(info, Pluck(0.37, 4.0), [1.0] * 10, sharp_cents=5), job)["all"]
+    assert rows[0].cents == pytest.approx(5, abs=0.1)
+    assert rows[0].model_hz == pytest.approx(rows[0].truth_hz * 2 ** (5 / 1200), rel=1e-4)  # type: ignore[operator]
+
+
+def test_rows_without_figures_say_why(info: PresetInfo, job: Job) -> None:
+    rows = take_partials(take_of(info, Pluck(0.5, 4.0), [1.0] * 10), job)["all"]
+    assert rows[1].truth_hz is None  # the middle is a node of it
+    assert "60 dB" in rows[1].note
+    assert rows[0].note == ""
+    assert "above half the sample rate: heard at" in rows[8].note
+
+
+def test_a_model_that_ran_away_is_measured_as_far_as_it_goes(info: PresetInfo, job: Job) -> None:
+    take = take_of(info, Pluck(0.37, 4.0), [1.0] * 10)
+    take.model_ends_s = 0.05
+    take._motion_m["model"][201:] = 0
+    rows = take_partials(take, job)
+    assert set(rows) == {"trained", "all"}
+    assert rows["all"][0].level_db == pytest.approx(0, abs=0.01)
+    take.model_ends_s = 0.0
+    assert take_partials(take, job) == {}
+
+
+def test_it_gives_up_when_nobody_waits(info: PresetInfo) -> None:
+    class Over:
+        def check(self) -> None:
+            raise Cancelled
+
+        def report(self, share: float, so_far: object = None) -> None:
+            self.check()
+
+    with pytest.raises(Cancelled):
+        take_partials(take_of(info, Pluck(), list(np.ones(10))), Over())

@@ -1,0 +1,77 @@
+"""The table of presets in the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.controller import Controller
+
+
+@pytest.fixture
+def shown(controller: Controller) -> Any:
+    controller.session.update(right_view="compare")
+    return next(panel.view for panel in controller.panels if panel.key == "compare")
+
+
+def figures(shown: Any) -> dict[object, tuple[Any, ...]]:
+    return {row.key: row.values for row in shown.table.rows}
+
+
+def is_computed(shown: Any, names: set[str]) -> bool:
+    rows = shown.table.rows
+    return {row.key for row in rows if not row.grey and row.values[1] is not None} == names
+
+
+def test_presets_of_the_same_string_are_compared(qtbot: QtBot, controller: Controller, shown: Any) -> None:
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    assert figures(shown)["first"][1] == figures(shown)["second"][1]
+    assert [row.bold for row in shown.table.rows if row.key == "first"] == [True]
+    before = figures(shown)["first"][1]
+    controller.session.update(position=0.6)
+    assert all(row.grey for row in shown.table.rows)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    assert figures(shown)["first"][1] != before
+
+
+def test_presets_are_taken_out_and_put_in(qtbot: QtBot, controller: Controller, shown: Any) -> None:
+    shown._actions["second"].trigger()
+    assert list(figures(shown)) == ["first"]
+    shown._actions["second"].trigger()
+    assert set(figures(shown)) == {"first", "second"}
+    shown.table.choose("first")
+    qtbot.keyClick(shown.table, Qt.Key.Key_Delete)
+    assert list(figures(shown)) == ["second"]
+    assert not shown._actions["first"].isChecked()
+    shown._menu.actions()[1].trigger()  # all
+    assert set(figures(shown)) == {"first", "second"}
+
+
+def test_enter_loads_a_preset(qtbot: QtBot, controller: Controller, shown: Any) -> None:
+    shown.table.setFocus()
+    shown.table.choose("second")
+    qtbot.keyClick(shown.table, Qt.Key.Key_Return)
+    assert controller.session.choices.preset == "second"
+    assert [row.bold for row in shown.table.rows if row.key == "second"] == [True]
+
+
+def test_a_bad_preset_is_a_row_with_the_reason(
+    qtbot: QtBot, controller: Controller, shown: Any, preset_folder: Path
+) -> None:
+    (preset_folder / "second.safetensors").write_bytes(b"damaged")
+    qtbot.waitUntil(lambda: "second.safetensors" in figures(shown)["second"][-1], timeout=20_000)
+    assert is_computed(shown, {"first"})
+
+
+def test_it_is_stopped_and_goes_on(qtbot: QtBot, controller: Controller, shown: Any) -> None:
+    panel = next(panel for panel in controller.panels if panel.key == "compare")
+    qtbot.waitUntil(lambda: panel._background.busy, timeout=20_000)  # type: ignore[attr-defined]
+    qtbot.mouseClick(shown._stop, Qt.MouseButton.LeftButton)
+    assert shown.progress.share is None
+    assert not panel._background.busy  # type: ignore[attr-defined]
+    qtbot.mouseClick(shown._stop, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
