@@ -37,6 +37,8 @@ class Choices(BaseModel):
     speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
     left_view: str = "spectrum"  # keys of panels
     right_view: str = "waveform"
+    motion: bool = True  # of the string's picture
+    envelope: bool = True
 
     @property
     def pluck(self) -> Pluck:

@@ -14,7 +14,7 @@ from app.controller import Controller
 from app.main_window import MainWindow
 from app.session import Choices
 from app.settings import Settings, load_settings
-from app.views.string_view import MARGIN_X
+from app.views.string_axes import MARGIN_X
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -55,6 +55,36 @@ def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: 
     qtbot.mouseRelease(string, LEFT, pos=QPoint(round(MARGIN_X + 0.8 * width), string.height() - 30))
     assert controller.session.choices.listen == pytest.approx(0.8, abs=0.01)
     assert controller.window.transport.knobs["listen"].value == controller.session.choices.listen
+
+
+def test_the_handle_sets_width_and_shape_and_resets(qtbot: QtBot, controller: Controller) -> None:
+    string, session = view(controller, "string"), controller.session
+    string.width_stepped.emit(1.0)
+    assert session.choices.width == pytest.approx(0.063)
+    string.shape_stepped.emit(1)
+    assert session.choices.shape == "triangular"
+    string.width_stepped.emit(1.0)  # a triangle has none
+    assert session.choices.width == pytest.approx(0.063)
+    session.update(position=0.6, amplitude_mm=7)
+    string.pluck_reset.emit()
+    assert (session.choices.position, session.choices.amplitude_mm, session.choices.width) == (0.35, 4.0, 0.06)
+    session.update(listen=0.9)
+    string.listening_point_reset.emit("left")
+    assert session.choices.listen == Choices().listen
+    assert string._listening == {"left": Choices().listen}
+
+
+def test_the_motion_can_be_switched_off(qtbot: QtBot, controller: Controller) -> None:
+    string = view(controller, "string")
+    wait_for_take(qtbot, controller)
+    controller.player.seek(0.1)
+    qtbot.waitUntil(lambda: string._frame is not None and bool(string._frame.envelopes), timeout=20_000)
+    qtbot.mouseClick(string._toggles[1], LEFT)
+    assert not controller.session.choices.envelope
+    qtbot.waitUntil(lambda: not string._frame.envelopes, timeout=20_000)
+    controller.session.update(motion=False)
+    assert not string._toggles[0].isChecked()
+    qtbot.waitUntil(lambda: string._frame is None, timeout=20_000)
 
 
 def test_keys(qtbot: QtBot, controller: Controller) -> None:

@@ -1,0 +1,105 @@
+"""What lies behind the string: the grid, and the plucks that the model was not trained on, with a word why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPen
+
+from app.views import theme
+from app.views.string_axes import MARGIN_X, StringAxes
+
+LINE_HEIGHT = 15
+SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
+
+
+@dataclass(frozen=True)
+class TrainedPlucks:
+    """The positions and amplitudes that the model was trained on; None: all."""
+
+    position: tuple[float, float] | None = None
+    amplitude_mm: tuple[float, float] | None = None
+
+
+def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, plucking: bool) -> None:
+    """All of it. Amplitudes are shaded only while the pluck is shown: a string that moves crosses them all."""
+    gradient = QLinearGradient(0, 0, 0, axes.height)
+    gradient.setColorAt(0, QColor("#171b22"))
+    gradient.setColorAt(1, QColor("#0f1216"))
+    painter.setPen(QPen(QColor(theme.LINE), 1))
+    painter.setBrush(gradient)
+    painter.drawRoundedRect(QRectF(0.5, 0.5, axes.width - 1, axes.height - 1), 6, 6)
+    paint_grid(painter, axes)
+    _paint_scale(painter, axes)
+    if trained.position is not None:
+        _paint_untrained_positions(painter, axes, trained.position)
+    if plucking and trained.amplitude_mm is not None:
+        _paint_untrained_amplitudes(painter, axes, trained)
+
+
+def paint_grid(painter: QPainter, axes: StringAxes) -> None:
+    """Tenths of the string and the scale's lines."""
+    painter.setPen(QPen(theme.translucent(theme.LINE, 120), 1))
+    for tenth in range(11):
+        x = round(axes.x(tenth / 10)) + 0.5
+        painter.drawLine(QPointF(x, axes.top), QPointF(x, axes.bottom))
+    for share in SCALE:
+        y = round(axes.middle - share * axes.half_height) + 0.5
+        painter.drawLine(QPointF(axes.x(0), y), QPointF(axes.x(1), y))
+
+
+def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
+    painter.setFont(theme.small_font(10))
+    painter.setPen(QColor(theme.FAINT))
+    for share in SCALE:
+        y = axes.middle - share * axes.half_height
+        painter.drawText(
+            QRectF(0, y - 8, MARGIN_X - 8, 16),
+            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+            f"{share * axes.span_mm:+g}" if share else "0 mm",
+        )
+
+
+def _shade(painter: QPainter, area: QRectF) -> None:
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(0, 0, 0, 70))
+    painter.drawRect(area)
+    painter.setBrush(QBrush(theme.translucent(theme.FAINT, 26), Qt.BrushStyle.BDiagPattern))
+    painter.drawRect(area)
+
+
+def _paint_untrained_positions(painter: QPainter, axes: StringAxes, trained: tuple[float, float]) -> None:
+    low, high = trained
+    height = axes.bottom - axes.top
+    words = ("not trained here", f"only plucks at {low:g} … {high:g}")
+    for start, stop in ((0.0, low), (high, 1.0)):
+        if stop <= start:
+            continue
+        area = QRectF(axes.x(start), axes.top, axes.x(stop) - axes.x(start), height)
+        _shade(painter, area)
+        painter.setFont(theme.small_font(11))
+        for row, text in enumerate(words):
+            painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
+            line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
+            painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
+
+
+def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: TrainedPlucks) -> None:
+    assert trained.amplitude_mm is not None
+    low_mm, high_mm = trained.amplitude_mm
+    left, right = trained.position or (0.0, 1.0)  # beside them it is shaded already
+    for bottom_mm, top_mm, text in (
+        (0.0, min(low_mm, axes.span_mm), f"not trained below {low_mm:g} mm"),
+        (high_mm, axes.span_mm, f"not trained above {high_mm:g} mm"),
+    ):
+        if top_mm <= bottom_mm:
+            continue
+        area = QRectF(axes.at(left, top_mm), axes.at(right, bottom_mm))
+        _shade(painter, area)
+        if area.height() >= LINE_HEIGHT:
+            painter.setFont(theme.small_font(11))
+            painter.setPen(theme.translucent(theme.TEXT, 190))
+            painter.drawText(
+                area.adjusted(8, 0, -8, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text
+            )
