@@ -18,6 +18,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
+from app.history import History
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
 from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
@@ -95,6 +96,8 @@ class Controller(QObject):
         self._connect()
         if self.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)
+        self.history = History(self.session)
+        self._connect_history()
         for problem in problems:
             self.window.notices.tell(problem)
         self._choices_shown(frozenset(type(self.session.choices).model_fields))
@@ -146,6 +149,17 @@ class Controller(QObject):
         self._mail.finished.connect(self._take_finished)
         self._mail.failed.connect(self._render_failed)
         self._mail.audio_problem.connect(self._tell_audio_problem)
+
+    def _connect_history(self) -> None:
+        window, session, history = self.window, self.session, self.history
+        window.undo_asked.connect(history.undo)
+        window.redo_asked.connect(history.redo)
+        window.motion_asked.connect(lambda: session.update(motion=not session.choices.motion))
+        window.envelope_asked.connect(lambda: session.update(envelope=not session.choices.envelope))
+        string = next(panel.view for panel in self.panels if isinstance(panel, StringPanel))
+        for dragged in (string, *window.transport.knobs.values()):
+            dragged.drag_started.connect(history.hold)
+            dragged.drag_ended.connect(history.let_go)
 
     def _change(self, field: str, value: object) -> None:
         try:

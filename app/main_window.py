@@ -29,6 +29,10 @@ KEYS = (  # (key, name of the signal, what it does)
     ("L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
+    ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
+    ("Ctrl+Shift+Z", "redo_asked", "redo"),
+    ("M", "motion_asked", "show or hide the string's motion"),
+    ("E", "envelope_asked", "show or hide the envelope of the motion"),
     ("Ctrl+E", "export_asked", "export WAV"),
     ("F1", "help_asked", "these keys"),
     ("Ctrl+Q", "quit_asked", "quit"),
@@ -44,6 +48,10 @@ class MainWindow(QMainWindow):
     loop_asked = Signal()
     previous_asked = Signal()
     next_asked = Signal()
+    undo_asked = Signal()
+    redo_asked = Signal()
+    motion_asked = Signal()
+    envelope_asked = Signal()
     export_asked = Signal()
     help_asked = Signal()
     quit_asked = Signal()
@@ -131,8 +139,11 @@ class MainWindow(QMainWindow):
         QMessageBox.information(
             self,
             "Keys",
-            f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
-            "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
+            f"<table>{rows}</table>"
+            "<p>On the string: arrow keys move the pluck, with Shift the listening point (Ctrl+Shift: the right one),"
+            "<br>with Ctrl width and shape; Delete resets the pluck, Shift+Delete the listening point.</p>"
+            "<p>On a knob: arrow keys or wheel, Shift is finer, Page up and down are coarse, Home and End;"
+            "<br>or type a number; Delete or a double-click resets.</p>",
         )
 
     def closeEvent(self, event: QCloseEvent) -> None:

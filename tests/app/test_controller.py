@@ -87,6 +87,34 @@ def test_the_motion_can_be_switched_off(qtbot: QtBot, controller: Controller) ->
     qtbot.waitUntil(lambda: string._frame is None, timeout=20_000)
 
 
+def test_gestures_are_undone_one_by_one(qtbot: QtBot, controller: Controller) -> None:
+    window, session, string = controller.window, controller.session, view(controller, "string")
+    start = session.choices
+    assert not controller.history.can_undo
+    at = string._handle(string._axes()).toPoint()
+    qtbot.mousePress(string, LEFT, pos=at)
+    for moved in range(5):
+        qtbot.mouseMove(string, at + QPoint(10 * moved, 5 * moved))
+    qtbot.mouseRelease(string, LEFT, pos=at + QPoint(40, 20))
+    plucked = session.choices
+    assert plucked.position > start.position
+    knob = window.transport.knobs["width"]
+    qtbot.mousePress(knob, LEFT, pos=QPoint(30, 40))
+    for moved in range(3):
+        qtbot.mouseMove(knob, QPoint(30, 35 - 5 * moved))
+    qtbot.mouseRelease(knob, LEFT, pos=QPoint(30, 25))
+    assert session.choices.width > plucked.width
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert session.choices == plucked
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert session.choices == start
+    assert knob.value == start.width
+    redo = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    qtbot.keyClick(window, Qt.Key.Key_Z, redo)
+    assert session.choices == plucked
+    assert string._pluck.position == plucked.position
+
+
 def test_keys(qtbot: QtBot, controller: Controller) -> None:
     window, session, string = controller.window, controller.session, view(controller, "string")
     wait_for_take(qtbot, controller)
