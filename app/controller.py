@@ -13,12 +13,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
 from app.history import History
+from app.keyboard import KeyPress, Reach, play
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
 from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
@@ -26,6 +28,7 @@ from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
 from app.views.export_dialog import ExportDialog
+from app.views.playing_keys import PlayingKeys
 from engine.metrics import ErrorSums
 
 LEFT: tuple[type[Panel], ...] = (SpectrumPanel,)
@@ -144,6 +147,8 @@ class Controller(QObject):
         window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
         window.audio_menu.aboutToShow.connect(self._fill_audio_menu)
         window.closing.connect(self.close)
+        self._keys = PlayingKeys(window)
+        self._keys.pressed.connect(self._press_key)
         self._mail.started.connect(self._take_started)
         self._mail.replaced.connect(self._track_replaced)
         self._mail.finished.connect(self._take_finished)
@@ -177,6 +182,22 @@ class Controller(QObject):
             return  # the rendering is on its way, and begins to sound when it starts
         if self._load(stage.track, keep_position=False):
             self._begin()
+
+    def perform(self, changes: dict[str, Any], plucks: bool) -> None:
+        """What an instrument says, a keyboard or MIDI: new values of `Choices`, and a pluck."""
+        self.session.update(**changes)
+        if plucks:
+            self.pluck()
+
+    @property
+    def reach(self) -> Reach:
+        """Where and how hard instruments pluck."""
+        return Reach.of(self.entry.info if self.entry else None)
+
+    def _press_key(self, press: KeyPress) -> None:
+        played = play(press, self.reach, self.session.choices.amplitude_mm)
+        if played is not None:
+            self.perform(played.changes, played.plucks)
 
     def play_or_stop(self) -> None:
         if self.player.status().playing:

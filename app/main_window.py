@@ -26,7 +26,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
     ("Return", "pluck_asked", "pluck"),
     ("X", "switch_asked", "switch between model and truth at the playhead"),
-    ("L", "loop_asked", "loop"),
+    ("Ctrl+L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
     ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
@@ -36,6 +36,12 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+E", "export_asked", "export WAV"),
     ("F1", "help_asked", "these keys"),
     ("Ctrl+Q", "quit_asked", "quit"),
+)
+
+PLAYED_KEYS = (  # see `app/keyboard.py`
+    ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
+    ("1 … 9", "how hard, from softest to loudest (not while a knob has the keyboard)"),
+    ("C   V", "softer, harder"),
 )
 
 
@@ -135,7 +141,8 @@ class MainWindow(QMainWindow):
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
 
     def show_help(self) -> None:
-        rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, _, what in KEYS)
+        table = [*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)]
+        rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, what in table)
         QMessageBox.information(
             self,
             "Keys",

@@ -123,7 +123,7 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     qtbot.keyClick(window, Qt.Key.Key_X)
     assert session.choices.heard == "truth"
     qtbot.waitUntil(lambda: controller.player.status().source == "truth", timeout=5_000)
-    qtbot.keyClick(window, Qt.Key.Key_L)
+    qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert session.choices.loop
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: not controller.player.status().playing, timeout=5_000)
@@ -133,6 +133,29 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     assert session.choices.amplitude_mm == 4.5
     qtbot.keyClick(string, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     assert session.choices.listen == pytest.approx(0.36)
+
+
+def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> None:
+    window, session = controller.window, controller.session
+    wait_for_take(qtbot, controller)
+    plucks: list[float] = []
+    pluck = controller.pluck
+    controller.pluck = lambda: (plucks.append(session.choices.position), pluck())  # type: ignore[method-assign]
+    for key in (Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L):
+        qtbot.keyClick(window, key)
+    assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.3 + 0.4 * 8 / 9])
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.keyClick(window, Qt.Key.Key_9)
+    assert session.choices.amplitude_mm == pytest.approx(10)
+    qtbot.keyClick(window, Qt.Key.Key_C)
+    assert 7 < session.choices.amplitude_mm < 8
+    assert len(plucks) == 5
+    knob = window.transport.knobs["seconds"]
+    qtbot.keyClicks(knob, "2")
+    assert knob._editor is not None
+    qtbot.keyClicks(knob._editor, "as")  # writes
+    assert (knob._editor.text(), len(plucks)) == ("2as", 5)
+    assert 7 < session.choices.amplitude_mm < 8
 
 
 def test_presets_are_stepped_and_chosen(qtbot: QtBot, controller: Controller) -> None:
