@@ -23,12 +23,16 @@ from app.history import History
 from app.keyboard import KeyPress, Reach, play
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
+from app.midi import MidiChoices
+from app.midi_control import MidiControl
 from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
 from app.views.export_dialog import ExportDialog
+from app.views.knob import Knob
 from app.views.playing_keys import PlayingKeys
+from app.views.string_view import StringView
 from engine.metrics import ErrorSums
 
 LEFT: tuple[type[Panel], ...] = (SpectrumPanel,)
@@ -101,6 +105,8 @@ class Controller(QObject):
             self.session.update(preset=first.name)
         self.history = History(self.session)
         self._connect_history()
+        self.midi = MidiControl(settings.midi, lambda: self.reach, lambda: self.library.names, self)
+        self._connect_midi()
         for problem in problems:
             self.window.notices.tell(problem)
         self._choices_shown(frozenset(type(self.session.choices).model_fields))
@@ -161,10 +167,21 @@ class Controller(QObject):
         window.redo_asked.connect(history.redo)
         window.motion_asked.connect(lambda: session.update(motion=not session.choices.motion))
         window.envelope_asked.connect(lambda: session.update(envelope=not session.choices.envelope))
-        string = next(panel.view for panel in self.panels if isinstance(panel, StringPanel))
-        for dragged in (string, *window.transport.knobs.values()):
+        strings = (panel.view for panel in self.panels if isinstance(panel, StringPanel))
+        draggable: list[StringView | Knob] = [*strings, *window.transport.knobs.values()]
+        for dragged in draggable:
             dragged.drag_started.connect(history.hold)
             dragged.drag_ended.connect(history.let_go)
+
+    def _connect_midi(self) -> None:
+        self.midi.performed.connect(self.perform)
+        self.midi.told.connect(self.window.notices.tell)
+        self.midi.choices_changed.connect(self._remember_midi)
+        self.window.midi_asked.connect(lambda: self.midi.show_dialog(self.window))
+        self.midi.start()
+
+    def _remember_midi(self, choices: MidiChoices) -> None:
+        self._settings = self._settings.model_copy(update={"midi": choices})
 
     def _change(self, field: str, value: object) -> None:
         try:
@@ -231,6 +248,7 @@ class Controller(QObject):
             save_settings(self._settings_path, self._settings)
         except OSError as error:
             self.window.notices.tell(f"The settings {self._settings_path} cannot be written ({error.strerror}).")
+        self.midi.close()
         for panel in self.panels:
             panel.close()
         self.worker.close()

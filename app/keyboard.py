@@ -49,7 +49,7 @@ class Reach:
     def place(self, share: float) -> float:
         """The position at 0 … 1 of the keys."""
         low, high = self.position
-        return low + min(max(share, 0.0), 1.0) * (high - low)
+        return min(low + min(max(share, 0.0), 1.0) * (high - low), high)
 
     def amplitude_of(self, velocity: int) -> float:
         """Velocity 1 … 127 to an amplitude in mm: equal steps in dB."""

@@ -34,6 +34,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("M", "motion_asked", "show or hide the string's motion"),
     ("E", "envelope_asked", "show or hide the envelope of the motion"),
     ("Ctrl+E", "export_asked", "export WAV"),
+    ("Ctrl+M", "midi_asked", "MIDI"),
     ("F1", "help_asked", "these keys"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
@@ -59,6 +60,7 @@ class MainWindow(QMainWindow):
     motion_asked = Signal()
     envelope_asked = Signal()
     export_asked = Signal()
+    midi_asked = Signal()
     help_asked = Signal()
     quit_asked = Signal()
     closing = Signal()
@@ -82,6 +84,8 @@ class MainWindow(QMainWindow):
         self._audio_button = tool_button("Audio ▾", "Audio device", "Choose where the sound goes")
         self._audio_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self._audio_button.setMenu(self.audio_menu)
+        self._midi_button = tool_button("MIDI …", "MIDI", "Play with a MIDI keyboard, and teach its controllers")
+        self._midi_button.clicked.connect(self.midi_asked)
         self._lay_out()
         for key, signal, _ in KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
@@ -101,6 +105,7 @@ class MainWindow(QMainWindow):
         head.addStretch(1)
         head.addWidget(self.rate_label)
         head.addWidget(self._audio_button)
+        head.addWidget(self._midi_button)
         facts = QHBoxLayout()
         facts.addWidget(self.presets.card)
         facts.addStretch(1)

@@ -9,6 +9,7 @@ from typing import Literal
 from platformdirs import user_config_path
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from app.midi import MidiChoices
 from app.session import Choices
 from engine.whole_file import whole_file
 
@@ -44,6 +45,7 @@ class Settings(BaseModel):
     choices: Choices = Choices()
     export: ExportChoices = ExportChoices()
     device: DeviceChoice | None = None
+    midi: MidiChoices = MidiChoices()
     window_geometry: str = ""  # Qt's, in base64
 
 

@@ -158,6 +158,19 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     assert 7 < session.choices.amplitude_mm < 8
 
 
+def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
+    wait_for_take(qtbot, controller)
+    controller.midi.performed.emit({"position": 0.6, "amplitude_mm": 8.0}, True)
+    assert (controller.session.choices.position, controller.session.choices.amplitude_mm) == (0.6, 8.0)
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.keyClick(controller.window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
+    assert controller.midi._dialog is not None
+    assert controller.midi._dialog.isVisible()
+    controller.midi._remember(controller.midi.choices.learned("width", 74))
+    controller.window.close()
+    assert load_settings(tmp_path / "settings.json")[0].midi.controllers == {"width": 74}
+
+
 def test_presets_are_stepped_and_chosen(qtbot: QtBot, controller: Controller) -> None:
     assert controller.session.choices.preset == "first"
     qtbot.keyClick(controller.window, Qt.Key.Key_PageDown)
