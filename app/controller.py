@@ -13,25 +13,21 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
 from app.history import History
-from app.keyboard import KeyPress, Reach, play
+from app.instruments import Instruments
 from app.library import Library, PresetEntry, list_presets
 from app.main_window import MainWindow
-from app.midi import MidiChoices
-from app.midi_control import MidiControl
 from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
 from app.views.export_dialog import ExportDialog
 from app.views.knob import Knob
-from app.views.playing_keys import PlayingKeys
 from app.views.string_view import StringView
 from engine.metrics import ErrorSums
 
@@ -105,8 +101,10 @@ class Controller(QObject):
             self.session.update(preset=first.name)
         self.history = History(self.session)
         self._connect_history()
-        self.midi = MidiControl(settings.midi, lambda: self.reach, lambda: self.library.names, self)
-        self._connect_midi()
+        self.instruments = Instruments(window, self.session, self.library, settings.midi)
+        self.instruments.plucked.connect(self.pluck)
+        self.instruments.told.connect(window.notices.tell)
+        self.instruments.start()
         for problem in problems:
             self.window.notices.tell(problem)
         self._choices_shown(frozenset(type(self.session.choices).model_fields))
@@ -153,8 +151,6 @@ class Controller(QObject):
         window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
         window.audio_menu.aboutToShow.connect(self._fill_audio_menu)
         window.closing.connect(self.close)
-        self._keys = PlayingKeys(window)
-        self._keys.pressed.connect(self._press_key)
         self._mail.started.connect(self._take_started)
         self._mail.replaced.connect(self._track_replaced)
         self._mail.finished.connect(self._take_finished)
@@ -173,16 +169,6 @@ class Controller(QObject):
             dragged.drag_started.connect(history.hold)
             dragged.drag_ended.connect(history.let_go)
 
-    def _connect_midi(self) -> None:
-        self.midi.performed.connect(self.perform)
-        self.midi.told.connect(self.window.notices.tell)
-        self.midi.choices_changed.connect(self._remember_midi)
-        self.window.midi_asked.connect(lambda: self.midi.show_dialog(self.window))
-        self.midi.start()
-
-    def _remember_midi(self, choices: MidiChoices) -> None:
-        self._settings = self._settings.model_copy(update={"midi": choices})
-
     def _change(self, field: str, value: object) -> None:
         try:
             self.session.update(**{field: value})
@@ -199,22 +185,6 @@ class Controller(QObject):
             return  # the rendering is on its way, and begins to sound when it starts
         if self._load(stage.track, keep_position=False):
             self._begin()
-
-    def perform(self, changes: dict[str, Any], plucks: bool) -> None:
-        """What an instrument says, a keyboard or MIDI: new values of `Choices`, and a pluck."""
-        self.session.update(**changes)
-        if plucks:
-            self.pluck()
-
-    @property
-    def reach(self) -> Reach:
-        """Where and how hard instruments pluck."""
-        return Reach.of(self.entry.info if self.entry else None)
-
-    def _press_key(self, press: KeyPress) -> None:
-        played = play(press, self.reach, self.session.choices.amplitude_mm)
-        if played is not None:
-            self.perform(played.changes, played.plucks)
 
     def play_or_stop(self) -> None:
         if self.player.status().playing:
@@ -242,13 +212,17 @@ class Controller(QObject):
         """Saves the choices and ends every thread."""
         self._timer.stop()
         self._settings = self._settings.model_copy(
-            update={"choices": self.session.choices, "window_geometry": self.window.geometry_text()}
+            update={
+                "choices": self.session.choices,
+                "midi": self.instruments.midi.choices,
+                "window_geometry": self.window.geometry_text(),
+            }
         )
         try:
             save_settings(self._settings_path, self._settings)
         except OSError as error:
             self.window.notices.tell(f"The settings {self._settings_path} cannot be written ({error.strerror}).")
-        self.midi.close()
+        self.instruments.close()
         for panel in self.panels:
             panel.close()
         self.worker.close()

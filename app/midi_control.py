@@ -17,11 +17,14 @@ from app.views.midi_dialog import MidiDialog
 
 
 class MidiControl(QObject):
-    """`performed` asks for new values of `Choices` and whether the string is plucked; `told` is for the user."""
+    """`performed` asks for new values of `Choices` and whether the string is plucked; `told` is for the user.
+
+    Attributes:
+        choices: what is to be remembered.
+    """
 
     performed = Signal(dict, bool)
     told = Signal(str)
-    choices_changed = Signal(object)  # `MidiChoices`, to be remembered
     _received = Signal(object)  # emitted in mido's thread
 
     def __init__(
@@ -102,7 +105,6 @@ class MidiControl(QObject):
     def _remember(self, choices: MidiChoices) -> None:
         self.choices = choices
         self._show_choices()
-        self.choices_changed.emit(choices)
 
     # Messages, in the window's thread
 

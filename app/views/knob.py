@@ -194,7 +194,7 @@ class Knob(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        ink = QColor(theme.TEXT if self.isEnabled() else theme.LINE)
+        ink = QColor(theme.TEXT if self.isEnabled() else theme.DISABLED)
         if self.hasFocus():
             painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QDialog,
-    QDialogButtonBox,
     QFormLayout,
     QGridLayout,
     QLabel,
@@ -60,9 +59,10 @@ class MidiDialog(QDialog):
         heading.setObjectName("faint")
         column.addWidget(heading)
         column.addLayout(self._build_rows(turned))
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(self.reject)
-        column.addWidget(buttons)
+        close = QPushButton("Close")
+        close.setAutoDefault(False)
+        close.clicked.connect(self.reject)
+        column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
 
     def _build_rows(self, turned: Mapping[str, str]) -> QGridLayout:
         grid = QGridLayout()

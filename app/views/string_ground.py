@@ -22,8 +22,12 @@ class TrainedPlucks:
     amplitude_mm: tuple[float, float] | None = None
 
 
-def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, plucking: bool) -> None:
-    """All of it. Amplitudes are shaded only while the pluck is shown: a string that moves crosses them all."""
+def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
+    """All of it.
+
+    `pluck`: the half of the string where it is, 0 or 1, while it is shown. Only then are amplitudes shaded, for a
+    string in motion crosses them all.
+    """
     gradient = QLinearGradient(0, 0, 0, axes.height)
     gradient.setColorAt(0, QColor("#171b22"))
     gradient.setColorAt(1, QColor("#0f1216"))
@@ -34,8 +38,8 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
     _paint_scale(painter, axes)
     if trained.position is not None:
         _paint_untrained_positions(painter, axes, trained.position)
-    if plucking and trained.amplitude_mm is not None:
-        _paint_untrained_amplitudes(painter, axes, trained)
+    if pluck is not None and trained.amplitude_mm is not None:
+        _paint_untrained_amplitudes(painter, axes, trained, pluck)
 
 
 def paint_grid(painter: QPainter, axes: StringAxes) -> None:
@@ -59,6 +63,24 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
             f"{share * axes.span_mm:+g}" if share else "0 mm",
         )
+
+
+def paint_legend(painter: QPainter, heard: str, warning: str, right: float) -> None:
+    """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`."""
+    painter.setFont(theme.small_font(12, bold=True))
+    x = float(MARGIN_X)
+    for name in ("model", "truth"):
+        painter.setPen(QPen(theme.translucent(theme.SOURCE_COLOURS[name], 255 if name == heard else 150), 3))
+        painter.drawLine(QPointF(x, 18), QPointF(x + 18, 18))
+        text = f"{name} (heard)" if name == heard else name
+        painter.drawText(QPointF(x + 24, 22), text)
+        x += 44 + painter.fontMetrics().horizontalAdvance(text)
+    if warning:
+        painter.setPen(QColor(theme.WARNING))
+        painter.setFont(theme.small_font(11))
+        room = max(0, int(right - x - 8))
+        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, room)
+        painter.drawText(QPointF(x + 8, 22), text)
 
 
 def _shade(painter: QPainter, area: QRectF) -> None:
@@ -85,10 +107,11 @@ def _paint_untrained_positions(painter: QPainter, axes: StringAxes, trained: tup
             painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
 
 
-def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: TrainedPlucks) -> None:
+def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int) -> None:
     assert trained.amplitude_mm is not None
     low_mm, high_mm = trained.amplitude_mm
     left, right = trained.position or (0.0, 1.0)  # beside them it is shaded already
+    free = Qt.AlignmentFlag.AlignLeft if pluck else Qt.AlignmentFlag.AlignRight
     for bottom_mm, top_mm, text in (
         (0.0, min(low_mm, axes.span_mm), f"not trained below {low_mm:g} mm"),
         (high_mm, axes.span_mm, f"not trained above {high_mm:g} mm"),
@@ -100,6 +123,4 @@ def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: Tr
         if area.height() >= LINE_HEIGHT:
             painter.setFont(theme.small_font(11))
             painter.setPen(theme.translucent(theme.TEXT, 190))
-            painter.drawText(
-                area.adjusted(8, 0, -8, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text
-            )
+            painter.drawText(area.adjusted(8, 0, -8, 0), free | Qt.AlignmentFlag.AlignVCenter, text)

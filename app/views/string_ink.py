@@ -156,3 +156,12 @@ def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, 
     painter.setPen(QColor(theme.GOOD))
     painter.setFont(theme.small_font(11))
     painter.drawText(QRectF(x - 60, y + 16, 120, 18), Qt.AlignmentFlag.AlignCenter, f"{label} {position:.2f}")
+
+
+def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
+    """The moment, in the corner of the picture."""
+    painter.setFont(theme.small_font(12))
+    painter.setPen(QColor(theme.WARNING if frame.past_horizon else theme.TEXT))
+    area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
+    text = frame.caption + ("   past training" if frame.past_horizon else "")
+    painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)

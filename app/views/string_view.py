@@ -24,10 +24,11 @@ from PySide6.QtWidgets import QApplication, QSizePolicy, QToolButton, QWidget
 from app.views import theme
 from app.views.parts import tool_button
 from app.views.string_axes import MARGIN_X, StringAxes
-from app.views.string_ground import TrainedPlucks, paint_ground
+from app.views.string_ground import TrainedPlucks, paint_ground, paint_legend
 from app.views.string_ink import (
     ShownPluck,
     StringFrame,
+    paint_caption,
     paint_ends,
     paint_handle,
     paint_listening_point,
@@ -336,7 +337,7 @@ class StringView(QWidget):
         grabbed = "pluck" in (self._drag, self._hovered)
         paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
         if self._frame is not None and not self._shows_pluck:
-            self._paint_caption(painter, axes, self._frame)
+            paint_caption(painter, axes, self._frame)
         if self.hasFocus():
             painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -344,40 +345,16 @@ class StringView(QWidget):
 
     def _ground(self, axes: StringAxes) -> QPixmap:
         """The picture behind the string, painted anew only when something in it changes."""
-        key = (axes, self.devicePixelRatioF(), self._trained, self._shows_pluck, self._heard, self._warning)
+        pluck = round(self._pluck.position) if self._shows_pluck else None  # on which side words would be in its way
+        key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._heard, self._warning)
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF())
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
             pixmap.fill(QColor(theme.BACKGROUND))
             painter = QPainter(pixmap)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint_ground(painter, axes, self._trained, self._shows_pluck)
-            self._paint_words(painter)
+            paint_ground(painter, axes, self._trained, pluck)
+            paint_legend(painter, self._heard, self._warning, self._toggles[0].x() - 14)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
         return self._ground_pixmap
-
-    def _paint_words(self, painter: QPainter) -> None:
-        painter.setFont(theme.small_font(12, bold=True))
-        x = float(MARGIN_X)
-        for name in ("model", "truth"):
-            heard = name == self._heard
-            colour = theme.translucent(theme.SOURCE_COLOURS[name], 255 if heard else 150)
-            painter.setPen(QPen(colour, 3))
-            painter.drawLine(QPointF(x, 18), QPointF(x + 18, 18))
-            text = f"{name} (heard)" if heard else name
-            painter.drawText(QPointF(x + 24, 22), text)
-            x += 44 + painter.fontMetrics().horizontalAdvance(text)
-        if self._warning:
-            painter.setPen(QColor(theme.WARNING))
-            painter.setFont(theme.small_font(11))
-            room = self._toggles[0].x() - x - 22
-            text = painter.fontMetrics().elidedText(self._warning, Qt.TextElideMode.ElideRight, max(0, int(room)))
-            painter.drawText(QPointF(x + 8, 22), text)
-
-    def _paint_caption(self, painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
-        painter.setFont(theme.small_font(12))
-        painter.setPen(QColor(theme.WARNING if frame.past_horizon else theme.TEXT))
-        area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
-        text = frame.caption + ("   past training" if frame.past_horizon else "")
-        painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)

@@ -12,6 +12,7 @@ RAISED = "#1d2129"
 LINE = "#2b313c"
 TEXT = "#d8dde6"
 FAINT = "#8a93a3"
+DISABLED = "#555d6b"
 MODEL = "#ffb03a"  # what the model says is amber, everywhere
 TRUTH = "#4cc3e8"  # and the physics blue
 WARNING = "#ff6b5e"
@@ -36,7 +37,7 @@ QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {TEXT}; }}
 QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus
     {{ border: 1px solid {TEXT}; }}
-QPushButton:disabled, QToolButton:disabled {{ color: {LINE}; }}
+QPushButton:disabled, QToolButton:disabled {{ color: {DISABLED}; }}
 QPushButton#model:checked {{ background: {MODEL}; color: {BACKGROUND}; border-color: {MODEL}; font-weight: 600; }}
 QPushButton#truth:checked {{ background: {TRUTH}; color: {BACKGROUND}; border-color: {TRUTH}; font-weight: 600; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
@@ -45,7 +46,7 @@ QToolButton::menu-indicator {{ image: none; }}
 QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}
 QToolButton#chip:checked {{ color: {TEXT}; background: {LINE}; border-color: {LINE}; }}
 QToolButton#chip:hover, QToolButton#chip:focus {{ border-color: {FAINT}; }}
-QToolButton#chip:disabled {{ color: {LINE}; }}
+QToolButton#chip:disabled {{ color: {DISABLED}; }}
 QComboBox, QLineEdit, QDoubleSpinBox {{
     background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;
     selection-background-color: {TRUTH}; selection-color: {BACKGROUND}; }}

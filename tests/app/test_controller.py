@@ -139,8 +139,7 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     window, session = controller.window, controller.session
     wait_for_take(qtbot, controller)
     plucks: list[float] = []
-    pluck = controller.pluck
-    controller.pluck = lambda: (plucks.append(session.choices.position), pluck())  # type: ignore[method-assign]
+    controller.instruments.plucked.connect(lambda: plucks.append(session.choices.position))
     for key in (Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L):
         qtbot.keyClick(window, key)
     assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.3 + 0.4 * 8 / 9])
@@ -160,13 +159,14 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
 
 def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
     wait_for_take(qtbot, controller)
-    controller.midi.performed.emit({"position": 0.6, "amplitude_mm": 8.0}, True)
+    midi = controller.instruments.midi
+    midi.performed.emit({"position": 0.6, "amplitude_mm": 8.0}, True)
     assert (controller.session.choices.position, controller.session.choices.amplitude_mm) == (0.6, 8.0)
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
     qtbot.keyClick(controller.window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
-    assert controller.midi._dialog is not None
-    assert controller.midi._dialog.isVisible()
-    controller.midi._remember(controller.midi.choices.learned("width", 74))
+    assert midi._dialog is not None
+    assert midi._dialog.isVisible()
+    midi._remember(midi.choices.learned("width", 74))
     controller.window.close()
     assert load_settings(tmp_path / "settings.json")[0].midi.controllers == {"width": 74}
 

@@ -112,7 +112,7 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     assert midi.choices.port == "Pads:Pads 24:0"
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
     assert "move" in taught.text()
-    with qtbot.waitSignal(midi.choices_changed, timeout=5_000):
+    with qtbot.waitSignal(midi.performed, timeout=5_000):
         backend.send("control_change", control=74, value=127)
     assert midi.choices.controllers == {"width": 74}
     assert taught.text() == "controller 74"
