@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
@@ -15,6 +15,7 @@ SWEEP_DEGREES = 270
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
+TIP_ABOVE = 44  # pixels: the value while dragging stands above the knob, out of the way of the hand
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class Knob(QWidget):
         self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
         self._dragged_at = event.position()
         self.value_asked.emit(self.limits.value(self._dragged_share))
-        QToolTip.showText(event.globalPosition().toPoint(), self.text, self)
+        QToolTip.showText(self.mapToGlobal(QPoint(0, -TIP_ABOVE)), self.text, self)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self._dragged_at is not None and event.button() == Qt.MouseButton.LeftButton:
