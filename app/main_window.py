@@ -152,8 +152,8 @@ class MainWindow(QMainWindow):
             self,
             "Keys",
             f"<table>{rows}</table>"
-            "<p>On the string: arrow keys move the pluck, with Shift the listening point (Ctrl+Shift: the right one), "
-            "with Ctrl width and shape; Delete resets the pluck, Shift+Delete the listening point.</p>"
+            "<p>On the string: arrow keys move the pluck, with Shift the listening point (Ctrl+Shift: the right "
+            "one), with Ctrl width and shape; Delete resets the pluck, Shift+Delete the listening point.</p>"
             "<p>On a knob: arrow keys or wheel, Shift is finer, Page up and down are coarse, Home and End; "
             "or type a number; Delete or a double-click resets.</p>",
         )
