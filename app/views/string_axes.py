@@ -63,22 +63,21 @@ class StringAxes:
     def curve(self, displacement_mm: NDArray[np.floating]) -> QPolygonF:
         """A line through (points,) displacements from end to end."""
         polygon = create_qpolygonf(len(displacement_mm))
-        self._fill(ndarray_from_qpolygonf(polygon), displacement_mm)
-        return polygon
-
-    def band(self, lowest_mm: NDArray[np.floating], highest_mm: NDArray[np.floating]) -> QPolygonF:
-        """The area between two lines."""
-        points = len(lowest_mm)
-        polygon = create_qpolygonf(2 * points)
         corners = ndarray_from_qpolygonf(polygon)
-        self._fill(corners[:points], lowest_mm)
-        self._fill(corners[points:], highest_mm)
-        corners[points:] = corners[points:][::-1].copy()
-        return polygon
-
-    def _fill(self, corners: NDArray[np.float64], displacement_mm: NDArray[np.floating]) -> None:
         corners[:, 0] = _places(self.x(0), self.x(1), len(corners))
         corners[:, 1] = self.middle - displacement_mm * (self.half_height / self.span_mm)
+        return polygon
+
+    def band(
+        self, lowest_mm: NDArray[np.floating], highest_mm: NDArray[np.floating]
+    ) -> tuple[QPolygonF, QPolygonF, QPolygonF]:
+        """The area between two lines, and both lines."""
+        low, high = self.curve(lowest_mm), self.curve(highest_mm)
+        area = create_qpolygonf(len(low) + len(high))
+        corners = ndarray_from_qpolygonf(area)
+        corners[: len(low)] = ndarray_from_qpolygonf(low)
+        corners[len(low) :] = ndarray_from_qpolygonf(high)[::-1]
+        return area, low, high
 
 
 @lru_cache(maxsize=4)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPen
 
 from app.views import theme
@@ -45,12 +46,14 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
 def paint_grid(painter: QPainter, axes: StringAxes) -> None:
     """Tenths of the string and the scale's lines."""
     painter.setPen(QPen(theme.translucent(theme.LINE, 120), 1))
-    for tenth in range(11):
-        x = round(axes.x(tenth / 10)) + 0.5
-        painter.drawLine(QPointF(x, axes.top), QPointF(x, axes.bottom))
-    for share in SCALE:
-        y = round(axes.middle - share * axes.half_height) + 0.5
-        painter.drawLine(QPointF(axes.x(0), y), QPointF(axes.x(1), y))
+    painter.drawLines(_grid(axes))
+
+
+@lru_cache(maxsize=2)
+def _grid(axes: StringAxes) -> list[QLineF]:
+    xs = [round(axes.x(tenth / 10)) + 0.5 for tenth in range(11)]
+    ys = [round(axes.middle - share * axes.half_height) + 0.5 for share in SCALE]
+    return [QLineF(x, axes.top, x, axes.bottom) for x in xs] + [QLineF(axes.x(0), y, axes.x(1), y) for y in ys]
 
 
 def _paint_scale(painter: QPainter, axes: StringAxes) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,12 +80,13 @@ def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, stre
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.blended(colour, theme.PANEL, strength))
-    painter.drawPolygon(axes.band(*band))
+    area, *edges = axes.band(*band)
+    painter.drawPolygon(area)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(theme.blended(colour, theme.PANEL, 3 * strength), 1))
-    for edge in band:
-        painter.drawPolyline(axes.curve(edge))
+    for edge in edges:
+        painter.drawPolyline(edge)
 
 
 def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
@@ -146,8 +148,7 @@ def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, 
     x = axes.x(position)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if grabbed else 120), 1))
-    starts = range(round(axes.top), round(axes.bottom) - DASH, 2 * DASH)  # a dashed pen is a hundred times slower
-    painter.drawLines([QLine(round(x), y, round(x), y + DASH) for y in starts])
+    painter.drawLines(_dashes(round(x), round(axes.top), round(axes.bottom)))
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
     painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.GOOD))
@@ -165,3 +166,9 @@ def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> No
     area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
     text = frame.caption + ("   past training" if frame.past_horizon else "")
     painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+@lru_cache(maxsize=4)
+def _dashes(x: int, top: int, bottom: int) -> list[QLine]:
+    """A vertical line of dashes: a pen that dashes is a hundred times slower."""
+    return [QLine(x, y, x, y + DASH) for y in range(top, bottom - DASH, 2 * DASH)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import pyqtgraph as pg
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication
@@ -102,6 +104,7 @@ def small_font(size: int = 11, bold: bool = False) -> QFont:
     return font
 
 
+@lru_cache(maxsize=64)
 def blended(colour: str, ground: str, share: float) -> QColor:
     """`colour` over `ground` as an opaque colour, which is several times faster to fill than a translucent one."""
     over, under = QColor(colour), QColor(ground)
