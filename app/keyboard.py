@@ -8,9 +8,12 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE
-from engine.preset import PresetInfo
+
+if TYPE_CHECKING:
+    from engine.preset import PresetInfo  # and torch with it, which settings are read without
 
 PLACES = 10
 ANYWHERE = (0.05, 0.95)  # of a model without trained positions

@@ -42,6 +42,15 @@ GRAB_PIXELS = 14  # how near a handle or a marker counts as on it
 FINE = 0.1  # with Shift
 WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
 
+MARKER_TIP = "Drag to hear the string from another point; double-click resets. Shift and arrow keys move it"
+TIPS: dict[str | None, str] = {  # by what the pointer is on
+    None: "Drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
+    "pluck": "Drag along the string for the place, up and down for the amplitude; double-click resets.\n"
+    "The wheel sets the width, with Shift the shape. Arrow keys do the same, with Ctrl for width and shape",
+    "left": MARKER_TIP,
+    "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
+}
+
 _Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
 
@@ -68,12 +77,7 @@ class StringView(QWidget):
         self.setMouseTracking(True)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName("String")
-        self.setToolTip(
-            "Drag the string to pluck it (Shift is finer); the wheel over the handle sets its width, with Shift its "
-            "shape.\nDrag a marker below to move a listening point. Double-click resets a handle or a marker.\n"
-            "Arrow keys move the pluck, with Shift the listening point, with Ctrl width and shape; Delete resets; "
-            "Enter plucks"
-        )
+        self.setToolTip(TIPS[None])
         self._frame: StringFrame | None = None
         self._pluck = ShownPluck(0.35, 4.0, np.zeros(2))
         self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
@@ -275,6 +279,7 @@ class StringView(QWidget):
         self.setCursor(cursors.get(on, Qt.CursorShape.SizeHorCursor))
         if on != self._hovered:
             self._hovered = on
+            self.setToolTip(TIPS[on])
             self.update()
 
     def _under(self, at: QPointF) -> str | None:

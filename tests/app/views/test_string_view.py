@@ -118,6 +118,16 @@ def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot: QtBot, view:
     assert (len(resets), len(plucks)) == (1, 3)
 
 
+def test_the_pointer_tells_what_can_be_grabbed(qtbot: QtBot, view: StringView) -> None:
+    shapes, tips = set(), set()
+    axes = view._axes()
+    for at in (QPoint(200, 200), handle(view), QPoint(round(axes.x(0.37)), int(axes.bottom) + 8)):
+        qtbot.mouseMove(view, at)
+        shapes.add(view.cursor().shape())
+        tips.add(view.toolTip())
+    assert len(shapes) == len(tips) == 3
+
+
 def test_two_markers_are_told_apart_and_reset(qtbot: QtBot, view: StringView) -> None:
     view.set_listening_points(0.2, 0.6)
     moved, resets = recorded(view.listening_point_moved), recorded(view.listening_point_reset)
