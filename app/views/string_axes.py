@@ -73,10 +73,10 @@ class StringAxes:
     ) -> tuple[QPolygonF, QPolygonF, QPolygonF]:
         """The area between two lines, and both lines."""
         low, high = self.curve(lowest_mm), self.curve(highest_mm)
-        area = create_qpolygonf(len(low) + len(high))
+        area = create_qpolygonf(low.size() + high.size())
         corners = ndarray_from_qpolygonf(area)
-        corners[: len(low)] = ndarray_from_qpolygonf(low)
-        corners[len(low) :] = ndarray_from_qpolygonf(high)[::-1]
+        corners[: low.size()] = ndarray_from_qpolygonf(low)
+        corners[low.size() :] = ndarray_from_qpolygonf(high)[::-1]
         return area, low, high
 
 
