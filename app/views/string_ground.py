@@ -26,7 +26,7 @@ class TrainedPlucks:
 def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
     """All of it.
 
-    `pluck`: the half of the string where it is, 0 or 1, while it is shown. Only then are amplitudes shaded, for a
+    `pluck`: 0 or 1, towards which end of the string it is, while it is shown. Only then are amplitudes shaded, for a
     string in motion crosses them all.
     """
     gradient = QLinearGradient(0, 0, 0, axes.height)

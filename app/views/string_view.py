@@ -350,7 +350,8 @@ class StringView(QWidget):
 
     def _ground(self, axes: StringAxes) -> QPixmap:
         """The picture behind the string, painted anew only when something in it changes."""
-        pluck = round(self._pluck.position) if self._shows_pluck else None  # on which side words would be in its way
+        # on which side words would be in the way of the pluck, with the words at its handle
+        pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
         key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._heard, self._warning)
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF())
