@@ -22,8 +22,10 @@ from app.abx.subject import subject_of
 from app.appearance import Appearance
 from app.audio import AudioProblem, Player, Track
 from app.audio_control import AudioControl
+from app.history import History
+from app.instruments import Instruments
 from app.library import Library, PresetEntry, list_presets
-from app.main_window import KEYS, MainWindow
+from app.main_window import KEYS, PLAYED_KEYS, MainWindow
 from app.panels import (
     ComparePanel,
     EigenvaluesPanel,
@@ -45,6 +47,8 @@ from app.views.about_dialog import AboutDialog
 from app.views.abx_dialog import AbxDialog
 from app.views.export_dialog import ExportDialog
 from app.views.help_dialog import HelpDialog
+from app.views.knob import Knob
+from app.views.string_view import StringView
 from engine.metrics import ErrorSums
 from engine.preset import SHIPPED
 
@@ -119,6 +123,12 @@ class Controller(QObject):
         self._connect()
         if self.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)
+        self.history = History(self.session)
+        self._connect_history()
+        self.instruments = Instruments(window, self.session, self.library, settings.midi)
+        self.instruments.plucked.connect(self.pluck)
+        self.instruments.told.connect(window.notices.tell)
+        self.instruments.start()
         for problem in problems:
             self.window.notices.tell(problem)
         self._choices_shown(frozenset(type(self.session.choices).model_fields))
@@ -172,6 +182,18 @@ class Controller(QObject):
         self._mail.finished.connect(self._take_finished)
         self._mail.failed.connect(self._render_failed)
         self._mail.audio_problem.connect(self.audio.tell)
+
+    def _connect_history(self) -> None:
+        window, session, history = self.window, self.session, self.history
+        window.undo_asked.connect(history.undo)
+        window.redo_asked.connect(history.redo)
+        window.motion_asked.connect(lambda: session.update(motion=not session.choices.motion))
+        window.envelope_asked.connect(lambda: session.update(envelope=not session.choices.envelope))
+        strings = (panel.view for panel in self.panels if isinstance(panel, StringPanel))
+        draggable: list[StringView | Knob] = [*strings, *window.transport.knobs.values()]
+        for dragged in draggable:
+            dragged.drag_started.connect(history.hold)
+            dragged.drag_ended.connect(history.let_go)
 
     def _change(self, field: str, value: object) -> None:
         try:
@@ -236,7 +258,7 @@ class Controller(QObject):
     def show_help(self) -> None:
         if self._help is None:
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
-            self._help = HelpDialog([(key, what) for key, _, what in KEYS], views, self.window)
+            self._help = HelpDialog([*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)], views, self.window)
         self._help.show()
         self._help.raise_()
 
@@ -256,6 +278,7 @@ class Controller(QObject):
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.appearance.look,
+                "midi": self.instruments.midi.choices,
                 "window_geometry": self.window.geometry_text(),
             }
         )
@@ -263,6 +286,7 @@ class Controller(QObject):
             save_settings(self._settings_path, self._settings)
         except OSError as error:
             self.window.notices.tell(f"The settings {self._settings_path} cannot be written ({error.strerror}).")
+        self.instruments.close()
         for panel in self.panels:
             panel.close()
         self.worker.close()

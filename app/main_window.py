@@ -29,17 +29,28 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
     ("Return", "pluck_asked", "pluck"),
     ("X", "switch_asked", "switch between model and truth at the playhead"),
-    ("L", "loop_asked", "loop"),
+    ("Ctrl+L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
+    ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
+    ("Ctrl+Shift+Z", "redo_asked", "redo"),
+    ("M", "motion_asked", "show or hide the string's motion"),
+    ("E", "envelope_asked", "show or hide the envelope of the motion"),
     ("Ctrl+E", "export_asked", "export WAV"),
     ("Ctrl+T", "abx_asked", "listening test: can you tell model and truth apart?"),
     ("Ctrl+,", "audio_asked", "audio settings"),
     ("F8", "notices_asked", "notices of this run"),
+    ("Ctrl+M", "midi_asked", "MIDI"),
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
 WIDE, HIGH = 960, 560  # below, the window is sparing
+
+PLAYED_KEYS = (  # see `app/keyboard.py`
+    ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
+    ("1 … 9", "how hard, from softest to loudest (not while a knob has the keyboard)"),
+    ("C   V", "softer, harder"),
+)
 
 
 class MainWindow(QMainWindow):
@@ -51,10 +62,15 @@ class MainWindow(QMainWindow):
     loop_asked = Signal()
     previous_asked = Signal()
     next_asked = Signal()
+    undo_asked = Signal()
+    redo_asked = Signal()
+    motion_asked = Signal()
+    envelope_asked = Signal()
     export_asked = Signal()
     abx_asked = Signal()
     audio_asked = Signal()
     notices_asked = Signal()
+    midi_asked = Signal()
     help_asked = Signal()
     about_asked = Signal()
     quit_asked = Signal()

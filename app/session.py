@@ -38,6 +38,8 @@ class Choices(BaseModel):
     solo: int = Field(0, ge=0, le=1000)  # the mode that is heard alone; 0: all of them
     left_view: str = "spectrum"  # keys of panels
     right_view: str = "waveform"
+    motion: bool = True  # of the string's picture
+    envelope: bool = True
 
     @property
     def pluck(self) -> Pluck:

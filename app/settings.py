@@ -14,6 +14,7 @@ from platformdirs import user_config_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from app.abx.trials import MOST_TRIALS
+from app.midi import MidiChoices
 from app.session import Choices
 from engine.whole_file import whole_file
 
@@ -83,6 +84,7 @@ class Settings(BaseModel):
     device: DeviceChoice | None = None
     sound: SoundChoice = SoundChoice()
     look: Look = Look()
+    midi: MidiChoices = MidiChoices()
     window_geometry: str = ""  # Qt's, in base64
 
 

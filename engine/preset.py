@@ -197,7 +197,7 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
 def _beyond(name: str, value: float, trained: tuple[float, float] | None, unit: str = "") -> list[str]:
     if trained is None or trained[0] <= value <= trained[1]:
         return []
-    return [f"{name} {value:g}{unit} is outside the trained {trained[0]:g} … {trained[1]:g}{unit}"]
+    return [f"{name} {value:.4g}{unit} is outside the trained {trained[0]:g} … {trained[1]:g}{unit}"]
 
 
 def preset_files(*folders: Path) -> list[Path]:

@@ -205,7 +205,14 @@ class _Run:
         return self.ends_epoch and (self.epoch >= self._recipe.epochs or tired)
 
     @property
+    def _latent_steps(self) -> int:
+        """Those in which the encoder learns the fitted latents; until their end there is no prediction."""
+        return self._recipe.latent_epochs * self._per_epoch
+
+    @property
     def validation_is_due(self) -> bool:
+        if self.step <= self._latent_steps:
+            return self.step == self._latent_steps
         return self.epoch % self._recipe.validate_every == 0 or self.epoch == self._recipe.epochs
 
     @property
@@ -223,7 +230,7 @@ class _Run:
         for group in self._optimiser.param_groups:
             group["lr"] = learning_rate * group["share"]
         model.train()
-        if self._latents is not None and epoch < recipe.latent_epochs:
+        if self._latents is not None and self.step < self._latent_steps:
             loss, error = self._latents.loss(model, recipe, self._batches[number], self.step)
         else:
             batch = self._data.draw(recipe, self._batches[number], horizon, self.step)
@@ -232,14 +239,17 @@ class _Run:
         loss.backward()
         torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
         self._optimiser.step()
-        if self._average is not None:
-            self._average.update_parameters(model)
         self._total += error
         self.step += 1
+        if self._latents is not None and self.step == self._latent_steps:
+            self._latents.yield_latents(model)
+            self._optimiser = _optimiser(model, recipe)
+        if self._average is not None and self.step >= self._latent_steps:
+            self._average.update_parameters(model)
 
     def _schedules(self) -> tuple[int, float]:
         """Horizon and learning rate of the next step."""
-        recipe, latent_steps = self._recipe, self._recipe.latent_epochs * self._per_epoch
+        recipe, latent_steps = self._recipe, self._latent_steps
         if self.step < latent_steps:
             peak = recipe.latent_learning_rate / recipe.peak_learning_rate
             return self._configuration.steps, peak * learning_rate_at(recipe, self.step / latent_steps)

@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from engine.models import StringModel
 from engine.models.koopman import Koopman
@@ -42,12 +42,14 @@ class LatentFit:
         unit: of the coordinates. Their squares, times its own, sum up to the mean over frames of the squared modal
             amplitudes.
         mirror: factors (2 state_size,) of the coordinates of a string seen from its other end.
+        mixing: from the coordinates to the latents, (2 state_size, 2 state_size), real parts first.
     """
 
     initial: Tensor
     targets: Tensor
     unit: float
     mirror: Tensor
+    mixing: Tensor
 
     def loss(self, model: StringModel, recipe: Recipe, rows: Tensor, iteration: int) -> tuple[Tensor, Tensor]:
         """The error of the coordinates, and the mean square of the prediction's, of the trajectories `rows`."""
@@ -59,13 +61,23 @@ class LatentFit:
             sign, mirrored = flips(len(rows), generator, initial.device)
             initial = sign * torch.where(mirrored, initial.flip(1), initial)
             targets = sign * torch.where(mirrored, targets * self.mirror, targets)
-        error = (model.encoder[:-1](initial) - targets).square().mean()
+        error = (model.encoder(initial) - targets).square().mean()
         # a mode's mean square over the string is half its amplitude's
         return error, (error * targets.shape[1] * self.unit**2 / 2).detach()
 
+    @torch.no_grad()
+    def yield_latents(self, model: StringModel) -> None:
+        """Makes an encoder that has learned the coordinates yield the latents."""
+        assert isinstance(model, Koopman)
+        last = model.encoder[-1]
+        assert isinstance(last, nn.Linear)
+        mixing = self.mixing.double().to(last.weight.device)
+        last.bias.copy_(mixing @ last.bias.double())
+        last.weight.copy_(mixing @ last.weight.double())
+
 
 def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator) -> LatentFit:
-    """Gives a Koopman its eigenvalues, its decoder and the last layer of its encoder.
+    """Gives a Koopman its eigenvalues and its decoder, and tells what its encoder shall learn.
 
     Args:
         steps: frames of the horizon.
@@ -105,10 +117,10 @@ def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Ge
         mirror[coordinates] = (-1.0) ** mode
         first += length
     unit = float(targets.square().mean().sqrt())
-    model.store_basis(log_eigenvalues, shapes, unit * mixing, generator)
+    model.store_basis(log_eigenvalues, shapes, generator)
     initial = (amplitudes[:, 0] @ sines).float()
     device = model.nu_log.device
-    return LatentFit(initial.to(device), (targets / unit).float().to(device), unit, mirror.to(device))
+    return LatentFit(initial.to(device), (targets / unit).float().to(device), unit, mirror.to(device), unit * mixing)
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from app.library import Library
-from app.motion import Strobe, frame_at
+from app.motion import Envelope, Strobe, frame_at
 from app.panels.base import Moment, Panel
 from app.rendering import Take
-from app.session import Session
+from app.session import Choices, Session
+from app.views.string_ground import TrainedPlucks
+from app.views.string_ink import ShownPluck
 from app.views.string_view import StringView
-from engine.preset import outside_training
+from engine.pluck import SHAPES, WIDTH_RANGE
+from engine.preset import PresetInfo, outside_training
 
 MM = 1000.0
+WIDTH_STEP = 1.05  # of a wheel notch
 PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "listen"}
 
 
@@ -29,33 +33,52 @@ class StringPanel(Panel):
         self.view = StringView()
         self.view.pluck_drawn.connect(session.move_pluck)
         self.view.pluck_released.connect(self.pluck_asked)
-        self.view.listening_point_moved.connect(session.move_listening_point)
+        self.view.pluck_reset.connect(self._reset_pluck)
+        self.view.width_stepped.connect(self._step_width)
+        self.view.shape_stepped.connect(self._step_shape)
+        self.view.listening_point_moved.connect(self._move_listening_point)
+        self.view.listening_point_reset.connect(self._reset_listening_point)
+        self.view.motion_toggled.connect(lambda on: session.update(motion=on))
+        self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
         self._strobe = Strobe()
+        self._envelope: Envelope | None = None
+        self._shown: tuple[object, ...] = ()
 
     def choices_changed(self, names: frozenset[str]) -> None:
+        choices = self.session.choices
         if names & PLUCK_FIELDS:
             self._show_pluck()
         if "heard" in names:
-            self.view.set_heard(self.session.choices.heard)
+            self.view.set_heard(choices.heard)
+        if names & {"motion", "envelope"}:
+            self.view.set_shown(choices.motion, choices.envelope)
 
     def take_started(self, take: Take) -> None:
         self._strobe.restart()
+        self._envelope = Envelope(take)
 
     def show_moment(self, moment: Moment) -> None:
-        take, position_s, speed = moment.take, moment.position_s, self.session.choices.speed
-        if take is None or not (moment.playing or position_s > 0):
+        take, position_s, choices = moment.take, moment.position_s, self.session.choices
+        if not choices.motion or take is None or not (moment.playing or position_s > 0):
             self.view.show_frame(None)
+            self._shown = ()
             return
-        self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, speed, take.fundamental_hz)
+        shown = (take, min(take.ready_frames, position_s * take.info.rate_hz), choices.speed, choices.envelope)
+        if not moment.playing and shown == self._shown:
+            return
+        self._shown = shown
+        self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, choices.speed, take.fundamental_hz)
         shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
-        self.view.show_frame(frame_at(take, position_s, shown_s, speed))
+        envelope = self._envelope if choices.envelope else None
+        self.view.show_frame(frame_at(take, position_s, shown_s, choices.speed, envelope))
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
         points = entry.info.grid_points if entry else 101
-        view.set_pluck(choices.position, choices.amplitude_mm, choices.pluck.displacement(points).numpy() * MM)
-        view.set_listening_point(choices.listen)
-        view.set_trained_positions(entry.info.trained_range.position if entry else None)
+        shape_mm = choices.pluck.displacement(points).numpy() * MM
+        view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
+        view.set_listening_points(choices.listen)
+        view.set_trained(_trained(entry.info) if entry else TrainedPlucks())
         view.set_warning(self._pluck_warning())
 
     def _pluck_warning(self) -> str:
@@ -65,3 +88,36 @@ class StringPanel(Panel):
         if choices.listen in (0.0, 1.0):
             return "silent: the listening point is at a fixed end"
         return "; ".join(outside_training(entry.info, choices.pluck)) if entry else ""
+
+    # Gestures
+
+    def _reset_pluck(self) -> None:
+        default = Choices()
+        self.session.update(position=default.position, amplitude_mm=default.amplitude_mm, width=default.width)
+        self.pluck_asked.emit()
+
+    def _step_width(self, notches: float) -> None:
+        choices = self.session.choices
+        if choices.shape != "triangular":  # it has no width
+            width = choices.width * WIDTH_STEP**notches
+            self.session.update(width=min(max(width, WIDTH_RANGE[0]), WIDTH_RANGE[1]))
+
+    def _step_shape(self, steps: int) -> None:
+        here = SHAPES.index(self.session.choices.shape)
+        self.session.update(shape=SHAPES[(here + steps) % len(SHAPES)])
+
+    def _move_listening_point(self, side: str, position: float) -> None:
+        self.session.move_listening_point(position)
+
+    def _reset_listening_point(self, side: str) -> None:
+        self.session.move_listening_point(Choices().listen)
+
+
+def _label(choices: Choices) -> str:
+    words = choices.shape.replace("_", " ")
+    return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
+
+
+def _trained(info: PresetInfo) -> TrainedPlucks:
+    low_m, high_m = info.trained_range.peak_m
+    return TrainedPlucks(info.trained_range.position, (MM * low_m, MM * high_m))

@@ -28,6 +28,7 @@ class AppMenu(QMenu):
             self.addAction(text): signal
             for text, signal in (
                 ("Audio settings …\tCtrl+,", "audio_asked"),
+                ("MIDI …\tCtrl+M", "midi_asked"),
                 ("Notices …\tF8", "notices_asked"),
                 ("Help\tF1", "help_asked"),
                 ("About Learned Strings", "about_asked"),

@@ -65,7 +65,7 @@ class CompareView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Compare")
-        self.setMinimumHeight(150)
+        self.setMinimumHeight(84)
         self._menu = QMenu(self)
         self._actions: dict[str, QAction] = {}
         presets = tool_button("Presets ▾", "Presets to compare", "Choose the presets that are compared")

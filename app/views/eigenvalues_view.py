@@ -38,7 +38,7 @@ class EigenvaluesView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Eigenvalues")
-        self.setMinimumHeight(150)
+        self.setMinimumHeight(84)
         self._figure: PoleFigure | None = None
         self._solo = 0
         self._axes = combo_box("Axes", [(text, key) for key, text in AXES.items()])

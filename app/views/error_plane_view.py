@@ -41,7 +41,7 @@ class ErrorPlaneView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Error map")
-        self.setMinimumHeight(150)
+        self.setMinimumHeight(84)
         self._words = words_label()
         self.progress = ProgressStrip("Progress of the error map")
         self.map = _Map()

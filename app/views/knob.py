@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
-from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
 from app.views import theme
 
 SWEEP_DEGREES = 270
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
+COARSE = 10  # of Page up and Page down
+TIP_ABOVE = 44  # pixels: the value while dragging stands above the knob, out of the way of the hand
 
 
 @dataclass(frozen=True)
@@ -64,18 +66,21 @@ class Knob(QWidget):
     """Shows a value and asks for new ones: `value_asked` is a wish, `set_value` is what became of it."""
 
     value_asked = Signal(float)
+    drag_started = Signal()
+    drag_ended = Signal()
 
     def __init__(self, name: str, limits: KnobRange, tip: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.limits = limits
         self._name = name
         self._value = limits.default
-        self._pressed_at: QPointF | None = None
-        self._pressed_share = 0.0
+        self._dragged_at: QPointF | None = None
+        self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
         self._editor: QLineEdit | None = None
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(name)
+        self.setAccessibleDescription(limits.text.format(self._value))
         self.setToolTip(
             f"{tip or name}\nDrag, wheel or arrow keys; Shift is finer; type a number; double-click resets"
         )
@@ -87,8 +92,13 @@ class Knob(QWidget):
     def set_value(self, value: float) -> None:
         if value != self._value:
             self._value = value
-            self.setAccessibleDescription(self.limits.text.format(value))
+            self.setAccessibleDescription(self.text)
             self.update()
+
+    @property
+    def text(self) -> str:
+        """The value in its unit."""
+        return self.limits.text.format(self._value)
 
     def sizeHint(self) -> QSize:
         return QSize(70, 82)
@@ -98,17 +108,24 @@ class Knob(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self._pressed_at = event.position()
-            self._pressed_share = self.limits.share(self._value)
+            self._dragged_at = event.position()
+            self._dragged_share = self.limits.share(self._value)
+            self.drag_started.emit()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed_at is not None:
-            fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
-            moved = (self._pressed_at.y() - event.position().y()) / DRAG_PIXELS * fine
-            self.value_asked.emit(self.limits.value(self._pressed_share + moved))
+        if self._dragged_at is None:
+            return
+        fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
+        self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
+        self._dragged_at = event.position()
+        self.value_asked.emit(self.limits.value(self._dragged_share))
+        QToolTip.showText(self.mapToGlobal(QPoint(0, -TIP_ABOVE)), self.text, self)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self._pressed_at = None
+        if self._dragged_at is not None and event.button() == Qt.MouseButton.LeftButton:
+            self._dragged_at = None
+            QToolTip.hideText()
+            self.drag_ended.emit()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self.value_asked.emit(self.limits.default)
@@ -119,6 +136,14 @@ class Knob(QWidget):
         self.value_asked.emit(self.limits.stepped(self._value, notches * fine))
         event.accept()
 
+    def event(self, event: QEvent) -> bool:
+        """Page up and Page down are the knob's while it has the keyboard, though the window has shortcuts of them."""
+        paging = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in paging:
+            event.accept()
+            return True
+        return super().event(event)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
         steps = {
@@ -126,9 +151,15 @@ class Knob(QWidget):
             Qt.Key.Key_Right: 1,
             Qt.Key.Key_Down: -1,
             Qt.Key.Key_Left: -1,
+            Qt.Key.Key_PageUp: COARSE,
+            Qt.Key.Key_PageDown: -COARSE,
         }.get(Qt.Key(event.key()))
         if steps is not None:
             self.value_asked.emit(self.limits.stepped(self._value, steps * fine))
+        elif event.key() == Qt.Key.Key_Home:
+            self.value_asked.emit(self.limits.low)
+        elif event.key() == Qt.Key.Key_End:
+            self.value_asked.emit(self.limits.high)
         elif event.key() == Qt.Key.Key_Delete:
             self.value_asked.emit(self.limits.default)
         elif event.text() and event.text() in "0123456789.-":
@@ -167,29 +198,33 @@ class Knob(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        middle, radius = QPointF(self.width() / 2, 37), 18.0
+        ink = QColor(theme.TEXT if self.isEnabled() else theme.DISABLED)
+        if self.hasFocus():
+            painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
+        middle, radius = QPointF(self.width() / 2, 38), 18.0
         ring = QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
         start = 90 + SWEEP_DEGREES / 2
         share = self.limits.share(self._value)
         painter.setPen(QPen(QColor(theme.LINE), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawArc(ring, round(start * 16), -SWEEP_DEGREES * 16)
-        painter.setPen(QPen(QColor(theme.TEXT), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.setPen(QPen(ink, 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawArc(ring, round(start * 16), -round(SWEEP_DEGREES * share * 16))
         angle = math.radians(start - SWEEP_DEGREES * share)
         direction = QPointF(math.cos(angle), -math.sin(angle))
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.LINE if self.hasFocus() else theme.RAISED))
         painter.drawEllipse(middle, radius - 5, radius - 5)
-        painter.setPen(QPen(QColor(theme.TEXT), 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.setPen(QPen(ink, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
         width = self.width()
         painter.setFont(theme.small_font(10))
         painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
-        painter.drawText(QRectF(0, 0, width, 14), Qt.AlignmentFlag.AlignCenter, self._name.upper())
-        painter.setPen(QColor(theme.TEXT))
+        painter.drawText(QRectF(0, 3, width, 14), Qt.AlignmentFlag.AlignCenter, self._name.upper())
+        painter.setPen(ink)
         painter.setFont(theme.small_font(12))
         painter.drawText(
-            QRectF(0, self.height() - 22, width, 18),
+            QRectF(0, self.height() - 23, width, 18),
             Qt.AlignmentFlag.AlignCenter,
-            self.limits.text.format(self._value),
+            self.text,
         )

@@ -55,7 +55,7 @@ class PartialsView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Partials")
-        self.setMinimumHeight(150)
+        self.setMinimumHeight(84)
         self._window = combo_box("Window of time", [(text, key) for key, text in WINDOWS.items()])
         self._window.setToolTip("Which part of the pluck the figures are of")
         self._window.activated.connect(lambda _: self.window_chosen.emit(self.window_key))

@@ -1,60 +1,73 @@
-"""The string: model and truth in motion, the pluck that is being drawn, and the listening point.
+"""The string: model and truth in motion, the pluck that is being drawn, and the listening points.
 
-Drag on the string: where and how far it is pulled. Drag the marker beneath it: where it is heard.
+Drag on the string: where and how far it is pulled; the wheel over the handle sets the width, with Shift the shape.
+Drag a marker beneath it: where it is heard. A double-click on either goes back to the default.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import (
     QColor,
     QKeyEvent,
-    QLinearGradient,
     QMouseEvent,
     QPainter,
     QPaintEvent,
     QPen,
     QPixmap,
-    QPolygonF,
+    QResizeEvent,
+    QWheelEvent,
 )
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QApplication, QSizePolicy, QToolButton, QWidget
 
 from app.views import theme
+from app.views.parts import tool_button
+from app.views.string_axes import MARGIN_X, StringAxes
+from app.views.string_ground import TrainedPlucks, paint_ground, paint_legend
+from app.views.string_ink import (
+    ShownPluck,
+    StringFrame,
+    paint_caption,
+    paint_ends,
+    paint_handle,
+    paint_listening_point,
+    paint_motion,
+    paint_pluck,
+)
 from engine.pluck import DEFAULT_LISTEN
 
-MARGIN_X = 46
-MARGIN_TOP = 34
-MARGIN_BOTTOM = 40
 SPANS_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)  # the display's half height, chosen to fit
-GRAB_PIXELS = 14  # how near the marker counts as on it
+GRAB_PIXELS = 14  # how near a handle or a marker counts as on it
+FINE = 0.1  # with Shift
+WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
 
+MARKER_TIP = "Drag to hear the string from another point; double-click resets. Shift and arrow keys move it"
+TIPS: dict[str | None, str] = {  # by what the pointer is on
+    None: "Drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
+    "pluck": "Drag along the string for the place, up and down for the amplitude; double-click resets.\n"
+    "The wheel sets the width, with Shift the shape. Arrow keys do the same, with Ctrl for width and shape",
+    "left": MARKER_TIP,
+    "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
+}
 
-@dataclass(frozen=True)
-class StringFrame:
-    """What the string looks like at one moment; displacements (points,) in mm.
-
-    Attributes:
-        shapes: by source.
-        lowest, highest: by source, the extremes since the last frame: the blur of a string in real time.
-    """
-
-    shapes: dict[str, NDArray[np.float32]]
-    lowest: dict[str, NDArray[np.float32]]
-    highest: dict[str, NDArray[np.float32]]
-    caption: str = ""
-    past_horizon: bool = False
+_Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
 
 class StringView(QWidget):
-    """See the module. Positions are in lengths, displacement in mm."""
+    """See the module. Positions are in lengths, displacement in mm; a `side` is "left" or "right"."""
 
     pluck_drawn = Signal(float, float)  # position, amplitude: while dragging
     pluck_released = Signal()
-    listening_point_moved = Signal(float)
+    pluck_reset = Signal()
+    width_stepped = Signal(float)  # notches
+    shape_stepped = Signal(int)  # the next or the previous
+    listening_point_moved = Signal(str, float)  # side, position
+    listening_point_reset = Signal(str)
+    drag_started = Signal()
+    drag_ended = Signal()
+    motion_toggled = Signal(bool)
+    envelope_toggled = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -62,37 +75,55 @@ class StringView(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName("String")
-        self.setToolTip(
-            "Drag the string to pluck it; drag the marker below to move the listening point.\n"
-            "Arrow keys move the pluck, with Shift the listening point; Enter plucks"
-        )
+        self.setToolTip(TIPS[None])
         self._frame: StringFrame | None = None
-        self._preview_mm: NDArray[np.float64] | None = None
-        self._pluck = (0.35, 4.0)
-        self._listen = DEFAULT_LISTEN
-        self._trained: tuple[float, float] | None = None
+        self._pluck = ShownPluck(0.35, 4.0, np.zeros(2))
+        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
+        self._trained = TrainedPlucks()
         self._warning = ""
         self._heard = "model"
         self._span_mm = 5.0
-        self._drag: str | None = None  # "pluck" or "listen"
+        self._drag: str | None = None  # "pluck" or a side
+        self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
+        self._dragged_at = QPointF()
+        self._hovered: str | None = None
+        self._on_handle_first = False  # the last press was the first of a series, and on the handle
+        self._last_press_ms = -10_000
+        self._turned = 0.0  # notches of the wheel towards the next shape
         self._ground_pixmap: QPixmap | None = None
         self._ground_key: tuple[object, ...] = ()
+        self._toggles = (
+            self._toggle("Motion", "Show the string in motion; off saves work (M)", self.motion_toggled),
+            self._toggle(
+                "Envelope", "Show how far the string swung within the last second (E)", self.envelope_toggled
+            ),
+        )
+
+    def _toggle(self, text: str, tip: str, toggled: SignalInstance) -> QToolButton:
+        button = tool_button(text, text, tip)
+        button.setObjectName("chip")
+        button.setParent(self)
+        button.setCheckable(True)
+        button.setCursor(Qt.CursorShape.ArrowCursor)
+        button.clicked.connect(toggled)
+        return button
 
     # What is shown
 
-    def set_pluck(self, position: float, amplitude_mm: float, shape_mm: NDArray[np.float64]) -> None:
+    def set_pluck(self, pluck: ShownPluck) -> None:
         """The pluck as chosen; it is drawn while no motion is shown."""
-        self._pluck = (position, amplitude_mm)
-        self._preview_mm = shape_mm
+        self._pluck = pluck
+        self.setAccessibleDescription(f"position {pluck.position:.2f}, {pluck.amplitude_mm:.2f} mm, {pluck.label}")
         self.update()
 
-    def set_listening_point(self, listen: float) -> None:
-        self._listen = listen
+    def set_listening_points(self, left: float, right: float | None = None) -> None:
+        """Where the string is heard; `right` is None in mono."""
+        self._listening = {"left": left} if right is None else {"left": left, "right": right}
         self.update()
 
-    def set_trained_positions(self, trained: tuple[float, float] | None) -> None:
-        """The pluck positions that the model was trained on; None: everywhere."""
+    def set_trained(self, trained: TrainedPlucks) -> None:
         self._trained = trained
         self.update()
 
@@ -105,94 +136,176 @@ class StringView(QWidget):
         self._heard = source
         self.update()
 
+    def set_shown(self, motion: bool, envelope: bool) -> None:
+        """What of the motion is switched on; the frames given should agree."""
+        for button, on in zip(self._toggles, (motion, envelope), strict=True):
+            button.setChecked(on)
+        self._toggles[1].setEnabled(motion)
+
     def show_frame(self, frame: StringFrame | None) -> None:
         """A moment of the motion; None goes back to the pluck."""
-        self._frame = frame
-        self.update()
+        before, self._frame = self._frame, frame
+        if frame is None or before is None:
+            if frame is not before:
+                self.update()
+        else:  # all that moves lies in one rectangle, which is cheaper to clip than the holes of the buttons
+            self.update(0, WORDS_HEIGHT, self.width(), self.height() - WORDS_HEIGHT)
 
     @property
     def is_dragging_pluck(self) -> bool:
         return self._drag == "pluck"
+
+    @property
+    def _shows_pluck(self) -> bool:
+        return self._frame is None or self._drag == "pluck"
 
     # Gestures
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton:
             return
-        self._drag = "listen" if self._on_marker(event.position()) else "pluck"
-        self._follow(event.position())
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._drag is None:
-            on_marker = self._on_marker(event.position())
-            self.setCursor(Qt.CursorShape.SizeHorCursor if on_marker else Qt.CursorShape.CrossCursor)
-        else:
-            self._follow(event.position())
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        drag, self._drag = self._drag, None
-        if drag == "pluck":
-            self.pluck_released.emit()
-        self.update()
+        on = self._under(event.position())
+        follows = event.timestamp() - self._last_press_ms < QApplication.doubleClickInterval()
+        self._on_handle_first = on == "pluck" and not follows
+        self._last_press_ms = event.timestamp()
+        self._start_drag(on, event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        if self._on_marker(event.position()):
-            self.listening_point_moved.emit(DEFAULT_LISTEN)
+        on = self._under(event.position())
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        if on in self._listening:
+            self.listening_point_reset.emit(on)
+        elif self._on_handle_first:
+            self.pluck_reset.emit()
+        else:  # the same place is plucked again and again
+            self._last_press_ms = event.timestamp()
+            self._start_drag(on, event.position())
+
+    def _start_drag(self, on: str | None, at: QPointF) -> None:
+        axes = self._axes()
+        self.drag_started.emit()
+        self._drag = on or "pluck"
+        self._dragged_at = at
+        if on == "pluck":
+            self._dragged = (self._pluck.position, self._pluck.amplitude_mm)
+            self.setCursor(Qt.CursorShape.ClosedHandCursor)
+        elif on is not None:
+            self._dragged = (self._listening[on], 0.0)
+        else:
+            self._dragged = (axes.position(at.x()), axes.displacement_mm(at.y()))
+            self._ask()
+        self.update()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        at = event.position()
+        if self._drag is None:
+            self._hover(self._under(at))
+            return
+        axes = self._axes()
+        fine = FINE if event.modifiers() & _Shift else 1.0
+        position, displacement_mm = self._dragged
+        self._dragged = (
+            position + fine * (axes.position(at.x()) - axes.position(self._dragged_at.x())),
+            displacement_mm + fine * (axes.displacement_mm(at.y()) - axes.displacement_mm(self._dragged_at.y())),
+        )
+        self._dragged_at = at
+        self._ask()
+
+    def _ask(self) -> None:
+        position, displacement_mm = self._dragged
+        if self._drag == "pluck":
+            self.pluck_drawn.emit(position, abs(displacement_mm))
+            self._fit_span()
+        elif self._drag is not None:
+            self.listening_point_moved.emit(self._drag, position)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or self._drag is None:
+            return
+        drag, self._drag = self._drag, None
+        self.drag_ended.emit()
+        if drag == "pluck":
+            self.pluck_released.emit()
+        self._hovered = None
+        self._hover(self._under(event.position()))
+        self.update()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self._under(event.position()) != "pluck":
+            event.ignore()
+            return
+        notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
+        if event.modifiers() & _Shift:
+            self._turned += notches
+            steps, self._turned = int(self._turned), self._turned - int(self._turned)
+            if steps:
+                self.shape_stepped.emit(steps)
+        else:
+            self.width_stepped.emit(notches)
+        event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        sideways = {Qt.Key.Key_Left: -0.01, Qt.Key.Key_Right: 0.01}.get(Qt.Key(event.key()))
-        upwards = {Qt.Key.Key_Up: 0.5, Qt.Key.Key_Down: -0.5}.get(Qt.Key(event.key()))
-        position, amplitude_mm = self._pluck
-        if sideways is not None and shift:
-            self.listening_point_moved.emit(self._listen + sideways)
+        key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
+        sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key)
+        upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key)
+        if sideways is not None and held & _Shift:
+            side = "right" if held & _Control else "left"
+            if side in self._listening:
+                self.listening_point_moved.emit(side, self._listening[side] + 0.01 * sideways)
+        elif sideways is not None and held & _Control:
+            self.shape_stepped.emit(sideways)
+        elif upwards is not None and held & _Control:
+            self.width_stepped.emit(float(upwards))
         elif sideways is not None:
-            self.pluck_drawn.emit(position + sideways, amplitude_mm)
+            self.pluck_drawn.emit(self._pluck.position + 0.01 * sideways, self._pluck.amplitude_mm)
         elif upwards is not None:
-            self.pluck_drawn.emit(position, amplitude_mm + upwards)
+            step_mm = 0.5 * (FINE if held & _Shift else 1.0)
+            self.pluck_drawn.emit(self._pluck.position, self._pluck.amplitude_mm + step_mm * upwards)
+        elif key == _Key.Key_Delete and held & _Shift:
+            for side in self._listening:
+                self.listening_point_reset.emit(side)
+        elif key == _Key.Key_Delete:
+            self.pluck_reset.emit()
         else:
             super().keyPressEvent(event)
 
-    def _follow(self, at: QPointF) -> None:
-        position = (at.x() - MARGIN_X) / max(1.0, self._width())
-        if self._drag == "listen":
-            self.listening_point_moved.emit(position)
-        else:
-            up = abs(self._middle() - at.y()) / self._half_height()
-            self.pluck_drawn.emit(position, up * self._span_mm)
+    def leaveEvent(self, event: object) -> None:
+        if self._drag is None:
+            self._hover(None)
 
-    def _on_marker(self, at: QPointF) -> bool:
-        return at.y() > self.height() - MARGIN_BOTTOM - 6 and abs(at.x() - self._x(self._listen)) < GRAB_PIXELS
+    def _hover(self, on: str | None) -> None:
+        cursors = {None: Qt.CursorShape.CrossCursor, "pluck": Qt.CursorShape.OpenHandCursor}
+        self.setCursor(cursors.get(on, Qt.CursorShape.SizeHorCursor))
+        if on != self._hovered:
+            self._hovered = on
+            self.setToolTip(TIPS[on])
+            self.update()
+
+    def _under(self, at: QPointF) -> str | None:
+        """What can be grabbed there: "pluck", a side, or None for the bare string."""
+        axes = self._axes()
+        if at.y() > axes.bottom - 6:
+            near = {side: abs(at.x() - axes.x(position)) for side, position in self._listening.items()}
+            side = min(near, key=lambda name: near[name])
+            return side if near[side] < GRAB_PIXELS else None
+        handle = self._handle(axes)
+        return "pluck" if (at - handle).manhattanLength() < 1.4 * GRAB_PIXELS else None
 
     # Geometry
 
-    def _width(self) -> float:
-        return self.width() - 2 * MARGIN_X
+    def _axes(self) -> StringAxes:
+        return StringAxes(self.width(), self.height(), self._span_mm)
 
-    def _x(self, position: float) -> float:
-        return MARGIN_X + position * self._width()
-
-    def _middle(self) -> float:
-        return (MARGIN_TOP + self.height() - MARGIN_BOTTOM) / 2
-
-    def _half_height(self) -> float:
-        return (self.height() - MARGIN_TOP - MARGIN_BOTTOM) / 2
-
-    def _y(self, displacement_mm: float) -> float:
-        return self._middle() - displacement_mm / self._span_mm * self._half_height()
-
-    def _curve(self, displacement_mm: NDArray[np.floating]) -> QPolygonF:
-        xs = np.linspace(self._x(0), self._x(1), len(displacement_mm)).tolist()
-        ys = (self._middle() - displacement_mm / self._span_mm * self._half_height()).tolist()
-        return QPolygonF([QPointF(x, y) for x, y in zip(xs, ys, strict=True)])
+    def _handle(self, axes: StringAxes) -> QPointF:
+        """In a decayed motion's scale the pluck lies above the picture; its handle stays at the edge."""
+        return axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
 
     def _fit_span(self) -> None:
         """Steps to a span that holds the pluck, or follows the decay; while a pluck is drawn it can only grow."""
-        if self._frame is None or self._drag == "pluck":
-            largest_mm = self._pluck[1]
-        else:
-            bands = [*self._frame.lowest.values(), *self._frame.highest.values()]
-            largest_mm = max(float(np.abs(band).max()) for band in bands)
+        largest_mm = self._pluck.amplitude_mm
+        if self._frame is not None and not self._shows_pluck:
+            largest_mm = self._frame.largest_mm()
         wanted = next((s for s in SPANS_MM if s >= 1.15 * largest_mm), SPANS_MM[-1])
         too_small = wanted > self._span_mm
         much_too_large = self._drag != "pluck" and 1.4 * largest_mm < wanted < self._span_mm
@@ -204,156 +317,50 @@ class StringView(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(1100, 330)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        right = self.width() - MARGIN_X
+        for button in reversed(self._toggles):
+            size = button.sizeHint()
+            right -= size.width()
+            button.setGeometry(right, 6, size.width(), 22)
+            right -= 6
+
     def paintEvent(self, event: QPaintEvent) -> None:
         self._fit_span()
+        axes = self._axes()
         painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._ground())
+        painter.drawPixmap(0, 0, self._ground(axes))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if self._drag == "pluck" or self._frame is None:
-            self._paint_pluck(painter)
+        if self._frame is None or self._drag == "pluck":
+            paint_pluck(painter, axes, self._pluck)
         else:
-            self._paint_motion(painter, self._frame)
-        self._paint_ends(painter)
-        self._paint_listening_point(painter)
-        self._paint_words(painter)
+            paint_motion(painter, axes, self._frame, self._heard)
+        paint_ends(painter, axes)
+        labels = {"left": "listen"} if len(self._listening) == 1 else {"left": "left", "right": "right"}
+        for side, label in labels.items():
+            paint_listening_point(painter, axes, self._listening[side], label, side in (self._drag, self._hovered))
+        grabbed = "pluck" in (self._drag, self._hovered)
+        paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
+        if self._frame is not None and not self._shows_pluck:
+            paint_caption(painter, axes, self._frame)
         if self.hasFocus():
-            painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1))
+            painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, 6)
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
 
-    def _ground(self) -> QPixmap:
+    def _ground(self, axes: StringAxes) -> QPixmap:
         """The picture behind the string, painted anew only when something in it changes."""
-        key = (self.size(), self.devicePixelRatioF(), self._span_mm, self._trained, theme.face)
+        # on which side words would be in the way of the pluck, with the words at its handle
+        pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
+        key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._heard, self._warning, theme.face)
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF())
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
             pixmap.fill(QColor(theme.BACKGROUND))
             painter = QPainter(pixmap)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            self._paint_ground(painter)
+            paint_ground(painter, axes, self._trained, pluck)
+            paint_legend(painter, self._heard, self._warning, self._toggles[0].x() - 14)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
         return self._ground_pixmap
-
-    def _paint_ground(self, painter: QPainter) -> None:
-        gradient = QLinearGradient(0, 0, 0, self.height())
-        gradient.setColorAt(0, QColor(theme.face.ground_top))
-        gradient.setColorAt(1, QColor(theme.face.ground_bottom))
-        painter.setPen(QPen(QColor(theme.LINE), 1))
-        painter.setBrush(gradient)
-        painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, 6)
-        top, bottom = self._middle() - self._half_height(), self._middle() + self._half_height()
-        painter.setFont(theme.small_font(10))
-        for tenth in range(11):
-            x = self._x(tenth / 10)
-            painter.setPen(QPen(theme.translucent(theme.LINE, 110), 1))
-            painter.drawLine(QPointF(x, top), QPointF(x, bottom))
-        for share in (-1, -0.5, 0, 0.5, 1):
-            y = self._middle() - share * self._half_height()
-            painter.setPen(QPen(theme.translucent(theme.LINE, 160 if share == 0 else 80), 1))
-            painter.drawLine(QPointF(self._x(0), y), QPointF(self._x(1), y))
-            painter.setPen(QColor(theme.FAINT))
-            label = f"{share * self._span_mm:+g}" if share else "0 mm"
-            painter.drawText(
-                QRectF(0, y - 8, MARGIN_X - 6, 16),
-                Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
-                label,
-            )
-        if self._trained is not None:
-            self._paint_untrained(painter, top, bottom)
-
-    def _paint_untrained(self, painter: QPainter, top: float, bottom: float) -> None:
-        assert self._trained is not None
-        low, high = self._trained
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(theme.translucent(theme.face.shade, theme.face.shade_alpha))
-        left = QRectF(self._x(0), top, self._x(low) - self._x(0), bottom - top)
-        right = QRectF(self._x(high), top, self._x(1) - self._x(high), bottom - top)
-        for area in (left, right):
-            painter.drawRect(area)
-        painter.setPen(theme.translucent(theme.FAINT, 150))
-        painter.setFont(theme.small_font(10))
-        for area in (left, right):
-            painter.drawText(
-                area.adjusted(4, 0, -4, -4),
-                Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom,
-                "not trained here",
-            )
-
-    def _paint_pluck(self, painter: QPainter) -> None:
-        if self._preview_mm is None:
-            return
-        curve = self._curve(self._preview_mm)
-        for colour, width in ((theme.translucent(theme.TEXT, 50), 6.4), (QColor(theme.TEXT), 2.0)):
-            painter.setPen(QPen(colour, width))
-            painter.drawPolyline(curve)
-        at = QPointF(self._x(self._pluck[0]), self._y(self._pluck[1]))
-        painter.setPen(QPen(QColor(theme.BACKGROUND), 2))
-        painter.setBrush(QColor(theme.TEXT))
-        painter.drawEllipse(at, 6, 6)
-        text = f"{self._pluck[0]:.2f}   {self._pluck[1]:.1f} mm"
-        painter.setFont(theme.small_font(12))
-        painter.setPen(QColor(theme.TEXT))
-        beside = at.x() + 12 if at.x() < self.width() - 140 else at.x() - 122
-        painter.drawText(QRectF(beside, at.y() - 9, 110, 18), Qt.AlignmentFlag.AlignVCenter, text)
-
-    def _paint_motion(self, painter: QPainter, frame: StringFrame) -> None:
-        order = [name for name in frame.shapes if name != self._heard] + [self._heard]
-        for name in order:
-            colour = theme.SOURCE_COLOURS[name]
-            band = self._curve(frame.lowest[name])
-            for point in reversed(self._curve(frame.highest[name]).toList()):
-                band.append(point)
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(theme.translucent(colour, 46 if name == self._heard else 26))
-            painter.drawPolygon(band)
-        for name in order:
-            heard = name == self._heard
-            painter.setPen(QPen(QColor(theme.SOURCE_COLOURS[name]), 2.4 if heard else 1.6))
-            painter.drawPolyline(self._curve(frame.shapes[name]))
-
-    def _paint_ends(self, painter: QPainter) -> None:
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.FAINT))
-        for x in (self._x(0), self._x(1)):
-            painter.drawRoundedRect(QRectF(x - 3, self._middle() - 22, 6, 44), 3, 3)
-
-    def _paint_listening_point(self, painter: QPainter) -> None:
-        x = self._x(self._listen)
-        bottom = self._middle() + self._half_height()
-        painter.setPen(QPen(theme.translucent(theme.GOOD, 120), 1, Qt.PenStyle.DashLine))
-        painter.drawLine(QPointF(x, self._middle() - self._half_height()), QPointF(x, bottom))
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.GOOD))
-        painter.drawPolygon(
-            QPolygonF([QPointF(x, bottom + 2), QPointF(x - 8, bottom + 15), QPointF(x + 8, bottom + 15)])
-        )
-        painter.setPen(QColor(theme.GOOD))
-        painter.setFont(theme.small_font(11))
-        painter.drawText(
-            QRectF(x - 60, bottom + 16, 120, 18), Qt.AlignmentFlag.AlignCenter, f"listen {self._listen:.2f}"
-        )
-
-    def _paint_words(self, painter: QPainter) -> None:
-        painter.setFont(theme.small_font(12, bold=True))
-        x = float(MARGIN_X)
-        for name in ("model", "truth"):
-            heard = name == self._heard
-            colour = (
-                QColor(theme.SOURCE_COLOURS[name]) if heard else theme.translucent(theme.SOURCE_COLOURS[name], 140)
-            )
-            painter.setPen(QPen(colour, 3))
-            painter.drawLine(QPointF(x, 18), QPointF(x + 18, 18))
-            text = f"{name} (heard)" if heard else name
-            painter.drawText(QPointF(x + 24, 22), text)
-            x += 44 + painter.fontMetrics().horizontalAdvance(text)
-        if self._warning:
-            painter.setPen(QColor(theme.WARNING))
-            painter.setFont(theme.small_font(11))
-            painter.drawText(QPointF(x + 8, 22), self._warning)
-        if self._frame is not None and self._drag != "pluck":
-            painter.setFont(theme.small_font(12))
-            painter.setPen(QColor(theme.WARNING if self._frame.past_horizon else theme.FAINT))
-            text = self._frame.caption + ("   past training" if self._frame.past_horizon else "")
-            area = QRectF(self.width() / 2, 8, self.width() / 2 - MARGIN_X, 20)
-            painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)

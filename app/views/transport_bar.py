@@ -103,7 +103,7 @@ class TransportBar(QFrame):
         self._play.setCheckable(True)
         self._play.setToolTip("Play from the pluck, or stop (Space)")
         self._play.clicked.connect(self.play_asked)
-        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (L)")
+        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
         self._loop.setCheckable(True)
         self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         column = QVBoxLayout()

@@ -120,22 +120,16 @@ class Koopman(DiagonalModel):
                 self._initialise_linear_string(physics, generator)
 
     @torch.no_grad()
-    def store_basis(
-        self, log_eigenvalues: Tensor, shapes: Tensor, mixing: Tensor, generator: torch.Generator
-    ) -> None:
-        """Eigenvalues, a decoder that is û = Σ_j Re z_j shape_j where SELU is straight, and the mixing layer.
+    def store_basis(self, log_eigenvalues: Tensor, shapes: Tensor, generator: torch.Generator) -> None:
+        """Eigenvalues, and a decoder that is û = Σ_j Re z_j shape_j where SELU is straight.
 
         Args:
             log_eigenvalues: complex (state_size,).
             shapes: (state_size, grid_points).
-            mixing: (2 state_size, 2 state_size), real parts first.
         """
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         synthesis = torch.cat([shapes.T, torch.zeros_like(shapes.T)], dim=1)
         _store_linear_map(dense_layers(self.decoder), synthesis, generator, straight=FAR, spare=False)
-        last = dense_layers(self.encoder)[-1]
-        last.weight.copy_(mixing)
-        nn.init.zeros_(last.bias)
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         c, modes = self.configuration, physics.modes

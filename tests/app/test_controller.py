@@ -14,7 +14,7 @@ from app.controller import Controller
 from app.main_window import MainWindow
 from app.session import Choices
 from app.settings import Settings, load_settings
-from app.views.string_view import MARGIN_X
+from app.views.string_axes import MARGIN_X
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -57,6 +57,64 @@ def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: 
     assert controller.window.transport.knobs["listen"].value == controller.session.choices.listen
 
 
+def test_the_handle_sets_width_and_shape_and_resets(qtbot: QtBot, controller: Controller) -> None:
+    string, session = view(controller, "string"), controller.session
+    string.width_stepped.emit(1.0)
+    assert session.choices.width == pytest.approx(0.063)
+    string.shape_stepped.emit(1)
+    assert session.choices.shape == "triangular"
+    string.width_stepped.emit(1.0)  # a triangle has none
+    assert session.choices.width == pytest.approx(0.063)
+    session.update(position=0.6, amplitude_mm=7)
+    string.pluck_reset.emit()
+    assert (session.choices.position, session.choices.amplitude_mm, session.choices.width) == (0.35, 4.0, 0.06)
+    session.update(listen=0.9)
+    string.listening_point_reset.emit("left")
+    assert session.choices.listen == Choices().listen
+    assert string._listening == {"left": Choices().listen}
+
+
+def test_the_motion_can_be_switched_off(qtbot: QtBot, controller: Controller) -> None:
+    string = view(controller, "string")
+    wait_for_take(qtbot, controller)
+    controller.player.seek(0.1)
+    qtbot.waitUntil(lambda: string._frame is not None and bool(string._frame.envelopes), timeout=20_000)
+    qtbot.mouseClick(string._toggles[1], LEFT)
+    assert not controller.session.choices.envelope
+    qtbot.waitUntil(lambda: not string._frame.envelopes, timeout=20_000)
+    controller.session.update(motion=False)
+    assert not string._toggles[0].isChecked()
+    qtbot.waitUntil(lambda: string._frame is None, timeout=20_000)
+
+
+def test_gestures_are_undone_one_by_one(qtbot: QtBot, controller: Controller) -> None:
+    window, session, string = controller.window, controller.session, view(controller, "string")
+    start = session.choices
+    assert not controller.history.can_undo
+    at = string._handle(string._axes()).toPoint()
+    qtbot.mousePress(string, LEFT, pos=at)
+    for moved in range(5):
+        qtbot.mouseMove(string, at + QPoint(10 * moved, 5 * moved))
+    qtbot.mouseRelease(string, LEFT, pos=at + QPoint(40, 20))
+    plucked = session.choices
+    assert plucked.position > start.position
+    knob = window.transport.knobs["width"]
+    qtbot.mousePress(knob, LEFT, pos=QPoint(30, 40))
+    for moved in range(3):
+        qtbot.mouseMove(knob, QPoint(30, 35 - 5 * moved))
+    qtbot.mouseRelease(knob, LEFT, pos=QPoint(30, 25))
+    assert session.choices.width > plucked.width
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert session.choices == plucked
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert session.choices == start
+    assert knob.value == start.width
+    redo = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    qtbot.keyClick(window, Qt.Key.Key_Z, redo)
+    assert session.choices == plucked
+    assert string._pluck.position == plucked.position
+
+
 def test_keys(qtbot: QtBot, controller: Controller) -> None:
     window, session, string = controller.window, controller.session, view(controller, "string")
     wait_for_take(qtbot, controller)
@@ -65,7 +123,7 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     qtbot.keyClick(window, Qt.Key.Key_X)
     assert session.choices.heard == "truth"
     qtbot.waitUntil(lambda: controller.player.status().source == "truth", timeout=5_000)
-    qtbot.keyClick(window, Qt.Key.Key_L)
+    qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert session.choices.loop
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: not controller.player.status().playing, timeout=5_000)
@@ -75,6 +133,42 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     assert session.choices.amplitude_mm == 4.5
     qtbot.keyClick(string, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     assert session.choices.listen == pytest.approx(0.36)
+
+
+def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> None:
+    window, session = controller.window, controller.session
+    wait_for_take(qtbot, controller)
+    plucks: list[float] = []
+    controller.instruments.plucked.connect(lambda: plucks.append(session.choices.position))
+    for key in (Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L):
+        qtbot.keyClick(window, key)
+    assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.3 + 0.4 * 8 / 9])
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.keyClick(window, Qt.Key.Key_9)
+    assert session.choices.amplitude_mm == pytest.approx(10)
+    qtbot.keyClick(window, Qt.Key.Key_C)
+    assert 7 < session.choices.amplitude_mm < 8
+    assert len(plucks) == 5
+    knob = window.transport.knobs["seconds"]
+    qtbot.keyClicks(knob, "2")
+    assert knob._editor is not None
+    qtbot.keyClicks(knob._editor, "as")  # writes
+    assert (knob._editor.text(), len(plucks)) == ("2as", 5)
+    assert 7 < session.choices.amplitude_mm < 8
+
+
+def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
+    wait_for_take(qtbot, controller)
+    midi = controller.instruments.midi
+    midi.performed.emit({"position": 0.6, "amplitude_mm": 8.0}, True)
+    assert (controller.session.choices.position, controller.session.choices.amplitude_mm) == (0.6, 8.0)
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.keyClick(controller.window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
+    assert midi._dialog is not None
+    assert midi._dialog.isVisible()
+    midi._remember(midi.choices.learned("width", 74))
+    controller.window.close()
+    assert load_settings(tmp_path / "settings.json")[0].midi.controllers == {"width": 74}
 
 
 def test_presets_are_stepped_and_chosen(qtbot: QtBot, controller: Controller) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.motion import Strobe, frame_at
+from app.motion import Envelope, Strobe, frame_at
 from app.rendering import Take
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
@@ -52,6 +52,21 @@ def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
     assert frame.lowest["model"][50] == pytest.approx(-0.5, abs=0.02)
     assert frame.past_horizon
     assert not frame_at(take, 0.05, 0.05, 1.0).past_horizon
+
+
+def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None:
+    take = Take("t", INFO, Pluck(), 3.0)
+    loud, soft = np.full((4_000, 101), 1e-3, np.float32), np.full((8_001, 101), -1e-4, np.float32)
+    take.append(loud, loud)
+    envelope = Envelope(take)
+    assert envelope.before(0.0) == {}
+    take.append(soft, soft / 2)
+    for position_s, lowest, highest in ((0.5, 1.0, 1.0), (1.5, -0.1, 1.0), (2.5, -0.1, -0.1), (9.0, -0.1, -0.1)):
+        low, high = envelope.before(position_s)["model"]
+        assert (low[50], high[50]) == (pytest.approx(lowest), pytest.approx(highest))
+    assert envelope.before(2.5)["truth"][0][50] == pytest.approx(-0.05)
+    assert frame_at(take, 1.5, 1.5, 1.0, envelope).envelopes["model"][1][50] == pytest.approx(1.0)
+    assert frame_at(take, 1.5, 1.5, 1.0).envelopes == {}
 
 
 def test_a_moment_between_frames_is_between_their_shapes() -> None:

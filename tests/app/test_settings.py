@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from app.midi import MidiChoices
 from app.session import Choices
 from app.settings import (
     DeviceChoice,
@@ -25,6 +26,7 @@ def test_round_trip(tmp_path: Path) -> None:
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         sound=SoundChoice(rate_hz=44_100, buffer=512),
         look=Look(face="light", size_percent=125),
+        midi=MidiChoices(port="Keys", notes="preset", controllers={"width": 74}),
         window_geometry="AdnQyw==",
     )
     save_settings(path, settings)
@@ -36,6 +38,13 @@ def test_a_first_start_has_defaults_and_no_notice(tmp_path: Path) -> None:
     assert load_settings(tmp_path / "nothing.json") == (Settings(), "")
 
 
+def test_a_file_of_a_version_without_midi_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text('{"version": 1, "choices": {"position": 0.6}}')
+    settings, notice = load_settings(path)
+    assert (settings.choices.position, settings.midi, notice) == (0.6, MidiChoices(), "")
+
+
 @pytest.mark.parametrize(
     ("text", "names"),
     [
@@ -44,6 +53,7 @@ def test_a_first_start_has_defaults_and_no_notice(tmp_path: Path) -> None:
         ("[1]", "the file"),
         ('{"choices": {"position": 9}}', "choices.position"),
         ('{"colour": 1}', "colour"),
+        ('{"midi": {"controllers": {"colour": 1}}}', "midi.controllers"),
         ('{"version": 2}', "version"),
     ],
 )

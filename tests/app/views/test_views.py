@@ -8,7 +8,8 @@ from pytestqt.qtbot import QtBot
 
 from app.views.knob import KnobRange
 from app.views.spectrum_view import COLUMNS, Analyser, SpectrumView
-from app.views.string_view import StringFrame, StringView
+from app.views.string_ink import ShownPluck, StringFrame
+from app.views.string_view import StringView
 from app.views.waveform_view import WaveformView, extremes
 
 
@@ -59,7 +60,7 @@ def test_the_string_view_zooms_with_the_decay(qtbot: QtBot) -> None:
     view = StringView()
     qtbot.addWidget(view)
     view.resize(900, 300)
-    view.set_pluck(0.3, 4.0, np.zeros(101))
+    view.set_pluck(ShownPluck(0.3, 4.0, np.zeros(101)))
     view.grab()
     spans = [view._span_mm]
     for peak_mm in (4.0, 1.5, 0.4, 0.05):

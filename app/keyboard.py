@@ -1,0 +1,113 @@
+"""The computer's keyboard as an instrument: a row of keys plucks at ten places, others set how hard.
+
+Keys are known by where they are: the row begins right of Caps lock, whatever is printed on it. No widget here.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE
+
+if TYPE_CHECKING:
+    from engine.preset import PresetInfo  # and torch with it, which settings are read without
+
+PLACES = 10
+ANYWHERE = (0.05, 0.95)  # of a model without trained positions
+ANY_AMPLITUDE_MM = (0.5, 10.0)
+SOFTEST_MM = 0.05
+LARGEST_VELOCITY = 127
+VELOCITY_STEP = 16
+
+# Native codes of the ten keys from A on, and the letters where a platform tells no code.
+_ROW_CODES = {
+    "linux": tuple(range(38, 48)),  # of X11, and of Wayland through Qt
+    "win32": tuple(range(0x1E, 0x28)),
+}
+_ROW_LETTERS = "ASDFGHJKL;"
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where and how hard an instrument of keys plucks: from its lowest to its highest key and velocity."""
+
+    position: tuple[float, float] = ANYWHERE
+    amplitude_mm: tuple[float, float] = ANY_AMPLITUDE_MM
+
+    @classmethod
+    def of(cls, info: PresetInfo | None) -> Reach:
+        """What a preset was trained on, so that every key sounds as learned."""
+        if info is None:
+            return cls()
+        low, high = info.trained_range.position or ANYWHERE
+        low_mm, high_mm = (1000 * peak_m for peak_m in info.trained_range.peak_m)
+        return cls(
+            (max(low, POSITION_RANGE[0]), min(high, POSITION_RANGE[1])),
+            (max(low_mm, SOFTEST_MM), min(high_mm, LARGEST_AMPLITUDE_MM)),
+        )
+
+    def place(self, share: float) -> float:
+        """The position at 0 … 1 of the keys."""
+        low, high = self.position
+        return min(low + min(max(share, 0.0), 1.0) * (high - low), high)
+
+    def amplitude_of(self, velocity: int) -> float:
+        """Velocity 1 … 127 to an amplitude in mm: equal steps in dB."""
+        low, high = self.amplitude_mm
+        share = (min(max(velocity, 1), LARGEST_VELOCITY) - 1) / (LARGEST_VELOCITY - 1)
+        return min(low * (high / low) ** share, high)
+
+    def velocity_of(self, amplitude_mm: float) -> int:
+        """The nearest velocity of an amplitude."""
+        low, high = self.amplitude_mm
+        share = math.log(max(amplitude_mm, low) / low) / math.log(high / low) if high > low else 1.0
+        return round(1 + min(share, 1.0) * (LARGEST_VELOCITY - 1))
+
+
+@dataclass(frozen=True)
+class KeyPress:
+    """A key as a platform tells it: the letter or digit on it, and its native code (0: not told)."""
+
+    letter: str
+    code: int = 0
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a key means: new values of `Choices`, and whether the string is plucked then."""
+
+    changes: dict[str, float]
+    plucks: bool
+
+
+def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
+    """0 … 9 along the row, or None for a key beside it."""
+    codes = _ROW_CODES.get(platform)
+    if codes and press.code:
+        return codes.index(press.code) if press.code in codes else None
+    found = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
+    return found if found >= 0 else None
+
+
+def play(press: KeyPress, reach: Reach, amplitude_mm: float, platform: str = sys.platform) -> Played | None:
+    """The meaning of a key while the string is pulled by `amplitude_mm`; None for a key that is not an instrument's.
+
+    The row plucks; 1 … 9 are velocities from softest to loudest; C and V are softer and harder.
+    """
+    place = place_of(press, platform)
+    if place is not None:
+        return Played({"position": reach.place(place / (PLACES - 1))}, plucks=True)
+    letter = press.letter.upper()
+    if letter and letter in "123456789":
+        return Played({"amplitude_mm": reach.amplitude_of(_ninth(int(letter)))}, plucks=False)
+    step = {"C": -VELOCITY_STEP, "V": VELOCITY_STEP}.get(letter)
+    if step is None:
+        return None
+    return Played({"amplitude_mm": reach.amplitude_of(reach.velocity_of(amplitude_mm) + step)}, plucks=False)
+
+
+def _ninth(digit: int) -> int:
+    return round(1 + (digit - 1) / 8 * (LARGEST_VELOCITY - 1))

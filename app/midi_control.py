@@ -1,0 +1,117 @@
+"""MIDI in the window: the input's messages become what the string does, and the dialog what is remembered.
+
+Messages come in mido's thread and reach the window's thread through a queued signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QWidget
+
+from app.keyboard import Reach
+from app.midi import TURNED, Control, Message, MidiChoices, meaning_of
+from app.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
+from app.views.midi_dialog import MidiDialog
+
+
+class MidiControl(QObject):
+    """`performed` asks for new values of `Choices` and whether the string is plucked; `told` is for the user.
+
+    Attributes:
+        choices: what is to be remembered.
+    """
+
+    performed = Signal(dict, bool)
+    told = Signal(str)
+    _received = Signal(object)  # emitted in mido's thread
+
+    def __init__(
+        self,
+        choices: MidiChoices,
+        reach: Callable[[], Reach],
+        presets: Callable[[], list[str]],
+        parent: QObject | None = None,
+        load: Callable[[], Backend] = load_backend,
+    ) -> None:
+        super().__init__(parent)
+        self.choices = choices
+        self._reach = reach
+        self._presets = presets
+        self._learning: str | None = None  # the field that the next controller is taught
+        self._dialog: MidiDialog | None = None
+        self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
+        self.input = MidiInput(self._received.emit, load)
+
+    def start(self) -> None:
+        """Opens the remembered input, if any; says why it cannot."""
+        if self.choices.port:
+            try:
+                self.input.open(self.choices.port)
+            except MidiUnavailable as error:
+                self.told.emit(str(error))
+
+    def close(self) -> None:
+        self.input.close()
+
+    # The dialog
+
+    def show_dialog(self, window: QWidget) -> None:
+        """Opens it beside the window, which can be played on; or brings it to the front."""
+        if self._dialog is None:
+            dialog = self._dialog = MidiDialog({field: turned.label for field, turned in TURNED.items()}, window)
+            dialog.port_chosen.connect(self._choose_port)
+            dialog.notes_chosen.connect(lambda mode: self._remember(self.choices.model_copy(update={"notes": mode})))
+            dialog.learn_asked.connect(self._learn)
+            dialog.forget_asked.connect(lambda field: self._remember(self.choices.forgotten(field)))
+            dialog.finished.connect(lambda _: self._learn(""))
+        self._show_inputs()
+        self._show_choices()
+        self._dialog.show()
+        self._dialog.raise_()
+
+    def _show_inputs(self) -> None:
+        assert self._dialog is not None
+        try:
+            self._dialog.show_inputs(self.input.names(), self.input.name, "")
+        except MidiUnavailable as error:
+            self._dialog.show_inputs([], "", str(error))
+
+    def _show_choices(self) -> None:
+        if self._dialog is not None:
+            controllers = {str(field): number for field, number in self.choices.controllers.items()}
+            self._dialog.show_choices(self.choices.notes, controllers, self._learning)
+
+    def _choose_port(self, name: str) -> None:
+        assert self._dialog is not None
+        problem = ""
+        try:
+            if name:
+                self.input.open(name)
+            else:
+                self.input.close()
+        except MidiUnavailable as error:
+            problem = str(error)
+        self._remember(self.choices.model_copy(update={"port": self.input.name}))
+        if problem:
+            self._dialog.show_problem(problem)
+
+    def _learn(self, field: str) -> None:
+        """The next controller that moves is taught `field`; "", or the same again: none."""
+        self._learning = field if field and field != self._learning else None
+        self._show_choices()
+
+    def _remember(self, choices: MidiChoices) -> None:
+        self.choices = choices
+        self._show_choices()
+
+    # Messages, in the window's thread
+
+    def _answer(self, message: Message) -> None:
+        if self._learning is not None and isinstance(message, Control):
+            field, self._learning = self._learning, None
+            self._remember(self.choices.learned(field, message.controller))
+        meaning = meaning_of(message, self.choices, self._reach(), self._presets())
+        if meaning.changes or meaning.plucks:
+            self.performed.emit(meaning.changes, meaning.plucks)

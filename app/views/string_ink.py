@@ -1,0 +1,174 @@
+"""What is drawn of the string itself: its motion, the pluck with its handle, the ends, and where it is heard."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QLine, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPen, QPolygonF
+
+from app.views import theme
+from app.views.string_axes import StringAxes
+from app.views.string_ground import paint_grid
+
+HANDLE_RADIUS = 7.0
+DASH = 4  # pixels
+Band = tuple[NDArray[np.float32], NDArray[np.float32]]  # lowest and highest
+
+
+@dataclass(frozen=True)
+class StringFrame:
+    """What the string looks like at one moment; displacements (points,) in mm.
+
+    Attributes:
+        shapes: by source.
+        lowest, highest: by source, the extremes since the last frame: the blur of a string in real time.
+        envelopes: by source, the extremes of a longer time before; empty where they are not shown.
+    """
+
+    shapes: dict[str, NDArray[np.float32]]
+    lowest: dict[str, NDArray[np.float32]]
+    highest: dict[str, NDArray[np.float32]]
+    caption: str = ""
+    past_horizon: bool = False
+    envelopes: Mapping[str, Band] = field(default_factory=dict)
+
+    def largest_mm(self) -> float:
+        """The largest displacement that is drawn of the motion itself."""
+        bands = [*self.lowest.values(), *self.highest.values()]
+        return max(float(np.abs(band).max()) for band in bands)
+
+
+@dataclass(frozen=True)
+class ShownPluck:
+    """The pluck as chosen. shape_mm (points,); `label` says its shape and width."""
+
+    position: float
+    amplitude_mm: float
+    shape_mm: NDArray[np.float64]
+    label: str = ""
+
+
+def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
+    """Both sources, the heard one in front. Opaque fills and thin pens only: this is drawn sixty times a second."""
+    order = [name for name in frame.shapes if name != heard] + [heard]
+    painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
+    for name in order:
+        if name in frame.envelopes:
+            _paint_band(painter, axes, frame.envelopes[name], name, 0.07)
+    for name in order:
+        band = frame.lowest[name], frame.highest[name]
+        _paint_band(painter, axes, band, name, 0.24 if name == heard else 0.18)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    paint_grid(painter, axes)  # the opaque bands have covered it
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    for name in order:
+        painter.setPen(QPen(QColor(theme.SOURCE_COLOURS[name]), 1))
+        curve = axes.curve(frame.shapes[name])
+        for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower
+            painter.drawPolyline(curve.translated(0, shift))
+    painter.setClipping(False)
+
+
+def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
+    """An area with thin edges, so that what lies behind another still tells its extent."""
+    colour = theme.SOURCE_COLOURS[name]
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(theme.blended(colour, theme.PANEL, strength))
+    area, *edges = axes.band(*band)
+    painter.drawPolygon(area)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(QPen(theme.blended(colour, theme.PANEL, 3 * strength), 1))
+    for edge in edges:
+        painter.drawPolyline(edge)
+
+
+def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
+    """The string as it is pulled."""
+    curve = axes.curve(pluck.shape_mm)
+    area = QPolygonF(curve)
+    area.append(axes.at(1, 0))
+    area.append(axes.at(0, 0))
+    fill = QLinearGradient(0, axes.y(pluck.amplitude_mm), 0, axes.middle)
+    fill.setColorAt(0, theme.translucent(theme.TEXT, 60))
+    fill.setColorAt(1, theme.translucent(theme.TEXT, 0))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(fill)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    painter.drawPolygon(area)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(QPen(QColor(theme.TEXT), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+    painter.drawPolyline(curve)
+
+
+def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
+    """The handle: `full` beside a string at rest, a ring while it moves; its words where it is full or grabbed."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    if grabbed:
+        painter.setBrush(theme.translucent(theme.TEXT, 50))
+        painter.drawEllipse(at, 2 * HANDLE_RADIUS, 2 * HANDLE_RADIUS)
+    solid = full or grabbed
+    painter.setPen(QPen(QColor(theme.BACKGROUND if solid else theme.FAINT), 2))
+    painter.setBrush(QColor(theme.TEXT) if solid else QColor(0, 0, 0, 90))
+    painter.drawEllipse(at, HANDLE_RADIUS, HANDLE_RADIUS)
+    if not solid:
+        return
+    painter.setBrush(QColor(theme.BACKGROUND))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.drawEllipse(at, 2.2, 2.2)
+    words = f"{pluck.position:.2f}   {pluck.amplitude_mm:.1f} mm"
+    if pluck.label:
+        words += f"   {pluck.label}"
+    painter.setFont(theme.small_font(12))
+    length = painter.fontMetrics().horizontalAdvance(words)
+    beside = at.x() + 22 if at.x() + 22 + length < right else at.x() - 22 - length
+    plate = QRectF(beside - 6, at.y() - 11, length + 12, 22)
+    painter.setBrush(theme.translucent(theme.RAISED, 220))
+    painter.drawRoundedRect(plate, 4, 4)
+    painter.setPen(QColor(theme.TEXT))
+    painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, words)
+
+
+def paint_ends(painter: QPainter, axes: StringAxes) -> None:
+    """Where the string is fixed."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.FAINT))
+    for x in (axes.x(0), axes.x(1)):
+        painter.drawRoundedRect(QRectF(x - 3, axes.middle - 22, 6, 44), 3, 3)
+
+
+def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, label: str, grabbed: bool) -> None:
+    x = axes.x(position)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if grabbed else 120), 1))
+    painter.drawLines(_dashes(round(x), round(axes.top), round(axes.bottom)))
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.GOOD))
+    y = axes.bottom
+    painter.drawPolygon(QPolygonF([QPointF(x, y + 2), QPointF(x - 8, y + 15), QPointF(x + 8, y + 15)]))
+    painter.setPen(QColor(theme.GOOD))
+    painter.setFont(theme.small_font(11))
+    painter.drawText(QRectF(x - 60, y + 16, 120, 18), Qt.AlignmentFlag.AlignCenter, f"{label} {position:.2f}")
+
+
+def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
+    """The moment, in the corner of the picture."""
+    painter.setFont(theme.small_font(12))
+    painter.setPen(QColor(theme.WARNING if frame.past_horizon else theme.TEXT))
+    area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
+    text = frame.caption + ("   past training" if frame.past_horizon else "")
+    painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+@lru_cache(maxsize=4)
+def _dashes(x: int, top: int, bottom: int) -> list[QLine]:
+    """A vertical line of dashes: a pen that dashes is a hundred times slower."""
+    return [QLine(x, y, x, y + DASH) for y in range(top, bottom - DASH, 2 * DASH)]

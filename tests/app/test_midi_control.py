@@ -1,0 +1,139 @@
+"""The input with a backend of our own in place of mido, and what the window makes of it."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.keyboard import Reach
+from app.midi import Control, Message, MidiChoices
+from app.midi_control import MidiControl
+from app.midi_port import MidiInput, MidiUnavailable, load_backend, same_device
+
+
+class FakeBackend:
+    """Two inputs; `send` speaks in a thread of its own, as mido does."""
+
+    def __init__(self) -> None:
+        self.names = ["Keys:Keys 20:0", "Pads:Pads 24:0"]
+        self.busy = False
+        self.open_name = ""
+        self._callback: Callable[[Any], None] | None = None
+
+    def get_input_names(self) -> list[str]:
+        return self.names
+
+    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> FakeBackend:
+        if self.busy:
+            raise OSError("resource busy")
+        self.open_name, self._callback = name, callback
+        return self
+
+    def close(self) -> None:
+        self.open_name, self._callback = "", None
+
+    def send(self, kind: str, **facts: int) -> None:
+        callback = self._callback
+        assert callback is not None
+        thread = threading.Thread(target=callback, args=(SimpleNamespace(type=kind, **facts),))
+        thread.start()
+        thread.join()
+
+
+def test_an_input_is_found_again_under_new_numbers() -> None:
+    backend, heard = FakeBackend(), list[Message]()
+    midi = MidiInput(heard.append, lambda: backend)
+    midi.open("Pads:Pads 31:0")
+    assert (midi.name, backend.open_name) == ("Pads:Pads 24:0", "Pads:Pads 24:0")
+    backend.send("control_change", control=1, value=2)
+    backend.send("clock")
+    assert heard == [Control(1, 2)]
+    midi.close()
+    midi.close()
+    assert (midi.name, backend.open_name) == ("", "")
+    assert not same_device("Keys 1", "Keys 2")
+
+
+def test_faults_are_told_in_plain_words() -> None:
+    backend = FakeBackend()
+    midi = MidiInput(lambda message: None, lambda: backend)
+    with pytest.raises(MidiUnavailable, match="Strings is not connected"):
+        midi.open("Strings")
+    backend.busy = True
+    with pytest.raises(MidiUnavailable, match="Another program"):
+        midi.open("Keys:Keys 20:0")
+    assert midi.name == ""
+
+
+def test_without_the_packages_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mido", None)
+    with pytest.raises(MidiUnavailable, match=r"pip install mido python-rtmidi"):
+        load_backend()
+
+
+@pytest.fixture
+def backend() -> FakeBackend:
+    return FakeBackend()
+
+
+@pytest.fixture
+def midi(qtbot: QtBot, backend: FakeBackend) -> MidiControl:
+    choices = MidiChoices(port="Keys:Keys 9:0")
+    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: ["a", "b"], None, lambda: backend)
+
+
+def test_messages_reach_the_windows_thread(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+    midi.start()
+    threads = []
+    midi.performed.connect(lambda changes, plucks: threads.append(threading.current_thread()))
+    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+        backend.send("note_on", note=96, velocity=127)
+    assert performed.args == [{"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}, True]
+    assert threads == [threading.main_thread()]
+
+
+def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.show_dialog(window)
+    dialog = midi._dialog
+    assert dialog is not None
+    taught, learn, forget = dialog._rows["width"]
+    assert not forget.isEnabled()
+    dialog.port_chosen.emit("Pads:Pads 24:0")
+    assert midi.choices.port == "Pads:Pads 24:0"
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
+    assert "move" in taught.text()
+    with qtbot.waitSignal(midi.performed, timeout=5_000):
+        backend.send("control_change", control=74, value=127)
+    assert midi.choices.controllers == {"width": 74}
+    assert taught.text() == "controller 74"
+    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+        backend.send("control_change", control=74, value=0)
+    assert performed.args == [{"width": pytest.approx(0.02)}, False]
+    qtbot.mouseClick(forget, Qt.MouseButton.LeftButton)
+    assert midi.choices.controllers == {}
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)  # thought better of it
+    assert not learn.isChecked()
+
+
+def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+    backend.names = []
+    with qtbot.waitSignal(midi.told) as told:
+        midi.start()
+    assert "not connected" in told.args[0]
+    assert midi.choices.port == "Keys:Keys 9:0"
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.show_dialog(window)
+    assert midi._dialog is not None
+    assert midi._dialog._inputs.currentText() == "no MIDI input found"

@@ -1,0 +1,221 @@
+"""Gestures on the string, and that what is given to it is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.views.string_axes import StringAxes
+from app.views.string_ground import TrainedPlucks
+from app.views.string_ink import ShownPluck, StringFrame
+from app.views.string_view import StringView
+
+LEFT = Qt.MouseButton.LeftButton
+SHIFT, CONTROL = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+NONE = Qt.KeyboardModifier.NoModifier
+
+
+@pytest.fixture
+def view(qtbot: QtBot) -> StringView:
+    """A string plucked at 0.5 by 4 mm that follows what is asked of it."""
+    made = StringView()
+    qtbot.addWidget(made)
+    made.resize(900, 300)
+    made.show()
+    made.set_listening_points(0.37)
+    made.pluck_drawn.connect(lambda position, mm: made.set_pluck(ShownPluck(position, mm, np.zeros(101))))
+    made.pluck_drawn.emit(0.5, 4.0)
+    made.grab()
+    return made
+
+
+def handle(view: StringView) -> QPoint:
+    return view._handle(view._axes()).toPoint()
+
+
+def wheel(view: StringView, at: QPoint, delta: int, modifiers: Qt.KeyboardModifier = NONE) -> bool:
+    event = QWheelEvent(
+        QPointF(at), QPointF(at), QPoint(), QPoint(0, delta), Qt.MouseButton.NoButton, modifiers,
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(view, event)
+    return event.isAccepted()
+
+
+def recorded(signal: object) -> list[tuple[object, ...]]:
+    seen: list[tuple[object, ...]] = []
+    signal.connect(lambda *values: seen.append(values))  # type: ignore[attr-defined]
+    return seen
+
+
+def test_axes_go_to_pixels_and_back() -> None:
+    axes = StringAxes(900, 300, 5.0)
+    assert axes.position(axes.x(0.3)) == pytest.approx(0.3)
+    assert axes.displacement_mm(axes.y(-2.5)) == pytest.approx(-2.5)
+    curve = axes.curve(np.array([0.0, 5.0, 0.0])).toList()
+    assert [(p.x(), p.y()) for p in curve] == [
+        (axes.x(0), axes.middle),
+        (axes.x(0.5), axes.top),
+        (axes.x(1), axes.middle),
+    ]
+    outlines = axes.band(np.array([-1.0, -2.0]), np.array([1.0, 2.0]))
+    heights = [[round(axes.displacement_mm(p.y()), 6) for p in outline.toList()] for outline in outlines]
+    assert heights == [[-1, -2, 2, 1], [-1, -2], [1, 2]]
+
+
+def test_the_handle_is_dragged_without_a_jump_and_shift_is_finer(qtbot: QtBot, view: StringView) -> None:
+    started, ended, released = recorded(view.drag_started), recorded(view.drag_ended), recorded(view.pluck_released)
+    grip = handle(view) + QPoint(5, 4)
+    qtbot.mousePress(view, LEFT, pos=grip)
+    assert (view._pluck.position, view._pluck.amplitude_mm) == (0.5, 4.0)
+    qtbot.mouseMove(view, grip + QPoint(80, 0))
+    moved = view._pluck.position - 0.5
+    assert moved == pytest.approx(80 / view._axes().length)
+    assert view._pluck.amplitude_mm == pytest.approx(4.0)
+    qtbot.mouseRelease(view, LEFT, pos=grip + QPoint(80, 0))
+    assert (len(started), len(ended), len(released)) == (1, 1, 1)
+
+
+def test_a_drag_beyond_the_top_grows_steadily(qtbot: QtBot, view: StringView) -> None:
+    """The scale steps up under the pointer; the amplitude must not jump with it."""
+    at = handle(view)
+    qtbot.mousePress(view, LEFT, pos=at)
+    before = view._pluck.amplitude_mm
+    for _ in range(12):
+        at -= QPoint(0, 5)
+        qtbot.mouseMove(view, at)
+        view.grab()
+        assert 0 < view._pluck.amplitude_mm - before < 1.0
+        before = view._pluck.amplitude_mm
+    assert view._span_mm > 5
+
+
+def test_the_wheel_over_the_handle_sets_width_and_with_shift_the_shape(view: StringView) -> None:
+    widths, shapes = recorded(view.width_stepped), recorded(view.shape_stepped)
+    assert wheel(view, handle(view), 120)
+    assert wheel(view, handle(view), -60, SHIFT)
+    assert wheel(view, handle(view), -60, SHIFT)
+    assert not wheel(view, QPoint(100, 200), 120)
+    assert (widths, shapes) == ([(1.0,)], [(-1,)])
+
+
+def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot: QtBot, view: StringView) -> None:
+    resets, plucks = recorded(view.pluck_reset), recorded(view.pluck_released)
+
+    def double_click(at: QPoint) -> None:
+        qtbot.mouseClick(view, LEFT, pos=at)
+        qtbot.mouseDClick(view, LEFT, pos=at)
+        qtbot.mouseRelease(view, LEFT, pos=at)
+
+    double_click(QPoint(200, 100))  # the first click brings the handle there: twice plucked
+    assert (resets, len(plucks)) == ([], 2)
+    view._last_press_ms = -10_000  # a while later
+    double_click(handle(view))
+    assert (len(resets), len(plucks)) == (1, 3)
+
+
+def test_the_pointer_tells_what_can_be_grabbed(qtbot: QtBot, view: StringView) -> None:
+    shapes, tips = set(), set()
+    axes = view._axes()
+    for at in (QPoint(200, 200), handle(view), QPoint(round(axes.x(0.37)), int(axes.bottom) + 8)):
+        qtbot.mouseMove(view, at)
+        shapes.add(view.cursor().shape())
+        tips.add(view.toolTip())
+    assert len(shapes) == len(tips) == 3
+
+
+def test_two_markers_are_told_apart_and_reset(qtbot: QtBot, view: StringView) -> None:
+    view.set_listening_points(0.2, 0.6)
+    moved, resets = recorded(view.listening_point_moved), recorded(view.listening_point_reset)
+    axes = view._axes()
+    y = int(axes.bottom) + 8
+    for side, position in (("left", 0.2), ("right", 0.6)):
+        at = QPoint(round(axes.x(position)), y)
+        qtbot.mousePress(view, LEFT, pos=at)
+        qtbot.mouseMove(view, at + QPoint(20, 0))
+        qtbot.mouseRelease(view, LEFT, pos=at)
+        assert moved[0] == (side, pytest.approx(position + 20 / axes.length, abs=0.001))
+        moved.clear()
+    qtbot.mouseDClick(view, LEFT, pos=QPoint(round(axes.x(0.6)), y))
+    assert resets == [("right",)]
+
+
+@pytest.mark.parametrize(
+    ("key", "held", "signal", "values"),
+    [
+        (Qt.Key.Key_Right, NONE, "pluck_drawn", (pytest.approx(0.51), 4.0)),
+        (Qt.Key.Key_Down, NONE, "pluck_drawn", (0.5, 3.5)),
+        (Qt.Key.Key_Up, SHIFT, "pluck_drawn", (0.5, pytest.approx(4.05))),
+        (Qt.Key.Key_Left, SHIFT, "listening_point_moved", ("left", pytest.approx(0.36))),
+        (Qt.Key.Key_Right, SHIFT | CONTROL, "listening_point_moved", ("right", pytest.approx(0.71))),
+        (Qt.Key.Key_Up, CONTROL, "width_stepped", (1.0,)),
+        (Qt.Key.Key_Left, CONTROL, "shape_stepped", (-1,)),
+        (Qt.Key.Key_Delete, NONE, "pluck_reset", ()),
+        (Qt.Key.Key_Delete, SHIFT, "listening_point_reset", ("left",)),
+    ],
+)
+def test_everything_by_keyboard(
+    qtbot: QtBot,
+    view: StringView,
+    key: Qt.Key,
+    held: Qt.KeyboardModifier,
+    signal: str,
+    values: tuple[object, ...],
+) -> None:
+    view.set_listening_points(0.37, 0.7)
+    seen = recorded(getattr(view, signal))
+    qtbot.keyClick(view, key, held)
+    assert seen[0] == values
+
+
+def picture(view: StringView) -> QImage:
+    return view.grab().toImage()
+
+
+def test_shading_envelope_and_focus_are_seen(qtbot: QtBot, view: StringView) -> None:
+    plain = picture(view)
+    view.set_trained(TrainedPlucks((0.3, 0.7), (1.0, 2.0)))
+    shaded = picture(view)
+    axes = view._axes()
+    for position, mm in ((0.1, 3.0), (0.9, -3.0), (0.4, 3.0), (0.4, 0.5)):
+        at = axes.at(position, mm).toPoint()
+        assert any(shaded.pixel(at + QPoint(i, 0)) != plain.pixel(at + QPoint(i, 0)) for i in range(8)), (
+            position,
+            mm,
+        )
+    inside = axes.at(0.42, 1.5).toPoint()
+    assert shaded.pixel(inside) == plain.pixel(inside)
+    still = np.zeros(101, np.float32)
+    both = {"model": still, "truth": still}
+    view.show_frame(StringFrame(both, both, both))
+    without = picture(view)
+    reach = dict.fromkeys(both, (still - 0.05, still + 0.05))
+    view.show_frame(StringFrame(both, both, both, envelopes=reach))
+    at = view._axes().at(0.42, 0.03).toPoint()
+    assert picture(view).pixel(at) != without.pixel(at)
+
+
+def test_the_pluck_comes_back_when_no_motion_is_shown(view: StringView) -> None:
+    rest = picture(view)
+    still = np.zeros(101, np.float32)
+    both = {"model": still, "truth": still}
+    view.show_frame(StringFrame(both, both, both))
+    assert picture(view) != rest
+    view.show_frame(None)
+    picture(view)  # its scale comes back first
+    assert picture(view) == rest
+
+
+def test_the_switches_say_what_is_wanted_and_show_what_is(qtbot: QtBot, view: StringView) -> None:
+    motion, envelope = view._toggles
+    view.set_shown(True, False)
+    assert (motion.isChecked(), envelope.isChecked()) == (True, False)
+    asked = recorded(view.motion_toggled)
+    qtbot.mouseClick(motion, LEFT)
+    assert asked == [(False,)]
+    view.set_shown(False, True)
+    assert not envelope.isEnabled()
