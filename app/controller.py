@@ -18,9 +18,11 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, Track, output_devices
-from app.library import Library, PresetEntry, list_presets
+from app.dropping import receive
+from app.library import Library, PresetEntry
 from app.main_window import MainWindow
 from app.panels import Moment, Panel, SpectrumPanel, StringPanel, WaveformPanel
+from app.preset_desk import PresetDesk
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import DeviceChoice, Settings, save_settings
@@ -89,8 +91,9 @@ class Controller(QObject):
         self._last_tick_s = time.monotonic()
         self._asked_rate_hz = 0
         self._audio_notice = ""
-        entries, problems = list_presets()
-        self.library = Library(entries)
+        self.library = Library([])
+        problems = self.library.refresh()
+        self.presets = PresetDesk(self.session, self.library, window.presets, window.browser, settings.favourites)
         self.panels = self._make_panels()
         self._connect()
         if self.entry is None and (first := self.library.first()):
@@ -126,11 +129,12 @@ class Controller(QObject):
     def _connect(self) -> None:
         window, session = self.window, self.session
         session.changed.connect(self._choices_changed)
-        window.presets.set_entries(self.library.entries)
-        window.presets.preset_chosen.connect(lambda name: session.update(preset=name))
-        window.presets.step_asked.connect(self._step_preset)
-        window.previous_asked.connect(lambda: self._step_preset(-1))
-        window.next_asked.connect(lambda: self._step_preset(1))
+        self.presets.pluck_asked.connect(self.pluck)
+        self.presets.told.connect(window.notices.tell)
+        window.previous_asked.connect(lambda: self.presets.step(-1))
+        window.next_asked.connect(lambda: self.presets.step(1))
+        window.browse_asked.connect(self.presets.toggle)
+        window.file_dropped.connect(lambda path: self.take_file(Path(path)))
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.transport.export_asked.connect(self.export)
@@ -181,6 +185,14 @@ class Controller(QObject):
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
+    def take_file(self, file: Path) -> None:
+        """A dropped preset is taken in and chosen; a dropped WAV's recipe is restored."""
+        dropped = receive(file, self.library)
+        if dropped.choices:
+            self.session.update(**dropped.choices)
+        if dropped.notice:
+            self.window.notices.tell(dropped.notice)
+
     @property
     def entry(self) -> PresetEntry | None:
         """The chosen preset."""
@@ -190,7 +202,11 @@ class Controller(QObject):
         """Saves the choices and ends every thread."""
         self._timer.stop()
         self._settings = self._settings.model_copy(
-            update={"choices": self.session.choices, "window_geometry": self.window.geometry_text()}
+            update={
+                "choices": self.session.choices,
+                "favourites": tuple(sorted(self.presets.favourites)),
+                "window_geometry": self.window.geometry_text(),
+            }
         )
         try:
             save_settings(self._settings_path, self._settings)
@@ -215,7 +231,7 @@ class Controller(QObject):
         choices, window = self.session.choices, self.window
         window.transport.show_choices(choices)
         if "preset" in names:
-            window.presets.set_chosen(choices.preset)
+            self.presets.choice_changed()
         window.left.show_key(choices.left_view)
         window.right.show_key(choices.right_view)
         for panel in self.panels:
@@ -226,9 +242,6 @@ class Controller(QObject):
             self.player.set_loop(choices.loop)
         if "volume_db" in names:
             self.player.set_volume_db(choices.volume_db)
-
-    def _step_preset(self, step: int) -> None:
-        self.session.step_preset(self.library.names, step)
 
     # Rendering
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -20,6 +20,7 @@ from app.views.deck import Deck
 from app.views.notice_bar import NoticeBar
 from app.views.parts import tool_button
 from app.views.preset_bar import PresetBar
+from app.views.preset_browser import PresetBrowser
 from app.views.transport_bar import TransportBar
 
 KEYS = (  # (key, name of the signal, what it does)
@@ -29,6 +30,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
+    ("Ctrl+P", "browse_asked", "browse the presets"),
     ("Ctrl+E", "export_asked", "export WAV"),
     ("F1", "help_asked", "these keys"),
     ("Ctrl+Q", "quit_asked", "quit"),
@@ -44,7 +46,9 @@ class MainWindow(QMainWindow):
     loop_asked = Signal()
     previous_asked = Signal()
     next_asked = Signal()
+    browse_asked = Signal()
     export_asked = Signal()
+    file_dropped = Signal(str)  # a path
     help_asked = Signal()
     quit_asked = Signal()
     closing = Signal()
@@ -69,6 +73,8 @@ class MainWindow(QMainWindow):
         self._audio_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self._audio_button.setMenu(self.audio_menu)
         self._lay_out()
+        self.browser = PresetBrowser(self)
+        self.setAcceptDrops(True)
         for key, signal, _ in KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setAutoRepeat(False)
@@ -134,6 +140,16 @@ class MainWindow(QMainWindow):
             f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
             "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
         )
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if any(url.isLocalFile() for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        event.acceptProposedAction()
+        for url in event.mimeData().urls():
+            if url.isLocalFile():
+                self.file_dropped.emit(url.toLocalFile())
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()

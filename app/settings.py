@@ -44,6 +44,7 @@ class Settings(BaseModel):
     choices: Choices = Choices()
     export: ExportChoices = ExportChoices()
     device: DeviceChoice | None = None
+    favourites: tuple[str, ...] = ()  # names of presets
     window_geometry: str = ""  # Qt's, in base64
 
 

@@ -24,6 +24,15 @@ QWidget {{ color: {TEXT}; font-size: 12px; }}
 QMainWindow, QDialog {{ background: {BACKGROUND}; }}
 QFrame#rule {{ background: {LINE}; }}
 QFrame#panel {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: 6px; }}
+QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius: 8px; }}
+QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
+QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
+QTreeWidget::item {{ padding: 6px 5px; }}
+QTreeWidget::item:hover {{ background: {RAISED}; }}
+QTreeWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
+QTreeWidget:focus {{ border: 1px solid {FAINT}; }}
+QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; padding: 5px; }}
+QPushButton#preset {{ text-align: left; font-weight: 600; padding: 6px 12px; }}
 QLabel {{ background: transparent; }}
 QLabel#faint {{ color: {FAINT}; }}
 QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
