@@ -107,9 +107,7 @@ def export_sounds(
     Raises:
         As `export_sound`.
     """
-    settings = settings or WavSettings()
-    if request.decay_db is not None:
-        settings = replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
+    settings = settings_of(request, settings or WavSettings())
     requests = {source: replace(request, source=source) for source in paths}
     info = request.preset.info
     with ExitStack() as files:
@@ -134,6 +132,13 @@ def export_sounds(
             past_s = max(0.0, wav.frames / wav.rate_hz - info.horizon_s) if labels else 0.0
             reports.append(replace(write(wav), past_training_s=past_s, decayed=voices.ended))
     return reports, voices
+
+
+def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
+    """The settings that a request is written with: an end by decay fades longer."""
+    if request.decay_db is None:
+        return settings
+    return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
 def write_wav(
@@ -217,5 +222,6 @@ __all__ = [
     "export_sounds",
     "render_signal",
     "render_sound",
+    "settings_of",
     "write_wav",
 ]

@@ -21,6 +21,7 @@ COMMANDS = [
     "predict",
     "render",
     "info",
+    "batch",
     "compare",
     "dataset",
     "train",
