@@ -181,7 +181,7 @@ class Controller(QObject):
         if entry is None:
             self.window.notices.tell("There is no preset to export: choose one first.")
             return
-        dialog = ExportDialog(entry, self.session.choices, self._settings.export, self.window)
+        dialog = ExportDialog(self.library.entries, self.session.choices, self._settings.export, self.window)
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 

@@ -10,20 +10,38 @@ from platformdirs import user_config_path
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from app.session import Choices
+from app.sound import Source
 from engine.whole_file import whole_file
 
 
+class BatchChoices(BaseModel):
+    """The batch page's last state; lists as they were typed."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    presets: tuple[str, ...] = ()
+    positions: str = ""
+    amplitudes: str = ""
+    sources: tuple[Source, ...] = ("model",)
+    folder: str = ""
+
+
 class ExportChoices(BaseModel):
-    """The export dialog's last state. rate_hz 0: the model's own rate."""
+    """The export dialog's last state. rate_hz 0: the model's own rate; source "files": both, a file each."""
 
     model_config = ConfigDict(extra="forbid")
 
     folder: str = ""
-    source: Literal["model", "truth", "difference"] = "model"
+    source: Literal["model", "truth", "difference", "both", "files"] = "model"
     rate_hz: int = 48_000
     bits: Literal["16", "24", "32f"] = "24"
+    until_decayed: bool = True
+    decay_db: float = 60.0
+    longest_s: float = 30.0
     seconds: float = 4.0
     normalise: bool = False
+    difference_gain_db: float = 20.0
+    batch: BatchChoices = BatchChoices()
 
 
 class DeviceChoice(BaseModel):

@@ -136,8 +136,8 @@ class PresetBrowser(QFrame):
         grid.addWidget(card, 1, 1)
         grid.addLayout(foot, 2, 0, 1, 2)
         grid.addWidget(hint, 3, 0, 1, 2)
-        grid.setColumnStretch(0, 3)
-        grid.setColumnStretch(1, 2)
+        grid.setColumnStretch(0, 4)
+        grid.setColumnStretch(1, 3)
         grid.setRowStretch(1, 1)
 
     # What is shown
@@ -284,7 +284,7 @@ class PresetBrowser(QFrame):
         parent = self.parentWidget()
         if parent is not None:
             top = 52
-            width, height = min(1040, parent.width() - 28), min(560, parent.height() - top - 140)
+            width, height = min(1240, parent.width() - 28), min(560, parent.height() - top - 140)
             self.setGeometry(14, top, width, max(300, height))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from app.library import PresetEntry
+from app.preset_folders import user_folder
 from app.preset_words import (
     initial_word,
     model_meaning,
@@ -23,7 +24,7 @@ def preset_card(entry: PresetEntry) -> str:
     """Title, description and a table of facts; what the preset does not say is left out."""
     info = entry.info
     rows = "".join(
-        f"<tr><td style='color: {FAINT}; padding: 3px 14px 3px 0'>{name}</td>"
+        f"<tr><td style='color: {FAINT}; padding: 3px 14px 3px 0; white-space: nowrap'>{name}</td>"
         f"<td style='padding: 3px 0'>{escape(text)}</td></tr>"
         for name, text in _facts(entry)
     )
@@ -66,8 +67,12 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
         facts.append(("Trained in", time_word(info.training_seconds)))
     if _can_be_remade(entry.name):
         facts.append(("To remake", f"learned-strings train {entry.name}"))
-    facts += [("Licence", info.licence), ("File", str(entry.path))]
+    facts += [("Licence", info.licence), ("File", f"{entry.name}, {_place(entry)}")]
     return facts
+
+
+def _place(entry: PresetEntry) -> str:
+    return "your own" if entry.path.parent == user_folder() else "shipped with the program"
 
 
 def _can_be_remade(name: str) -> bool:
