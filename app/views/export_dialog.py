@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
-    QTabWidget,
+    QTabBar,
     QVBoxLayout,
     QWidget,
 )
@@ -67,7 +67,8 @@ class ExportDialog(QDialog):
         self._lay_out()
         for part in (self.sound, self.batch, self.form):
             part.changed.connect(self._update)
-        self._pages.currentChanged.connect(self._update)
+        self.tabs.currentChanged.connect(self._turn)
+        self.batch.hide()
         self._update()
 
     def export_choices(self) -> ExportChoices:
@@ -77,9 +78,12 @@ class ExportDialog(QDialog):
         return ExportChoices.model_validate({**self._export.model_dump(), **self.form.choices(), **more})
 
     def _lay_out(self) -> None:
-        self._pages = QTabWidget()
-        self._pages.addTab(self.sound, "This pluck")
-        self._pages.addTab(self.batch, "Batch")
+        self.tabs = QTabBar()
+        self.tabs.setAccessibleName("What to export")
+        self.tabs.addTab("This pluck")
+        self.tabs.addTab("Batch")
+        self.tabs.setDrawBase(False)
+        self.tabs.setExpanding(False)
         self.state = QLabel(_RECIPE_NOTE)
         self.state.setObjectName("faint")
         self.state.setWordWrap(True)
@@ -91,6 +95,7 @@ class ExportDialog(QDialog):
         self.show_folder.setToolTip("Open the folder of what was saved")
         self.show_folder.clicked.connect(self._open_folder)
         self.save = QPushButton("Export", default=True)
+        self.save.setObjectName("primary")
         self.save.setToolTip("Render and save")
         self.save.clicked.connect(self._start)
         self.close_button = QPushButton("Close")
@@ -102,8 +107,8 @@ class ExportDialog(QDialog):
         buttons.addWidget(self.save)
         column = QVBoxLayout(self)
         column.setSpacing(12)
-        column.addWidget(self._pages)
-        column.addWidget(self.form)
+        for part in (self.tabs, self.sound, self.batch, self.form):
+            column.addWidget(part)
         column.addStretch(1)
         column.addWidget(self.bar)
         column.addWidget(self.state)
@@ -113,14 +118,22 @@ class ExportDialog(QDialog):
 
     @property
     def _is_batch(self) -> bool:
-        return self._pages.currentWidget() is self.batch
+        return self.tabs.currentIndex() == 1
+
+    def _turn(self) -> None:
+        """To the other page."""
+        self.sound.setVisible(not self._is_batch)
+        self.batch.setVisible(self._is_batch)
+        self._say(_RECIPE_NOTE)
+        self._update()
+        self.adjustSize()
 
     def _update(self) -> None:
         if self._job is not None:
             return
         export = self.export_choices()
         self.sound.suggest_name(export.rate_hz)
-        self.form.gain.setEnabled(self._is_batch or export.source == "difference")
+        self.form.show_difference("difference" in (export.batch.sources if self._is_batch else (export.source,)))
         if not self._is_batch:
             there = any(path.is_file() for path in self.sound.paths().values())
             self.save.setText("Replace" if there else "Export")
@@ -171,7 +184,7 @@ class ExportDialog(QDialog):
         self._job.finished.connect(told)
         self._job.failed.connect(lambda message: self._end(message, failed=True))
         self._job.cancelled.connect(self._tell_cancelled)
-        for part in (self._pages, self.form, self.save):
+        for part in (self.tabs, self.sound, self.batch, self.form, self.save):
             part.setEnabled(False)
         self.close_button.setText("Cancel")
         self.bar.setValue(0)
@@ -218,7 +231,7 @@ class ExportDialog(QDialog):
             self._job.wait()
             self._job = None
         self.bar.hide()
-        for part in (self._pages, self.form, self.save):
+        for part in (self.tabs, self.sound, self.batch, self.form, self.save):
             part.setEnabled(True)
         self.close_button.setText("Close")
         self._update()

@@ -133,6 +133,7 @@ class BatchPage(QWidget):
             source: QCheckBox(source.capitalize()) for source in SOURCES if not (stereo and source == "both")
         }
         for source, box in self.sources.items():
+            box.setMinimumSize(92, 28)
             box.setToolTip({data: text for text, data in SOURCE_NAMES}[source])
             box.setChecked(source in batch.sources)
         self.overwrite = QCheckBox("Render again what is there already")
@@ -145,7 +146,7 @@ class BatchPage(QWidget):
         form.setContentsMargins(0, 12, 0, 0)
         form.addRow(label("Presets"), self.presets)
         form.addRow(label("Positions"), self.positions)
-        form.addRow(label("Amplitudes"), self.amplitudes)
+        form.addRow(label("Amplitudes, mm"), self.amplitudes)
         form.addRow(label("Sources"), row_of(*self.sources.values()))
         form.addRow(label("Folder"), place)
         form.addRow(label(""), row_of(self.overwrite))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QBrush, QColor, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -33,6 +33,7 @@ from app.preset_filter import PresetFilter
 from app.preset_words import error_word, model_word, rate_word, string_word
 from app.views.parts import combo_box, tool_button
 from app.views.preset_card import preset_card
+from app.views.theme import FAINT
 
 _KEYS = Qt.Key
 _MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
@@ -69,7 +70,7 @@ class PresetBrowser(QFrame):
         for box in (self._strings, self._models, self._rates):
             box.setToolTip(f"Show only presets of this {box.accessibleName().lower()}")
             box.currentIndexChanged.connect(self._tell_filter)
-        self._starred = tool_button("★", "Favourites only", "Show only favourites")
+        self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
         self._starred.setCheckable(True)
         self._starred.toggled.connect(self._tell_filter)
         self.list = self._build_list()
@@ -171,6 +172,8 @@ class PresetBrowser(QFrame):
                 item.setToolTip(_STAR, "Favourite (Ctrl+D)")
                 for column in (_RATE, _ERROR):
                     item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                if star == "☆":
+                    item.setForeground(_STAR, QBrush(QColor(FAINT)))
                 self.list.addTopLevelItem(item)
         found = f"{len(entries)} of {total} presets" if len(entries) < total else f"{total} presets"
         self._state.setText(f"{found}   ·   your own: {folder}" if total else f"No presets   ·   your own: {folder}")

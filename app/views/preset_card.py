@@ -28,8 +28,9 @@ def preset_card(entry: PresetEntry) -> str:
         f"<td style='padding: 3px 0'>{escape(text)}</td></tr>"
         for name, text in _facts(entry)
     )
-    head = f"<p style='font-size: 15px'><b>{escape(info.title)}</b></p><p>{escape(info.description)}</p>"
-    return f"{head}<table>{rows}</table>"
+    title = f"<p style='font-size: 15px'><b>{escape(info.title)}</b></p>"
+    what = f"<p style='margin-bottom: 12px'>{escape(info.description)}</p>"
+    return f"{title}{what}<table>{rows}</table>"
 
 
 def preset_summary(entry: PresetEntry) -> str:

@@ -12,7 +12,7 @@ from app.wav import Bits, WavSettings
 
 RATES_HZ = (0, 44_100, 48_000, 96_000)  # 0: the model's own
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
-LABEL_WIDTH = 92
+LABEL_WIDTH = 104
 
 
 class SoundForm(QWidget):
@@ -36,6 +36,7 @@ class SoundForm(QWidget):
         self._rate_note = _faint()
         self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
         self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
+        self.normalise.setMinimumHeight(28)
         self.normalise.setToolTip("Off: 10 mm of displacement are full scale, as in playback at 0 dB")
         self.normalise.setChecked(export.normalise)
         self.gain = spin_box(
@@ -45,12 +46,14 @@ class SoundForm(QWidget):
         self.gain.setToolTip("How much louder the difference of model and truth is made")
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
-        form.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
         form.addRow(label("Length"), row_of(self.length, self.decay, self.longest, self.seconds))
         form.addRow(label("Sample rate"), row_of(self.rate, self._rate_note))
         form.addRow(label("Format"), row_of(self.bits))
         form.addRow(label("Level"), row_of(self.normalise))
-        form.addRow(label("Difference"), row_of(self.gain, _faint("louder than it is")))
+        self._difference = QWidget()
+        self._difference.setLayout(row_of(self.gain, _faint("louder than it is")))
+        form.addRow(label("Difference"), self._difference)
+        self._form = form
         for box in (self.length, self.rate, self.bits):
             box.currentIndexChanged.connect(self._update)
         for spin in (self.decay, self.longest, self.seconds, self.gain):
@@ -70,6 +73,10 @@ class SoundForm(QWidget):
             "normalise": self.normalise.isChecked(),
             "difference_gain_db": self.gain.value(),
         }
+
+    def show_difference(self, shown: bool) -> None:
+        """Whether the gain of the difference matters."""
+        self._form.setRowVisible(self._difference, shown)
 
     def _update(self) -> None:
         decays = self.length.currentData()
@@ -92,12 +99,14 @@ def label(text: str) -> QLabel:
     """A form's label, as wide as all of them so that the forms of the dialog stand in line."""
     made = QLabel(text)
     made.setFixedWidth(LABEL_WIDTH)
+    made.setMinimumHeight(28)
     made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     return made
 
 
 def row_of(*widgets: QWidget) -> QHBoxLayout:
     row = QHBoxLayout()
+    row.setContentsMargins(0, 0, 0, 0)
     for widget in widgets:
         row.addWidget(widget)
     row.addStretch(1)
@@ -109,6 +118,9 @@ def spin_box(
 ) -> QDoubleSpinBox:
     spin = QDoubleSpinBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, decimals=decimals)
     spin.setAccessibleName(name)
+    spin.lineEdit().setTextMargins(6, 0, 0, 0)
+
+    spin.setMinimumWidth(84)
     spin.setValue(value)
     return spin
 

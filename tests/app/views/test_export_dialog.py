@@ -135,7 +135,7 @@ def test_its_state_is_remembered(made, tmp_path: Path) -> None:
 
 def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made({"batch": {"presets": ("small", "other"), "sources": ("model", "truth"), "positions": "0.3, 0.4"}})
-    dialog._pages.setCurrentWidget(dialog.batch)
+    dialog.tabs.setCurrentIndex(1)
     assert dialog.save.text() == "Export 8 files"
     for field, text, words in (
         (dialog.batch.positions, "0.3, x", "positions: numbers with commas"),
@@ -158,7 +158,7 @@ def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Pa
 def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_path: Path) -> None:
     positions = ", ".join(f"{0.2 + 0.01 * i:.2f}" for i in range(60))
     dialog = made({"seconds": 2, "batch": {"positions": positions}})
-    dialog._pages.setCurrentWidget(dialog.batch)
+    dialog.tabs.setCurrentIndex(1)
     dialog.save.click()
     qtbot.waitUntil(lambda: len(wavs(tmp_path / "strings")) > 1, timeout=20_000)
     dialog.close_button.click()
