@@ -237,14 +237,14 @@ class PresetBrowser(QFrame):
         if not isinstance(event, QKeyEvent):
             return False
         if event.type() == QEvent.Type.ShortcutOverride:
-            if self._is_ours(event) or event.text().isprintable():
+            if self._is_ours(event) or (event.text() and event.text().isprintable()):
                 event.accept()  # the window's own keys rest meanwhile
                 return True
         elif event.type() == QEvent.Type.KeyPress:
             if self._is_ours(event):
                 self._press(event)
                 return True
-            if watched is self.list and event.text().strip().isprintable() and event.text().strip():
+            if watched is self.list and event.text().strip() and event.text().isprintable():
                 self.search.setFocus()
                 self.search.insert(event.text())
                 return True
