@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QByteArray, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import (
+    QGraphicsView,
     QHBoxLayout,
     QLabel,
     QMainWindow,
@@ -140,6 +141,12 @@ class MainWindow(QMainWindow):
             f"<table>{rows}</table><p>On the string: arrow keys move the pluck, with Shift the listening point.<br>"
             "On a knob: arrow keys, wheel, or type a number; Delete resets.</p>",
         )
+
+    def showEvent(self, event: QShowEvent) -> None:
+        for plot in self.findChildren(QGraphicsView):
+            for part in (plot, plot.viewport()):
+                part.setAcceptDrops(False)  # it would keep dropped files from the window
+        super().showEvent(event)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if any(url.isLocalFile() for url in event.mimeData().urls()):

@@ -142,6 +142,16 @@ def drop(controller: Controller, *files: Path) -> None:
     assert event.isAccepted()
 
 
+def test_a_file_over_any_view_reaches_the_window(controller: Controller) -> None:
+    window = controller.window
+    for view in (panel.view for panel in controller.panels):
+        under = view.childAt(view.rect().center()) or view
+        while under is not window:
+            assert not under.acceptDrops(), under
+            under = under.parentWidget()
+    assert window.acceptDrops()
+
+
 def test_dropped_files_are_taken_in(
     controller: Controller, preset_folder: Path, small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
