@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,11 +66,17 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                 if path.stem in entries:
                     problems.append(f"{path}: there is a preset of this name already; rename the file to use it")
                     continue
-                info = read_info(path)
-                parameters = described_parameters(path, info)
-                entries[path.stem] = PresetEntry(path.stem, path, info, parameters, path.stat().st_size)
+                state = path.stat()
+                entries[path.stem] = _read_entry(path, state.st_mtime_ns, state.st_size)
             except PresetError as error:
                 problems.append(str(error))
             except OSError as error:  # taken away meanwhile
                 problems.append(f"{path}: cannot be read ({error.strerror})")
     return [entries[name] for name in sorted(entries)], problems
+
+
+@functools.lru_cache(maxsize=512)
+def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
+    """Remembered for as long as the file is the same one: the browser looks each time that it opens."""
+    info = read_info(path)
+    return PresetEntry(path.stem, path, info, described_parameters(path, info), size_bytes)

@@ -70,7 +70,7 @@ class Recipe(BaseModel):
             seconds=request.seconds,
             decay_db=request.decay_db,
             source=request.source,
-            difference_gain_db=request.difference_gain_db,
+            difference_gain_db=request.difference_gain_db if request.source == "difference" else 0.0,
             preset_rate_hz=info.rate_hz,
             horizon_s=info.horizon_s,
             full_scale_m=FULL_SCALE_M,
