@@ -188,10 +188,13 @@ class Controller(QObject):
     def take_file(self, file: Path) -> None:
         """A dropped preset is taken in and chosen; a dropped WAV's recipe is restored."""
         dropped = receive(file, self.library)
-        if dropped.choices:
+        notice = dropped.notice
+        try:
             self.session.update(**dropped.choices)
-        if dropped.notice:
-            self.window.notices.tell(dropped.notice)
+        except ValueError as error:  # a recipe that was edited, or of another version
+            notice = f"{file}: its choices cannot be restored here ({error})."
+        if notice:
+            self.window.notices.tell(notice)
 
     @property
     def entry(self) -> PresetEntry | None:

@@ -27,7 +27,7 @@ Source = Literal["model", "truth", "difference", "both"]
 SOURCES: tuple[Source, ...] = get_args(Source)
 Pickup = Literal["displacement", "velocity"]
 PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
-FULL_SCALE_M_S = 40.0  # the velocity that is 0 dBFS: about as loud as displacement, for a pluck of middling width
+FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
 DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)
@@ -52,7 +52,7 @@ class SoundRequest:
         seconds: the duration; with `decay_db` the longest.
         source: "difference" is model minus truth, "both" the model in the left channel and the truth in the right.
         listen_right: the listening point of a right channel; None is mono.
-        pickup: "velocity" is the derivative of displacement; 40 m/s are full scale.
+        pickup: "velocity" is the derivative of displacement; 30 m/s are full scale.
         difference_gain_db: how much louder the difference is made.
         decay_db: the sound ends where model and truth have fallen this far below their loudest, so that all files of
             a pluck have one length. None: it lasts `seconds`.

@@ -32,7 +32,7 @@ Listen = Annotated[float, typer.Option(help="Where to listen, 0 … 1 as for --p
 ListenRight = Annotated[
     float | None, typer.Option(help="Where the right channel listens; the file is stereo then.", metavar="PLACE")
 ]
-PickupOption = Annotated[Pickup, typer.Option(help="velocity is brighter by 6 dB an octave; 40 m/s are full scale.")]
+PickupOption = Annotated[Pickup, typer.Option(help="velocity is brighter by 6 dB an octave; 30 m/s are full scale.")]
 DecayDb = Annotated[
     float | None,
     typer.Option(metavar="DB", help="End when the sound has fallen so far; --seconds is the longest then."),

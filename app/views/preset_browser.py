@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QBrush, QColor, QKeyEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -33,7 +33,6 @@ from app.preset_filter import PresetFilter
 from app.preset_words import error_word, model_word, rate_word, string_word
 from app.views.parts import combo_box, tool_button
 from app.views.preset_card import preset_card
-from app.views.theme import FAINT
 
 _KEYS = Qt.Key
 _MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
@@ -173,7 +172,7 @@ class PresetBrowser(QFrame):
                 for column in (_RATE, _ERROR):
                     item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 if star == "☆":
-                    item.setForeground(_STAR, QBrush(QColor(FAINT)))
+                    item.setForeground(_STAR, self.palette().placeholderText())
                 self.list.addTopLevelItem(item)
         found = f"{len(entries)} of {total} presets" if len(entries) < total else f"{total} presets"
         self._state.setText(f"{found}   ·   your own: {folder}" if total else f"No presets   ·   your own: {folder}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
+from PySide6.QtWidgets import QApplication
+
 from app.library import PresetEntry
 from app.preset_folders import user_folder
 from app.preset_words import (
@@ -15,7 +17,6 @@ from app.preset_words import (
     string_word,
     time_word,
 )
-from app.views.theme import FAINT
 from engine.schema import SchemaError
 from training.by_name import load
 
@@ -23,8 +24,9 @@ from training.by_name import load
 def preset_card(entry: PresetEntry) -> str:
     """Title, description and a table of facts; what the preset does not say is left out."""
     info = entry.info
+    faint = QApplication.palette().placeholderText().color().name()
     rows = "".join(
-        f"<tr><td style='color: {FAINT}; padding: 3px 14px 3px 0; white-space: nowrap'>{name}</td>"
+        f"<tr><td style='color: {faint}; padding: 3px 14px 3px 0; white-space: nowrap'>{name}</td>"
         f"<td style='padding: 3px 0'>{escape(text)}</td></tr>"
         for name, text in _facts(entry)
     )

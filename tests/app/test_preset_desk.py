@@ -168,6 +168,9 @@ def test_dropped_files_are_taken_in(
     choices = controller.session.choices
     assert (choices.pluck, choices.listen, choices.seconds) == (Pluck(0.5, 2.0), 0.3, 0.6)
     assert (choices.preset, choices.heard) == ("first", "truth")
+    monkeypatch.setattr("app.dropping.restored_choices", lambda recipe: {"listen": 3})
+    drop(controller, tmp_path / "a.wav")
+    assert "its choices cannot be restored here (listen: " in controller.window.notices.text
     drop(controller, tmp_path / "foreign.txt")
     assert "neither a preset" in controller.window.notices.text
     assert controller.session.choices == choices
