@@ -255,7 +255,8 @@ def _errors(preset: Preset, voices: Voices) -> tuple[float | None, float | None]
     model, truth = (torch.from_numpy(voices.sounds[name])[None, 1:] for name in ("model", "truth"))
     ends = (preset.info.horizon_steps, truth.shape[1])
     found = [relative_error(model[:, :end], truth[:, :end]).rel_mae if truth.shape[1] else None for end in ends]
-    return found[0], found[1]
+    trained, whole = (None if error is None else float(f"{error:.4g}") for error in found)
+    return trained, whole
 
 
 def _row(

@@ -80,6 +80,7 @@ class ExportDialog(QDialog):
     def _lay_out(self) -> None:
         self.tabs = QTabBar()
         self.tabs.setAccessibleName("What to export")
+        self.tabs.setToolTip("One pluck, or many")
         self.tabs.addTab("This pluck")
         self.tabs.addTab("Batch")
         self.tabs.setDrawBase(False)
@@ -99,6 +100,7 @@ class ExportDialog(QDialog):
         self.save.setToolTip("Render and save")
         self.save.clicked.connect(self._start)
         self.close_button = QPushButton("Close")
+        self.close_button.setToolTip("Close, or cancel what is being rendered (Escape)")
         self.close_button.clicked.connect(self._cancel_or_close)
         buttons = QHBoxLayout()
         buttons.addWidget(self.show_folder)

@@ -56,8 +56,10 @@ class SoundPage(QWidget):
         names = [entry for entry in SOURCE_NAMES if not (stereo and entry[1] == "both")]
         self.source = combo_box("Source", names, export.source)
         self.source.currentIndexChanged.connect(self.changed)
+        self.source.setToolTip("What is saved")
         self.path = QLineEdit()
         self.path.setAccessibleName("File")
+        self.path.setToolTip("Two files have the source behind their names")
         self.path.textEdited.connect(self._name_edited)
         browse = tool_button("Browse …", tip="Choose the file")
         browse.clicked.connect(self._browse)
@@ -137,6 +139,7 @@ class BatchPage(QWidget):
             box.setToolTip({data: text for text, data in SOURCE_NAMES}[source])
             box.setChecked(source in batch.sources)
         self.overwrite = QCheckBox("Render again what is there already")
+        self.overwrite.setToolTip("Off: files that are there with the same recipe are kept")
         self.folder = _line("Folder", batch.folder or str(Path(export.folder or Path.home()) / "strings"), "")
         browse = tool_button("Browse …", tip="Choose the folder")
         browse.clicked.connect(self._browse)
@@ -205,6 +208,7 @@ def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
 def _line(name: str, text: str, example: str) -> QLineEdit:
     edit = QLineEdit(text)
     edit.setAccessibleName(name)
+    edit.setToolTip(f"{name}, commas between" if example else name)
     if example:
         edit.setPlaceholderText(f"for example {example}")
     return edit

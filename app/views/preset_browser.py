@@ -88,6 +88,7 @@ class PresetBrowser(QFrame):
     def _build_list(self) -> QTreeWidget:
         made = QTreeWidget()
         made.setAccessibleName("Presets")
+        made.setToolTip("Arrows load, Space plucks, Enter closes")
         made.setHeaderLabels(["", "Preset", "Model", "Rate", "Error"])
         made.setRootIsDecorated(False)
         made.setUniformRowHeights(True)

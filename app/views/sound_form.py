@@ -24,6 +24,7 @@ class SoundForm(QWidget):
         super().__init__(parent)
         self._preset_rate_hz = preset_rate_hz
         self.length = combo_box("Length", [("Until it has decayed", True), ("Fixed", False)], export.until_decayed)
+        self.length.setToolTip("Until it has decayed: nothing that can be heard is cut")
         self.decay = spin_box("Decay", *DECAY_RANGE_DB, export.decay_db, " dB", 0, 5)
         self.decay.setPrefix("by ")
         self.decay.setToolTip("The sound ends where model and truth have fallen so far below their loudest")
@@ -31,10 +32,13 @@ class SoundForm(QWidget):
         self.longest.setPrefix("at most ")
         self.longest.setToolTip("A string that rings longer is faded out here")
         self.seconds = spin_box("Duration", 0.1, LONGEST_S, export.seconds, " s", 1, 0.5)
+        self.seconds.setToolTip("The end is faded out within 10 ms")
         names = [("The model's own", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ if rate)]
         self.rate = combo_box("Sample rate", names, export.rate_hz)
+        self.rate.setToolTip("A rate above the model's own adds no bandwidth")
         self._rate_note = _faint()
         self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
+        self.bits.setToolTip("16 bits are dithered; floating point never clips")
         self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
         self.normalise.setMinimumHeight(28)
         self.normalise.setToolTip("Off: 10 mm of displacement are full scale, as in playback at 0 dB")

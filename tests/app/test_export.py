@@ -243,4 +243,7 @@ def test_the_end_of_training_is_marked_in_the_file(request_: SoundRequest, bits:
         path = tmp_path / f"{source}.wav"
         export_sound(replace(request_, source=source), path, WavSettings(bits, 12_000))  # type: ignore[arg-type]
         assert read_markers(path.read_bytes()) == marks
-        assert soundfile.info(path).frames == 2400
+        with soundfile.SoundFile(path) as file:
+            assert file.frames == 2400
+            assert ("Cue ID :  1  Pos :  1200" in file.extra_info) == bool(marks)  # as libsndfile reads it
+            assert ("labl : 1 : end of training" in file.extra_info) == bool(marks)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
+from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeWidget
 from pytestqt.qtbot import QtBot
 
 from app.controller import Controller
@@ -118,6 +119,17 @@ def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, br
         assert words in card
     assert "To remake" not in card
     assert "A small string" in controller.window.presets.name.text()
+
+
+def test_every_control_of_bar_and_browser_has_a_name_and_a_tip(
+    controller: Controller, browser: PresetBrowser
+) -> None:
+    for part in (browser, controller.window.presets):
+        for kind in (QAbstractButton, QComboBox, QLineEdit, QTreeWidget):
+            for control in part.findChildren(kind):
+                if control.focusPolicy() != Qt.FocusPolicy.NoFocus:
+                    assert control.accessibleName(), control
+                    assert control.toolTip(), control.accessibleName()
 
 
 def test_presets_put_into_the_folder_appear_when_it_is_opened(

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 import soundfile
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QAbstractButton, QComboBox, QDoubleSpinBox, QListWidget, QTabBar
 from pytestqt.qtbot import QtBot
 
 from app.library import list_presets
@@ -167,14 +169,12 @@ def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_p
     assert list((tmp_path / "strings").glob(".*")) == []
 
 
-def test_every_control_of_the_dialog_has_a_name(dialog: ExportDialog) -> None:
-    from PySide6.QtCore import Qt
-    from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QLineEdit
-
-    for kind in (QAbstractButton, QComboBox, QAbstractSpinBox):
+def test_every_control_of_the_dialog_has_a_name_and_a_tip(dialog: ExportDialog) -> None:
+    for kind in (QAbstractButton, QComboBox, QDoubleSpinBox, QListWidget, QTabBar):
         for control in dialog.findChildren(kind):
-            if control.focusPolicy() != Qt.FocusPolicy.NoFocus:
+            if control.focusPolicy() != Qt.FocusPolicy.NoFocus and not isinstance(control.parent(), QTabBar):
                 assert control.accessibleName() or getattr(control, "text", lambda: "")(), control
+                assert control.toolTip(), control.accessibleName()
     for edit in (dialog.sound.path, dialog.batch.positions, dialog.batch.amplitudes, dialog.batch.folder):
-        assert isinstance(edit, QLineEdit)
         assert edit.accessibleName()
+        assert edit.toolTip()
