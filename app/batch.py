@@ -6,30 +6,24 @@ anew after every pluck, so it is never behind the files.
 
 from __future__ import annotations
 
-import csv
-import io
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
 
 import soundfile
 import torch
 
+from app.batch_index import INDEX, BatchIndex, BatchRow
 from app.export import ExportError, WavReport, default_file_name, export_sounds, settings_of
 from app.recipe import Recipe, RecipeError, read_recipe
 from app.sound import Cancelled, ExportCancelled, Pickup, SoundRequest, Source, Voices
 from app.wav import WavSettings
-from app.whole_file import WriteError, whole_file
 from engine.metrics import relative_error
 from engine.pluck import Pluck
 from engine.preset import Preset, PresetError, load_preset
 from engine.sources import Runaway
 
-INDEX = "index.csv"
-Status = Literal["written", "kept", "failed"]
-STATUSES: tuple[Status, ...] = get_args(Status)
 BatchProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known
 
 
@@ -94,29 +88,6 @@ class BatchPlan:
 
 
 @dataclass(frozen=True)
-class BatchRow:
-    """A line of the index. Errors are the model's relative MAE at the listening points; the truth has none.
-
-    Attributes:
-        rel_mae_trained: as far as the model was trained; rel_mae: over the whole file.
-    """
-
-    file: str
-    status: Status
-    preset: str
-    position: float
-    amplitude_mm: float
-    source: str
-    rate_hz: int
-    seconds: float | None = None
-    peak_db: float | None = None
-    clipped: int | None = None
-    rel_mae_trained: float | None = None
-    rel_mae: float | None = None
-    message: str = ""
-
-
-@dataclass(frozen=True)
 class _Job:
     """One pluck of one preset: what is to be rendered of it."""
 
@@ -142,7 +113,7 @@ def run_batch(
         plan.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ExportError(f"{plan.folder}: cannot be made ({error.strerror}); choose another folder") from error
-    index = _Index(plan.folder / INDEX)
+    index = BatchIndex(plan.folder / INDEX)
     jobs, rows = _sorted_out(plan, index)
     index.add(rows)
     started = time.monotonic()
@@ -164,7 +135,7 @@ def run_batch(
     return rows
 
 
-def _sorted_out(plan: BatchPlan, index: _Index) -> tuple[list[_Job], list[BatchRow]]:
+def _sorted_out(plan: BatchPlan, index: BatchIndex) -> tuple[list[_Job], list[BatchRow]]:
     """What is to be rendered, and rows of what is not: kept, or of a preset that cannot be used."""
     jobs, rows = [], []
     for path in plan.presets:
@@ -185,7 +156,7 @@ def _sorted_out(plan: BatchPlan, index: _Index) -> tuple[list[_Job], list[BatchR
     return jobs, rows
 
 
-def _kept(plan: BatchPlan, preset: Preset, pluck: Pluck, source: Source, index: _Index) -> BatchRow | None:
+def _kept(plan: BatchPlan, preset: Preset, pluck: Pluck, source: Source, index: BatchIndex) -> BatchRow | None:
     """The row of a file that is there; None where it is to be rendered."""
     row = _row(plan, preset.name, preset.info.rate_hz, pluck, source)
     path = plan.folder / row.file
@@ -265,54 +236,6 @@ def _row(
     rate_hz = plan.settings.rate_hz or preset_rate_hz
     name = default_file_name(preset, pluck, rate_hz, source)
     return BatchRow(name, "failed", preset, pluck.position, pluck.amplitude_mm, source, rate_hz, message=message)
-
-
-class _Index:
-    """The CSV file, with rows of earlier batches in the same folder."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self.rows: dict[str, BatchRow] = {}
-        try:
-            with path.open(encoding="utf-8", newline="") as file:
-                self.rows = {row.file: row for row in map(_read_row, csv.DictReader(file))}
-        except (OSError, ValueError, KeyError, TypeError):
-            pass  # none yet, or not one of ours: it is written anew
-
-    def add(self, rows: Sequence[BatchRow]) -> None:
-        """Raises ExportError."""
-        self.rows |= {row.file: row for row in rows}
-        text = io.StringIO()
-        table = csv.DictWriter(text, [one.name for one in fields(BatchRow)], lineterminator="\n")
-        table.writeheader()
-        table.writerows(asdict(row) for row in self.rows.values())
-        try:
-            with whole_file(self._path) as file:
-                file.write(text.getvalue().encode())
-        except WriteError as error:
-            raise ExportError(str(error)) from error
-
-
-def _read_row(cells: dict[str, str]) -> BatchRow:
-    def number(name: str) -> float | None:
-        return float(cells[name]) if cells[name] else None
-
-    status = next(status for status in STATUSES if status == cells["status"])
-    return BatchRow(
-        cells["file"],
-        status,
-        cells["preset"],
-        float(cells["position"]),
-        float(cells["amplitude_mm"]),
-        cells["source"],
-        int(cells["rate_hz"]),
-        number("seconds"),
-        number("peak_db"),
-        int(cells["clipped"]) if cells["clipped"] else None,
-        number("rel_mae_trained"),
-        number("rel_mae"),
-        cells["message"],
-    )
 
 
 __all__ = ["INDEX", "BatchPlan", "BatchRow", "ExportCancelled", "run_batch"]
