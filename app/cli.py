@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, bench, evaluation, listing, motion, render, sweep, tables, training
+from app.commands import abx, batch, bench, evaluation, info, listing, motion, render, sweep, tables, training
 from app.commands.console import say
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
@@ -57,6 +57,8 @@ for command in (
     motion.simulate,
     motion.predict,
     render.render,
+    batch.batch,
+    info.info,
     motion.compare,
     training.dataset,
     training.train,

@@ -22,9 +22,10 @@ from app.abx.subject import subject_of
 from app.appearance import Appearance
 from app.audio import AudioProblem, Player, Track
 from app.audio_control import AudioControl
+from app.dropping import receive
 from app.history import History
 from app.instruments import Instruments
-from app.library import Library, PresetEntry, list_presets
+from app.library import Library, PresetEntry
 from app.main_window import KEYS, PLAYED_KEYS, MainWindow
 from app.panels import (
     ComparePanel,
@@ -40,6 +41,7 @@ from app.panels import (
     StringPanel,
     WaveformPanel,
 )
+from app.preset_desk import PresetDesk
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import Settings, save_settings
@@ -48,6 +50,7 @@ from app.views.abx_dialog import AbxDialog
 from app.views.export_dialog import ExportDialog
 from app.views.help_dialog import HelpDialog
 from app.views.knob import Knob
+from app.views.preset_browser import PresetBrowser
 from app.views.string_view import StringView
 from engine.metrics import ErrorSums
 from engine.preset import SHIPPED
@@ -116,8 +119,11 @@ class Controller(QObject):
         self._asked_rate_hz = 0
         self._abx: AbxDialog | None = None  # while it is open, the player is its own
         self._help: HelpDialog | None = None
-        entries, problems = list_presets()
-        self.library = Library(entries)
+        self.library = Library([])
+        problems = self.library.refresh()
+        self.presets = PresetDesk(
+            self.session, self.library, window.presets, PresetBrowser(window), settings.favourites
+        )
         self.panels = self._make_panels()
         window.order_tabs()
         self._connect()
@@ -160,11 +166,12 @@ class Controller(QObject):
     def _connect(self) -> None:
         window, session = self.window, self.session
         session.changed.connect(self._choices_changed)
-        window.presets.set_entries(self.library.entries)
-        window.presets.preset_chosen.connect(lambda name: session.update(preset=name))
-        window.presets.step_asked.connect(self._step_preset)
-        window.previous_asked.connect(lambda: self._step_preset(-1))
-        window.next_asked.connect(lambda: self._step_preset(1))
+        self.presets.pluck_asked.connect(self.pluck)
+        self.presets.told.connect(window.notices.tell)
+        window.previous_asked.connect(lambda: self.presets.step(-1))
+        window.next_asked.connect(lambda: self.presets.step(1))
+        window.browse_asked.connect(self.presets.toggle)
+        window.file_dropped.connect(lambda path: self.take_file(Path(path)))
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.transport.export_asked.connect(self.export)
@@ -225,7 +232,7 @@ class Controller(QObject):
         if entry is None:
             self.window.notices.tell("There is no preset to export: choose one first.")
             return
-        dialog = ExportDialog(entry, self.session.choices, self._settings.export, self.window)
+        dialog = ExportDialog(self.library.entries, self.session.choices, self._settings.export, self.window)
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
@@ -262,6 +269,17 @@ class Controller(QObject):
         self._help.show()
         self._help.raise_()
 
+    def take_file(self, file: Path) -> None:
+        """A dropped preset is taken in and chosen; a dropped WAV's recipe is restored."""
+        dropped = receive(file, self.library)
+        notice = dropped.notice
+        try:
+            self.session.update(**dropped.choices)
+        except ValueError as error:  # a recipe that was edited, or of another version
+            notice = f"{file}: its choices cannot be restored here ({error})."
+        if notice:
+            self.window.notices.tell(notice)
+
     @property
     def entry(self) -> PresetEntry | None:
         """The chosen preset."""
@@ -279,6 +297,7 @@ class Controller(QObject):
                 "sound": self.audio.sound,
                 "look": self.appearance.look,
                 "midi": self.instruments.midi.choices,
+                "favourites": tuple(sorted(self.presets.favourites)),
                 "window_geometry": self.window.geometry_text(),
             }
         )
@@ -306,7 +325,7 @@ class Controller(QObject):
         choices, window = self.session.choices, self.window
         window.transport.show_choices(choices)
         if "preset" in names:
-            window.presets.set_chosen(choices.preset)
+            self.presets.choice_changed()
         window.left.show_key(choices.left_view)
         window.right.show_key(choices.right_view)
         for panel in self.panels:
@@ -317,9 +336,6 @@ class Controller(QObject):
             self.player.set_loop(choices.loop)
         if "volume_db" in names:
             self.player.set_volume_db(choices.volume_db)
-
-    def _step_preset(self, step: int) -> None:
-        self.session.step_preset(self.library.names, step)
 
     # Rendering
 

@@ -1,73 +1,44 @@
-"""Export: a pluck of a preset, heard at a point of the string, as a WAV file that carries its recipe.
+"""Export: the sound of a pluck as WAV files that carry their recipe, each whole or absent.
 
 The window and the command line write the same files through this module.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
+from app.recipe import Recipe
+from app.sound import (
+    LONGEST_S,
+    SOURCES,
+    Cancelled,
+    ExportCancelled,
+    Progress,
+    SoundRequest,
+    Source,
+    Voices,
+    render_signal,
+    render_sound,
+    render_voices,
+)
 from app.version import PROGRAM, program_version
 from app.wav import BITS, RATE_RANGE_HZ, Bits, EncodedWav, WavSettings, encode_wav
-from app.whole_file import WriteError, whole_file
+from app.whole_file import WriteError, explain, whole_file
 from engine.pluck import Pluck
-from engine.preset import Preset
-from engine.sine_transform import listening_weights
-from engine.sources import FULL_SCALE_M, ModelSource, Runaway, StringSource, TruthSource, project
+from engine.preset import PresetError
 
-Source = Literal["model", "truth", "difference"]
-SOURCES: tuple[Source, ...] = get_args(Source)
-LONGEST_S = 600.0
-BLOCK_FRAMES = 4096  # between two looks at `cancelled`
-
-Progress = Callable[[float], None]  # is told the share that is done, 0 … 1
-Cancelled = Callable[[], bool]
+END_OF_TRAINING = "end of training"  # the marker's name
+DECAY_FADE_S = 0.05  # where a sound ends by its decay
 
 
 class ExportError(Exception):
     """An export that failed. The message names the path, what happened and the remedy. No file is left."""
-
-
-class ExportCancelled(Exception):
-    """The user stopped the export. No file is left."""
-
-
-@dataclass(frozen=True)
-class SoundRequest:
-    """What is to be heard.
-
-    Attributes:
-        listen: the listening point, 0 … 1 in lengths of the string.
-        source: "difference" is model minus truth.
-
-    Raises:
-        ValueError: a value is out of its range; the message names it and the range.
-    """
-
-    preset: Preset
-    pluck: Pluck
-    listen: float
-    seconds: float
-    source: Source = "model"
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.listen <= 1:
-            raise ValueError(f"listening point must lie in 0 … 1, not {self.listen:g}")
-        if not 1 / self.preset.info.rate_hz <= self.seconds <= LONGEST_S:
-            raise ValueError(f"seconds must be above 0 and at most {LONGEST_S:g}, not {self.seconds:g}")
-        if self.source not in SOURCES:
-            raise ValueError(f"source {self.source!r} is not one of {', '.join(SOURCES)}")
 
 
 @dataclass(frozen=True)
@@ -77,6 +48,8 @@ class WavReport:
     Attributes:
         peak_db: the largest sample in dBFS before any clipping; -inf for silence.
         clipped: samples beyond full scale that were cut; always 0 in floating point.
+        past_training_s: how much of the end the model was not trained on; 0 for the truth.
+        decayed: False where the sound was to last until it had decayed, and the longest duration came first.
     """
 
     path: Path
@@ -86,6 +59,12 @@ class WavReport:
     peak_db: float
     clipped: int
     gain_db: float
+    past_training_s: float = 0.0
+    decayed: bool = True
+
+    @property
+    def seconds(self) -> float:
+        return self.frames / self.rate_hz
 
 
 def export_sound(
@@ -99,17 +78,67 @@ def export_sound(
     """Renders and writes a WAV file, whole or not at all.
 
     Raises:
-        ExportError: the file cannot be written.
+        ExportError: the file cannot be written, or the preset is gone.
         ExportCancelled: `cancelled` said so.
         Runaway: the model's output stopped being a string's.
     """
-    settings = settings or WavSettings()
+    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress, cancelled=cancelled)[0]
+    return report
+
+
+def export_sounds(
+    request: SoundRequest,
+    paths: Mapping[Source, Path],
+    settings: WavSettings | None = None,
+    *,
+    measured: bool = False,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
+) -> tuple[list[WavReport], Voices]:
+    """Renders a pluck once and writes a file for each source, with one gain.
+
+    Args:
+        request: its own `source` is not looked at.
+        measured: render model and truth whatever the sources, to compare them.
+
+    Returns:
+        The reports in the order of `paths`, and what was rendered.
+
+    Raises:
+        As `export_sound`.
+    """
+    settings = settings_of(request, settings or WavSettings())
+    requests = {source: replace(request, source=source) for source in paths}
     info = request.preset.info
-    tags = _tags(info.title, recipe(request, settings))
-    with _written_whole(path) as write:  # opened first, so that a folder that refuses is told before the work
-        samples = render_sound(request, progress=progress, cancelled=cancelled)
-        beside = _sounds_of_one_gain(request, cancelled) if settings.normalise else []
-        return write(encode_wav(samples, info.rate_hz, settings, tags, beside))
+    with ExitStack() as files:
+        try:
+            recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
+        except PresetError as error:
+            raise ExportError(str(error)) from error
+        # opened first, so that a folder that refuses is told before the work
+        writers = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
+        voices = render_voices(
+            request, paths, all_voices=measured or settings.normalise, progress=progress, cancelled=cancelled
+        )
+        sounds = {source: voices.samples(source, request.difference_gain_db) for source in paths}
+        beside = [*voices.sounds.values(), *sounds.values()] if settings.normalise else []
+        reports = []
+        for source, write in writers.items():
+            with _explained(paths[source]):
+                labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
+                wav = encode_wav(
+                    sounds[source], info.rate_hz, settings, _tags(info.title, recipes[source]), beside, labels
+                )
+            past_s = max(0.0, wav.frames / wav.rate_hz - info.horizon_s) if labels else 0.0
+            reports.append(replace(write(wav), past_training_s=past_s, decayed=voices.ended))
+    return reports, voices
+
+
+def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
+    """The settings that a request is written with: an end by decay fades longer."""
+    if request.decay_db is None:
+        return settings
+    return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
 def write_wav(
@@ -119,7 +148,6 @@ def write_wav(
     settings: WavSettings | None = None,
     *,
     title: str = "",
-    recipe: Mapping[str, Any] | None = None,
 ) -> WavReport:
     """Writes samples (frames,) or (frames, channels), ±1 being full scale, whole or not at all.
 
@@ -127,125 +155,50 @@ def write_wav(
         ExportError: the file cannot be written, or a sample is not finite.
     """
     with _written_whole(path) as write:
-        return write(encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title, recipe)))
-
-
-def render_sound(
-    request: SoundRequest, *, progress: Progress = lambda share: None, cancelled: Cancelled = lambda: False
-) -> NDArray[np.float64]:
-    """The samples of a request at the preset's rate, ±1 being full scale."""
-    if request.source != "difference":
-        return _render(request, request.source, progress, cancelled)
-    model = _render(request, "model", lambda share: progress(share / 2), cancelled)
-    return model - _render(request, "truth", lambda share: progress(0.5 + share / 2), cancelled)
-
-
-def render_signal(
-    source: StringSource,
-    displacement_m: Tensor,
-    seconds: float,
-    listen: float,
-    *,
-    progress: Progress = lambda share: None,
-    cancelled: Cancelled = lambda: False,
-) -> NDArray[np.float64]:
-    """Samples (frames,) of one source at a listening point, ±1 being full scale; the first is frame 0.
-
-    Args:
-        displacement_m: frame 0, (grid_points,), already projected on the modes in use.
-
-    Raises:
-        ExportCancelled: `cancelled` said so between two blocks.
-    """
-    frames = max(1, round(seconds * source.rate_hz))
-    weights = listening_weights(torch.tensor([listen], dtype=torch.float64), source.grid_points)
-    signal = torch.zeros(frames, dtype=torch.float64)
-    signal[0] = displacement_m.double() @ weights[:, 0]
-    state = source.start(displacement_m[None])
-    for first in range(1, frames, BLOCK_FRAMES):
-        if cancelled():
-            raise ExportCancelled
-        steps = min(BLOCK_FRAMES, frames - first)
-        block, state = source.advance(state, steps, weights)
-        signal[first : first + steps] = block[0, :, 0]
-        progress((first + steps) / frames)
-    return (signal / FULL_SCALE_M).numpy()
-
-
-def _render(
-    request: SoundRequest, name: Literal["model", "truth"], progress: Progress, cancelled: Cancelled
-) -> NDArray[np.float64]:
-    info = request.preset.info
-    source = ModelSource(request.preset) if name == "model" else TruthSource(info)
-    displacement_m = project(request.pluck.displacement(info.grid_points), info.modes)
-    return render_signal(
-        source, displacement_m, request.seconds, request.listen, progress=progress, cancelled=cancelled
-    )
-
-
-def _sounds_of_one_gain(request: SoundRequest, cancelled: Cancelled) -> list[NDArray[np.float64]]:
-    """Model and truth, so that normalising keeps the ratio of their levels; no model that runs away."""
-    sounds = [_render(request, "truth", lambda share: None, cancelled)]
-    with suppress(Runaway):
-        sounds.append(_render(request, "model", lambda share: None, cancelled))
-    return sounds
-
-
-def recipe(request: SoundRequest, settings: WavSettings) -> dict[str, Any]:
-    """All that repeats the file, as plain data: the comment of the file is this in JSON."""
-    info = request.preset.info
-    try:
-        digest = hashlib.sha256(request.preset.path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise ExportError(
-            f"{request.preset.path}: the preset cannot be read any more ({error.strerror}); put it back"
-        ) from error
-    return {
-        "program": PROGRAM,
-        "version": program_version(),
-        "preset": request.preset.name,
-        "preset_sha256": digest,
-        "pluck": asdict(request.pluck),
-        "listen": request.listen,
-        "seconds": request.seconds,
-        "source": request.source,
-        "preset_rate_hz": info.rate_hz,
-        "horizon_s": info.horizon_s,
-        "full_scale_m": FULL_SCALE_M,
-        "rate_hz": settings.rate_hz or info.rate_hz,
-        "bits": settings.bits,
-        "normalise": settings.normalise,
-    }
+        return write(encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title)))
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
     """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`."""
-    return f"{preset}_x{pluck.position:.2f}_a{pluck.amplitude_mm:.1f}_{rate_hz}_{source}.wav"
+    place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
+    return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
 
 
-def _tags(title: str, recipe: Mapping[str, Any] | None) -> dict[str, str]:
-    tags = {"title": title, "software": f"{PROGRAM} {program_version()}"}
-    if recipe is not None:
-        tags["comment"] = json.dumps(recipe, separators=(",", ":"), allow_nan=False)
+def _digits(value: float, least: int) -> str:
+    """At least so many decimals, and as many more as tell the value from its neighbours in a file name."""
+    return next((text for places in range(least, 6) if float(text := f"{value:.{places}f}") == value), f"{value:.6f}")
+
+
+def _tags(title: str, recipe: Recipe | None = None) -> dict[str, str]:
+    comment = recipe.model_dump_json() if recipe else ""
+    tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": comment}
     return {name: text for name, text in tags.items() if text}
 
 
 @contextmanager
 def _written_whole(path: Path) -> Iterator[Callable[[EncodedWav], WavReport]]:
     """A function that writes the file at `path`, which appears when the block ends well."""
-    try:
-        with whole_file(path) as file:
+    with _explained(path), whole_file(path) as file:
 
-            def write(wav: EncodedWav) -> WavReport:
+        def write(wav: EncodedWav) -> WavReport:
+            with _explained(path):
                 file.write(wav.data)
-                level = wav.level
-                return WavReport(
-                    path, wav.frames, wav.rate_hz, len(wav.data), level.peak_db, level.clipped, level.gain_db
-                )
+            level = wav.level
+            return WavReport(
+                path, wav.frames, wav.rate_hz, len(wav.data), level.peak_db, level.clipped, level.gain_db
+            )
 
-            yield write
+        yield write
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    try:
+        yield
     except WriteError as error:
         raise ExportError(str(error)) from error
+    except OSError as error:
+        raise ExportError(explain(path, error)) from error
     except ValueError as error:
         raise ExportError(f"{path}: {error}") from error
     except MemoryError as error:
@@ -266,8 +219,9 @@ __all__ = [
     "WavSettings",
     "default_file_name",
     "export_sound",
-    "recipe",
+    "export_sounds",
     "render_signal",
     "render_sound",
+    "settings_of",
     "write_wav",
 ]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 
+from psygnal import Signal
+
+from app.preset_folders import user_folder
 from engine.preset import SHIPPED, PresetError, PresetInfo, described_parameters, preset_files, read_info
 
 
@@ -16,10 +20,13 @@ class PresetEntry:
     path: Path
     info: PresetInfo
     parameters: int
+    size_bytes: int = 0
 
 
 class Library:
-    """The presets in the order of the list, found by name."""
+    """The presets in the order of the list, found by name. `changed` tells that there are others now."""
+
+    changed = Signal()
 
     def __init__(self, entries: list[PresetEntry]) -> None:
         self.entries = entries
@@ -37,14 +44,39 @@ class Library:
         fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
 
+    def refresh(self) -> list[str]:
+        """Reads the folders again; whoever holds this library has the new entries. Returns what was not usable."""
+        entries, problems = list_presets()
+        if entries != self.entries:
+            self.entries = entries
+            self.changed.emit()
+        return problems
+
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
-    """The usable presets by name, and a line for each file that is not one: it does not hide the rest."""
-    entries, problems = [], []
-    for path in preset_files(*(folders or (SHIPPED,))):
-        try:
-            info = read_info(path)
-            entries.append(PresetEntry(path.stem, path, info, described_parameters(path, info)))
-        except PresetError as error:
-            problems.append(str(error))
-    return entries, problems
+    """The usable presets by name, and a line for each file that is not one: it does not hide the rest.
+
+    By default those of the shipped and of the user's folder; of two of one name, the one of the first folder.
+    """
+    entries: dict[str, PresetEntry] = {}
+    problems = []
+    for folder in folders or (SHIPPED, user_folder()):
+        for path in preset_files(folder):
+            try:
+                if path.stem in entries:
+                    problems.append(f"{path}: there is a preset of this name already; rename the file to use it")
+                    continue
+                state = path.stat()
+                entries[path.stem] = _read_entry(path, state.st_mtime_ns, state.st_size)
+            except PresetError as error:
+                problems.append(str(error))
+            except OSError as error:  # taken away meanwhile
+                problems.append(f"{path}: cannot be read ({error.strerror})")
+    return [entries[name] for name in sorted(entries)], problems
+
+
+@functools.lru_cache(maxsize=512)
+def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
+    """Remembered for as long as the file is the same one: the browser looks each time that it opens."""
+    info = read_info(path)
+    return PresetEntry(path.stem, path, info, described_parameters(path, info), size_bytes)

@@ -5,8 +5,18 @@ from __future__ import annotations
 from itertools import pairwise
 
 from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QResizeEvent, QShortcut
+from PySide6.QtGui import (
+    QCloseEvent,
+    QDragEnterEvent,
+    QDropEvent,
+    QKeySequence,
+    QPaintEvent,
+    QResizeEvent,
+    QShortcut,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
+    QGraphicsView,
     QHBoxLayout,
     QLabel,
     QMainWindow,
@@ -32,6 +42,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
+    ("Ctrl+P", "browse_asked", "browse the presets"),
     ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
     ("Ctrl+Shift+Z", "redo_asked", "redo"),
     ("M", "motion_asked", "show or hide the string's motion"),
@@ -71,6 +82,8 @@ class MainWindow(QMainWindow):
     audio_asked = Signal()
     notices_asked = Signal()
     midi_asked = Signal()
+    browse_asked = Signal()
+    file_dropped = Signal(str)  # a path
     help_asked = Signal()
     about_asked = Signal()
     quit_asked = Signal()
@@ -98,6 +111,7 @@ class MainWindow(QMainWindow):
         self.menu = AppMenu(self)
         self._menu_button = menu_button(self.menu)
         self._lay_out()
+        self.setAcceptDrops(True)
         for key, signal, _ in KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setAutoRepeat(False)
@@ -201,6 +215,22 @@ class MainWindow(QMainWindow):
         if not self._painted:
             self._painted = True
             QTimer.singleShot(0, self.first_painted.emit)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        for plot in self.findChildren(QGraphicsView):
+            for part in (plot, plot.viewport()):
+                part.setAcceptDrops(False)  # it would keep dropped files from the window
+        super().showEvent(event)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if any(url.isLocalFile() for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        event.acceptProposedAction()
+        for url in event.mimeData().urls():
+            if url.isLocalFile():
+                self.file_dropped.emit(url.toLocalFile())
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()

@@ -16,20 +16,38 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from app.abx.trials import MOST_TRIALS
 from app.midi import MidiChoices
 from app.session import Choices
+from app.sound_names import Source
 from engine.whole_file import whole_file
 
 
+class BatchChoices(BaseModel):
+    """The batch page's last state; lists as they were typed."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    presets: tuple[str, ...] = ()
+    positions: str = ""
+    amplitudes: str = ""
+    sources: tuple[Source, ...] = ("model",)
+    folder: str = ""
+
+
 class ExportChoices(BaseModel):
-    """The export dialog's last state. rate_hz 0: the model's own rate."""
+    """The export dialog's last state. rate_hz 0: the model's own rate; source "files": both, a file each."""
 
     model_config = ConfigDict(extra="forbid")
 
     folder: str = ""
-    source: Literal["model", "truth", "difference"] = "model"
+    source: Literal["model", "truth", "difference", "both", "files"] = "model"
     rate_hz: int = 48_000
     bits: Literal["16", "24", "32f"] = "24"
+    until_decayed: bool = True
+    decay_db: float = 60.0
+    longest_s: float = 30.0
     seconds: float = 4.0
     normalise: bool = False
+    difference_gain_db: float = 20.0
+    batch: BatchChoices = BatchChoices()
 
 
 class DeviceChoice(BaseModel):
@@ -85,6 +103,7 @@ class Settings(BaseModel):
     sound: SoundChoice = SoundChoice()
     look: Look = Look()
     midi: MidiChoices = MidiChoices()
+    favourites: tuple[str, ...] = ()  # names of presets
     window_geometry: str = ""  # Qt's, in base64
 
 

@@ -6,8 +6,7 @@ libsndfile stores what it is given; whatever changes a number is done here, in N
 from __future__ import annotations
 
 import io
-import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -15,6 +14,8 @@ import numpy as np
 import soundfile
 import soxr
 from numpy.typing import NDArray
+
+from app.wav_chunks import Marker, with_markers, without_time_stamp
 
 Bits = Literal["16", "24", "32f"]
 BITS: tuple[Bits, ...] = get_args(Bits)
@@ -77,12 +78,14 @@ def encode_wav(
     settings: WavSettings,
     tags: dict[str, str],
     beside: Sequence[NDArray[np.float64]] = (),
+    labels: Mapping[str, float] | None = None,
 ) -> EncodedWav:
     """A WAV file of samples (frames,) or (frames, channels) where ±1 is full scale.
 
     Args:
         tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
         beside: other sounds of the same rate that share the gain when normalising.
+        labels: names of markers and their times in s; those past the end are left out.
 
     Raises:
         ValueError: a sample is not finite, there are none, or a tag is too long.
@@ -96,7 +99,10 @@ def encode_wav(
     gain = NORMALISED_PEAK / loudest if settings.normalise and loudest > 0 else 1.0
     stored, clipped = quantised(sound * gain, settings.bits)
     level = Level(_decibel(peak * gain), clipped, _decibel(gain))
-    return EncodedWav(_file(stored, new_rate_hz, settings.bits, tags), level, len(sound), new_rate_hz)
+    places = {label: round(time_s * new_rate_hz) for label, time_s in (labels or {}).items()}
+    markers = [Marker(frame, label) for label, frame in places.items() if frame < len(sound)]
+    data = with_markers(_file(stored, new_rate_hz, settings.bits, tags), markers)
+    return EncodedWav(data, level, len(sound), new_rate_hz)
 
 
 def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> NDArray[np.float64]:
@@ -156,19 +162,7 @@ def _file(stored: NDArray[np.generic], rate_hz: int, bits: Bits, tags: dict[str,
         for name, text in tags.items():
             setattr(file, name, text)
         file.write(stored)
-    return _without_time_stamp(buffer.getvalue())
-
-
-def _without_time_stamp(data: bytes) -> bytes:
-    """The same WAV with the time in its PEAK chunk, which libsndfile adds to floating point, set to zero."""
-    position = 12  # after "RIFF", size, "WAVE"
-    while position + 8 <= len(data):
-        name, size = struct.unpack_from("<4sI", data, position)
-        if name == b"PEAK":
-            stamp = position + 12  # name, size, version
-            return data[:stamp] + bytes(4) + data[stamp + 4 :]
-        position += 8 + size + size % 2
-    return data
+    return without_time_stamp(buffer.getvalue())
 
 
 def _decibel(ratio: float) -> float:

@@ -8,6 +8,7 @@ each tensor's name, type and shape, then that every number is finite.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -205,13 +206,13 @@ def preset_files(*folders: Path) -> list[Path]:
     return sorted((p for folder in folders or (SHIPPED,) for p in folder.glob("*.safetensors")), key=lambda p: p.stem)
 
 
-def find_preset(name_or_path: str) -> Path:
-    """The file of a preset given by its name among the shipped ones, or by path.
+def find_preset(name_or_path: str, files: Iterable[Path] | None = None) -> Path:
+    """The file of a preset given by its name among `files` (by default the shipped ones), or by path.
 
     Raises:
         PresetError: there is none; the message lists the names.
     """
-    by_name = {path.stem: path for path in preset_files()}
+    by_name = {path.stem: path for path in (preset_files() if files is None else files)}
     if name_or_path in by_name:
         return by_name[name_or_path]
     path = Path(name_or_path)

@@ -42,3 +42,9 @@ def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("presets") / "small.safetensors"
     save_preset(path, info, model)
     return path
+
+
+@pytest.fixture(autouse=True)
+def no_presets_of_ones_own(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests do not see what lies in the developer's own folder."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path_factory.getbasetemp() / "no own presets"))

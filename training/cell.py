@@ -35,6 +35,8 @@ MODEL_NAMES = {
     "frnn": "FRNN",
 }
 
+TITLE_WORDS = {"koopman_var": "Koopman, variable"}  # where a musician would not know the tables' name
+
 Initial = Literal["gaussian", "noise"]
 _NAME = re.compile(
     r"nylon_(?P<kind>linear|nonlinear)_(?P<initial>gaussian|noise)_(?P<rate>\d+)k_(?P<model>[a-z0-9_]+?)"
@@ -187,7 +189,7 @@ def configuration_of(
 
 
 def _title(cell: Cell) -> str:
-    details = [MODEL_NAMES[cell.model]]
+    details = [TITLE_WORDS.get(cell.model, MODEL_NAMES[cell.model])]
     if not cell.tension_modulated:
         details.append("linear")
     if cell.horizon != HORIZON:

@@ -16,9 +16,12 @@ PresetName = Annotated[str, typer.Argument(metavar="PRESET", help="A preset's na
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Cache = Annotated[Path | None, typer.Option(help="Folder of the data sets; made where it is not there.")]
 
-Position = Annotated[float, typer.Option(help="Where to pluck: 0 and 1 are the fixed ends, 0.5 the middle.")]
-AmplitudeMm = Annotated[float, typer.Option(help="Peak displacement in mm.")]
-Seconds = Annotated[float, typer.Option(help="Duration in s.")]
+POSITION_HELP = "Where to pluck: 0 and 1 are the fixed ends, 0.5 the middle."
+AMPLITUDE_HELP = "Peak displacement in mm."
+SECONDS_HELP = "Duration in s."
+Position = Annotated[float, typer.Option(help=POSITION_HELP)]
+AmplitudeMm = Annotated[float, typer.Option(help=AMPLITUDE_HELP)]
+Seconds = Annotated[float, typer.Option(help=SECONDS_HELP)]
 Shape = Annotated[plucks.Shape, typer.Option(help="The pluck's shape.")]
 Width = Annotated[float, typer.Option(help="Width of the pluck in lengths of the string.")]
 DEFAULT_SHAPE = plucks.Pluck().shape
@@ -41,7 +44,8 @@ def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width
 
 
 def open_preset(name_or_path: str) -> Preset:
-    """The preset of a name or a path. Raises PresetError."""
+    """The preset of a name (the user's own among them) or a path. Raises PresetError."""
+    from app.preset_folders import usable_files
     from engine.preset import find_preset, load_preset
 
-    return load_preset(find_preset(name_or_path))
+    return load_preset(find_preset(name_or_path, usable_files()))

@@ -25,11 +25,12 @@ PRESET_FIELDS = (
 
 
 def presets(json: Json = False) -> None:
-    """List the presets. A broken file is told on standard error and does not hide the others."""
-    from engine.preset import PresetError, preset_files
+    """List the presets, the user's own among them. A broken file is told on standard error and hides no other."""
+    from app.preset_folders import usable_files
+    from engine.preset import PresetError
 
     found = []
-    for path in preset_files():
+    for path in usable_files():
         try:
             found.append(_facts(path))
         except PresetError as error:

@@ -1,78 +1,187 @@
-"""render: a pluck to a WAV file."""
+"""render: a pluck to a WAV file, or again what a WAV file's recipe says."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import typer
 
 from app.commands import arguments
-from app.commands.console import progress, say
+from app.commands.console import Failure, progress, say
+from app.sound_names import Pickup, Source
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
     from app.export import SoundRequest, WavReport
+    from app.wav import WavSettings
+    from engine.preset import Preset
 
+Value = TypeVar("Value")
 SILENT_DB = -120.0
 
 Bits = Literal["16", "24", "32f"]  # app.wav.Bits, known without soundfile
-Source = Literal["model", "truth", "difference"]  # app.export.Source
+
+Rate = Annotated[
+    int | None,
+    typer.Option(metavar="HZ", help="Sample rate; default the preset's own. A higher one adds no bandwidth."),
+]
+BitsOption = Annotated[Bits, typer.Option(help="16 is dithered; 32f is floating point and never clips.")]
+Listen = Annotated[float, typer.Option(help="Where to listen, 0 … 1 as for --position.")]
+ListenRight = Annotated[
+    float | None, typer.Option(help="Where the right channel listens; the file is stereo then.", metavar="PLACE")
+]
+PickupOption = Annotated[Pickup, typer.Option(help="velocity is brighter by 6 dB an octave; 30 m/s are full scale.")]
+DecayDb = Annotated[
+    float | None,
+    typer.Option(metavar="DB", help="End when the sound has fallen so far; --seconds is the longest then."),
+]
+GainDb = Annotated[float, typer.Option(help="How much louder the difference is made, in dB.")]
+Normalise = Annotated[bool, typer.Option("--normalise", help="To -1 dBFS, one gain for model and truth.")]
 
 
 def render(
-    preset: arguments.PresetName,
-    out: Annotated[Path, typer.Argument(metavar="OUT.wav", help="The file to write.")],
-    position: arguments.Position,
-    amplitude_mm: arguments.AmplitudeMm,
-    seconds: arguments.Seconds,
-    rate: Annotated[
-        int | None,
-        typer.Option(metavar="HZ", help="Sample rate; default the preset's own. A higher one adds no bandwidth."),
+    preset: Annotated[
+        str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
-    bits: Annotated[Bits, typer.Option(help="16 is dithered; 32f is floating point and never clips.")] = "24",
-    listen: Annotated[float, typer.Option(help="Where to listen, 0 … 1 as for --position.")] = DEFAULT_LISTEN,
-    source: Annotated[Source, typer.Option(help="difference is model minus truth.")] = "model",
+    out: Annotated[Path | None, typer.Argument(metavar="OUT.wav", help="The file to write.")] = None,
+    position: Annotated[float | None, typer.Option(help=arguments.POSITION_HELP)] = None,
+    amplitude_mm: Annotated[float | None, typer.Option(help=arguments.AMPLITUDE_HELP)] = None,
+    seconds: Annotated[float | None, typer.Option(help=arguments.SECONDS_HELP)] = None,
+    rate: Rate = None,
+    bits: BitsOption = "24",
+    listen: Listen = DEFAULT_LISTEN,
+    listen_right: ListenRight = None,
+    pickup: PickupOption = "displacement",
+    source: Annotated[
+        Source,
+        typer.Option(help="difference is model minus truth; both has the model on the left, the truth on the right."),
+    ] = "model",
+    difference_gain_db: GainDb = 0.0,
+    decay_db: DecayDb = None,
     shape: arguments.Shape = arguments.DEFAULT_SHAPE,
     width: arguments.Width = arguments.DEFAULT_WIDTH,
-    normalise: Annotated[bool, typer.Option("--normalise", help="To -1 dBFS, one gain for model and truth.")] = False,
+    normalise: Normalise = False,
+    recipe: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.wav",
+            help="Render again what this file's recipe says; then only OUT.wav is given, by default a name after "
+            "the recipe in this folder.",
+        ),
+    ] = None,
 ) -> None:
     """Render a pluck to a WAV file. 10 mm of displacement at the listening point are full scale."""
+    if recipe is not None:
+        if out is not None or any(value is not None for value in (position, amplitude_mm, seconds)):
+            raise typer.BadParameter(
+                "holds preset, pluck and duration already; give OUT.wav alone beside it", param_hint="--recipe"
+            )
+        _render_again(recipe, Path(preset) if preset else None)
+        return
+    preset, out = _given("PRESET", preset), _given("OUT.wav", out)
+    position, amplitude_mm = _given("--position", position), _given("--amplitude-mm", amplitude_mm)
+    seconds = _given("--seconds", seconds)
     pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
-    from app.export import LONGEST_S, RATE_RANGE_HZ, SoundRequest, WavSettings, export_sound
+    check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
+    from app.export import SoundRequest, WavSettings
+
+    loaded = arguments.open_preset(preset)
+    check_shortest(loaded, seconds)
+    try:
+        request = SoundRequest(
+            loaded, pluck, listen, seconds, source, listen_right, pickup, difference_gain_db, decay_db
+        )
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--source") from error
+    _write(request, out, WavSettings(bits, rate, normalise))
+
+
+def check_sound(
+    seconds: float,
+    rate: int | None,
+    listen: float,
+    listen_right: float | None,
+    difference_gain_db: float,
+    decay_db: float | None,
+) -> None:
+    """Checks the ranges of options that every command that writes sound has."""
+    from app.export import LONGEST_S, RATE_RANGE_HZ
+    from app.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB
 
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     arguments.check_range("--listen", listen, 0, 1)
+    arguments.check_range("--difference-gain-db", difference_gain_db, *DIFFERENCE_GAIN_RANGE_DB, "dB")
+    if listen_right is not None:
+        arguments.check_range("--listen-right", listen_right, 0, 1)
+    if decay_db is not None:
+        arguments.check_range("--decay-db", decay_db, *DECAY_RANGE_DB, "dB")
     if rate is not None:
         arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
-    loaded = arguments.open_preset(preset)
-    if round(seconds * loaded.info.rate_hz) < 1:
+
+
+def check_shortest(preset: Preset, seconds: float) -> None:
+    """A sound has a sample at least."""
+    if round(seconds * preset.info.rate_hz) < 1:
         raise typer.BadParameter(
-            f"must hold a sample of {loaded.info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
+            f"must hold a sample of {preset.info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
         )
-    request = SoundRequest(loaded, pluck, listen, seconds, source)
+
+
+def _given(name: str, value: Value | None) -> Value:
+    if value is None:
+        raise typer.BadParameter("is missing (only --recipe goes without it)", param_hint=name)
+    return value
+
+
+def _render_again(file: Path, out: Path | None) -> None:
+    from app.export import default_file_name
+    from app.preset_folders import usable_files
+    from app.recipe import changed_preset_notice, preset_of, read_recipe
+    from app.version import program_version
+    from engine.preset import load_preset
+
+    recipe = read_recipe(file)
+    path, exact = preset_of(recipe, usable_files())
+    if out is None:
+        out = Path(default_file_name(recipe.preset, recipe.pluck, recipe.rate_hz, recipe.source))
+        if out.exists():
+            raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
+    request = recipe.request(load_preset(path))
+    if not exact:
+        say(f"note: {changed_preset_notice(recipe)}")
+    if recipe.version != program_version():
+        say(f"note: {file} was made by version {recipe.version}, this is {program_version()}: bytes may differ")
+    _write(request, out, recipe.settings)
+
+
+def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
+    from app.export import export_sound
+
     with progress("render") as report:
-        written = export_sound(request, out, WavSettings(bits, rate, normalise), progress=report)
-    for note in _notes(request):  # after the work: a failure is told in one line, alone
+        written = export_sound(request, out, settings, progress=report)
+    for note in _notes(request, written):  # after the work: a failure is told in one line, alone
         say(note)
     if written.peak_db < SILENT_DB:
         say("note: the file is silent; amplitude 0, or the string does not move at the listening point")
-    print(_summary(written, bits))
+    print(_summary(written, settings.bits))
 
 
-def _notes(request: SoundRequest) -> list[str]:
+def _notes(request: SoundRequest, written: WavReport) -> list[str]:
     from engine.preset import outside_training
 
     info = request.preset.info
-    if request.source == "truth":
-        return []
-    notes = [f"warning: {words}" for words in outside_training(info, request.pluck)]
-    if request.seconds > info.horizon_s:
-        notes.append(f"note: from {info.horizon_s:g} s on, the model is past its training")
+    notes = []
+    if request.source != "truth":
+        notes += [f"warning: {words}" for words in outside_training(info, request.pluck)]
+    if written.past_training_s > 0:
+        notes.append(f"note: from {info.horizon_s:g} s on, the model is past its training (marked in the file)")
+    if not written.decayed:
+        notes.append(f"note: the sound had not fallen by {request.decay_db:g} dB after {written.seconds:g} s")
     return notes
 
 
-def _summary(written: WavReport, bits: str) -> str:
+def _summary(written: WavReport, bits: Bits) -> str:
     level = f"peak {written.peak_db:.1f} dBFS, {written.clipped} samples clipped"
     kind = "32-bit float" if bits == "32f" else f"{bits} bits"
     return f"{written.path}: {written.frames} frames at {written.rate_hz} Hz, {kind}, {level}"

@@ -132,6 +132,15 @@ QWidget {{ color: {TEXT}; font-size: 12px; }}
 QMainWindow, QDialog {{ background: {BACKGROUND}; }}
 QFrame#rule {{ background: {LINE}; }}
 QFrame#panel {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: 6px; }}
+QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius: 8px; }}
+QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
+QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
+QTreeWidget::item {{ padding: 6px 5px; }}
+QTreeWidget::item:hover {{ background: {RAISED}; }}
+QTreeWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
+QTreeWidget:focus {{ border: 1px solid {FAINT}; }}
+QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; padding: 5px; }}
+QPushButton#preset {{ text-align: left; font-weight: 600; padding: 6px 12px; }}
 QLabel {{ background: transparent; }}
 QLabel#faint {{ color: {FAINT}; }}
 QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
@@ -161,7 +170,23 @@ QToolButton#chip:disabled {{ color: {DISABLED}; }}
 QComboBox, QLineEdit, QDoubleSpinBox, QPlainTextEdit, QTextBrowser, QListWidget {{
     background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;
     selection-background-color: {TRUTH}; selection-color: {BACKGROUND}; }}
+QDoubleSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
+QDoubleSpinBox::up-button, QDoubleSpinBox::down-button {{ width: 0; border: none; }}
 QComboBox::drop-down {{ border: none; width: 22px; }}
+QComboBox::down-arrow {{ image: none; width: 0; height: 0; border-left: 4px solid {RAISED};
+    border-right: 4px solid {RAISED}; border-top: 5px solid {FAINT}; }}
+QCheckBox {{ spacing: 8px; }}
+QCheckBox::indicator, QListWidget::indicator {{
+    width: 13px; height: 13px; background: {RAISED}; border: 1px solid {FAINT}; border-radius: 3px; }}
+QCheckBox::indicator:checked, QListWidget::indicator:checked {{ background: {TEXT}; border-color: {TEXT}; }}
+QCheckBox:focus {{ color: white; }}
+QCheckBox::indicator:focus {{ border-color: {TEXT}; }}
+QListWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
+QListWidget:focus {{ border: 1px solid {FAINT}; }}
+QListWidget::item {{ padding: 3px 5px; }}
+QListWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
+QPushButton#primary {{ background: {TEXT}; color: {BACKGROUND}; border-color: {TEXT}; font-weight: 600; }}
+QPushButton#primary:disabled {{ background: {RAISED}; color: {FAINT}; border-color: {LINE}; }}
 QComboBox QAbstractItemView, QMenu {{
     background: {RAISED}; border: 1px solid {LINE}; selection-background-color: {LINE}; }}
 QMenu::item:selected {{ background: {LINE}; }}

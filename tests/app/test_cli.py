@@ -11,6 +11,7 @@ import typer
 from app import cli
 from app.commands import arguments, render
 from app.export import BITS, SOURCES
+from app.sound import PICKUPS
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = [
@@ -19,6 +20,8 @@ COMMANDS = [
     "simulate",
     "predict",
     "render",
+    "info",
+    "batch",
     "compare",
     "dataset",
     "train",
@@ -132,6 +135,7 @@ def test_a_failure_names_what_and_the_remedy(error: Exception, expected: str) ->
 def test_what_is_known_without_soundfile_is_what_they_say() -> None:
     assert render.Bits.__args__ == BITS
     assert render.Source.__args__ == SOURCES
+    assert render.Pickup.__args__ == PICKUPS
 
 
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), float("inf")])

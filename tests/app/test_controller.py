@@ -177,7 +177,7 @@ def test_presets_are_stepped_and_chosen(qtbot: QtBot, controller: Controller) ->
     assert controller.session.choices.preset == "second"
     assert controller.entry is not None
     assert controller.entry.name == "second"
-    controller.window.presets.preset_chosen.emit("first")
+    qtbot.keyClick(controller.window, Qt.Key.Key_PageUp)
     assert controller.session.choices.preset == "first"
 
 

@@ -12,7 +12,7 @@ import pytest
 import soundfile
 import torch
 
-from app import export
+from app import export, sound
 from app.export import (
     ExportCancelled,
     ExportError,
@@ -20,10 +20,13 @@ from app.export import (
     WavSettings,
     default_file_name,
     export_sound,
+    export_sounds,
     render_signal,
     render_sound,
     write_wav,
 )
+from app.recipe import Recipe
+from app.wav_chunks import Marker, read_markers
 from engine.pluck import Pluck
 from engine.preset import load_preset
 from engine.sine_transform import listening_weights
@@ -56,13 +59,13 @@ def test_the_signal_is_the_whole_motion_at_the_listening_point_for_any_block(
     start_m = project(request_.pluck.displacement(101), 10)
     frames, _ = source.advance(source.start(start_m[None]), 299)
     whole_m = torch.cat([start_m[None], frames[0].double()]) @ listening_weights(torch.tensor([0.37]), 101)[:, 0]
-    monkeypatch.setattr(export, "BLOCK_FRAMES", block)
+    monkeypatch.setattr(sound, "BLOCK_FRAMES", block)
     signal = render_signal(source, start_m, 300 / 4000, 0.37)
     assert signal == pytest.approx(whole_m.numpy() / FULL_SCALE_M, abs=1e-6)
 
 
 def test_the_difference_is_model_minus_truth(request_: SoundRequest) -> None:
-    model, truth, difference = (render_sound(replace(request_, source=s)) for s in export.SOURCES)  # type: ignore[arg-type]
+    model, truth, difference = (render_sound(replace(request_, source=s)) for s in ("model", "truth", "difference"))  # type: ignore[arg-type]
     assert np.abs(difference).max() > 1e-3
     assert (difference == model - truth).all()
 
@@ -82,7 +85,7 @@ def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: exp
     assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
     assert report.peak_db == pytest.approx(20 * np.log10(np.abs(expected).max()))
     assert report.size_bytes == path.stat().st_size
-    assert recipe == export.recipe(request_, settings)
+    assert recipe == json.loads(Recipe.of(request_, settings).model_dump_json())
     assert recipe["preset_sha256"] == hashlib.sha256(request_.preset.path.read_bytes()).hexdigest()
     assert Pluck(**recipe["pluck"]) == request_.pluck
 
@@ -103,7 +106,7 @@ def test_normalising_keeps_the_ratio_of_model_and_truth(request_: SoundRequest, 
 
 
 def test_progress_rises_to_one(request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(export, "BLOCK_FRAMES", 100)
+    monkeypatch.setattr(sound, "BLOCK_FRAMES", 100)
     shares: list[float] = []
     export_sound(replace(request_, source="difference"), tmp_path / "a.wav", progress=shares.append)
     assert shares == sorted(shares)
@@ -150,9 +153,9 @@ def test_samples_that_are_not_finite_are_refused(tmp_path: Path) -> None:
 
 
 def test_samples_can_be_written_with_several_channels(tmp_path: Path) -> None:
-    report = write_wav(tmp_path / "a.wav", np.zeros((50, 2)), 4000, PLAIN, title="two", recipe={"a": 1})
+    report = write_wav(tmp_path / "a.wav", np.zeros((50, 2)), 4000, PLAIN, title="two")
     with soundfile.SoundFile(tmp_path / "a.wav") as file:
-        assert (file.channels, file.frames, file.title, json.loads(file.comment)) == (2, 50, "two", {"a": 1})
+        assert (file.channels, file.frames, file.title) == (2, 50, "two")
     assert report.frames == 50
 
 
@@ -163,7 +166,12 @@ def test_samples_can_be_written_with_several_channels(tmp_path: Path) -> None:
         ({"seconds": 0.0}, "at most 600, not 0"),
         ({"seconds": 601.0}, "at most 600, not 601"),
         ({"seconds": float("nan")}, "not nan"),
-        ({"source": "both"}, "model, truth, difference"),
+        ({"source": "all"}, "model, truth, difference, both"),
+        ({"source": "both", "listen_right": 0.5}, "choose two files, or mono"),
+        ({"listen_right": -0.1}, "right listening point must lie in 0 … 1"),
+        ({"pickup": "magnet"}, "displacement, velocity"),
+        ({"decay_db": 5.0}, "decay_db must lie in 10 … 120, not 5"),
+        ({"difference_gain_db": 99.0}, "difference_gain_db must lie in 0 … 80, not 99"),
     ],
 )
 def test_a_request_out_of_range_is_refused(request_: SoundRequest, change: dict, message: str) -> None:
@@ -173,3 +181,69 @@ def test_a_request_out_of_range_is_refused(request_: SoundRequest, change: dict,
 
 def test_the_file_name_tells_what_is_in_it() -> None:
     assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth") == "nylon_x0.35_a4.0_48000_truth.wav"
+    assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both") == "b_x0.1234_a0.25_4000_both.wav"
+
+
+def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(request_: SoundRequest, tmp_path: Path) -> None:
+    model, truth = (render_sound(replace(request_, source=s)) for s in ("model", "truth"))  # type: ignore[arg-type]
+    assert (render_sound(replace(request_, source="both")) == np.stack([model, truth], axis=1)).all()
+    paths = {"model": tmp_path / "m.wav", "truth": tmp_path / "t.wav", "difference": tmp_path / "d.wav"}
+    reports, _ = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
+    assert [report.path for report in reports] == list(paths.values())
+    assert len({report.gain_db for report in reports}) == 1
+    m, t, d = (soundfile.read(path)[0] for path in paths.values())
+    assert d == pytest.approx(m - t, abs=1e-6)
+    assert max(np.abs(m).max(), np.abs(t).max()) == pytest.approx(10 ** (-1 / 20), rel=1e-6)
+
+
+def test_the_difference_is_made_louder_by_its_gain(request_: SoundRequest) -> None:
+    plain = render_sound(replace(request_, source="difference"))
+    loud = render_sound(replace(request_, source="difference", difference_gain_db=20.0))
+    assert loud == pytest.approx(10 * plain)
+
+
+def test_a_right_listening_point_makes_stereo(request_: SoundRequest) -> None:
+    stereo = render_sound(replace(request_, listen_right=0.6))
+    assert stereo[:, 0] == pytest.approx(render_sound(request_), abs=1e-6)
+    assert stereo[:, 1] == pytest.approx(render_sound(replace(request_, listen=0.6)), abs=1e-6)
+
+
+def test_velocity_is_the_derivative_of_displacement(request_: SoundRequest) -> None:
+    displacement_m = render_sound(request_) * FULL_SCALE_M
+    expected = np.gradient(displacement_m, 1 / 4000) / sound.FULL_SCALE_M_S
+    found = render_sound(replace(request_, pickup="velocity"))
+    slow = np.convolve(found - expected, np.ones(16) / 16, "valid")  # central differences are low at high partials
+    assert np.abs(slow[4:]).max() < 0.05 * np.abs(found).max()
+    assert found[0] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_decay_ends_where_it_is_so_far_down_and_not_before() -> None:
+    rate_hz, rate = 1000, 10.0  # 1/s: 86.9 dB in a second
+    signal = np.exp(-rate * np.arange(3000) / rate_hz)[:, None]
+    assert sound.decayed_frames(signal, rate_hz, 60.0) / rate_hz == pytest.approx(6.9 / rate, abs=0.06)
+    assert sound.decayed_frames(signal[:200], rate_hz, 60.0) == 200
+    assert sound.decayed_frames(np.zeros((500, 1)), rate_hz, 60.0) == 50
+
+
+def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_told(
+    request_: SoundRequest, tmp_path: Path
+) -> None:
+    decaying = replace(request_, seconds=8.0, decay_db=10.0)
+    model = export_sound(decaying, tmp_path / "m.wav")
+    truth = export_sound(replace(decaying, source="truth"), tmp_path / "t.wav")
+    assert model.frames == truth.frames < 8 * 4000
+    assert model.decayed
+    assert truth.past_training_s == 0 < model.past_training_s
+    assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "m.wav").decayed
+
+
+@pytest.mark.parametrize("bits", export.BITS)
+def test_the_end_of_training_is_marked_in_the_file(request_: SoundRequest, bits: export.Bits, tmp_path: Path) -> None:
+    for source, marks in (("model", [Marker(1200, "end of training")]), ("truth", [])):
+        path = tmp_path / f"{source}.wav"
+        export_sound(replace(request_, source=source), path, WavSettings(bits, 12_000))  # type: ignore[arg-type]
+        assert read_markers(path.read_bytes()) == marks
+        with soundfile.SoundFile(path) as file:
+            assert file.frames == 2400
+            assert ("Cue ID :  1  Pos :  1200" in file.extra_info) == bool(marks)  # as libsndfile reads it
+            assert ("labl : 1 : end of training" in file.extra_info) == bool(marks)

@@ -52,3 +52,19 @@ def test_models_counts_the_real_modules_at_the_papers_sizes(run) -> None:
     found = {entry["name"]: entry["parameters"] for entry in json.loads(run("models", "--json").out)}
     assert found["koopman_var"] == 134_885
     assert "134,885" in run("models").out
+
+
+def test_presets_of_the_users_own_folder_are_listed_and_found(
+    run, installed: Path, small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = tmp_path / "own"
+    own.mkdir()
+    for name in ("mine", "good"):  # of two of one name, the shipped one counts
+        shutil.copy(small_preset, own / f"{name}.safetensors")
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
+    found = {entry["name"]: entry["file"] for entry in json.loads(run("presets", "--json").out)}
+    assert found == {
+        "good": str(installed / "good.safetensors"),
+        "mine": str(own / "mine.safetensors"),
+    }
+    assert run("compare", "mine", "--position", 0.5, "--amplitude-mm", 2, "--seconds", 0.01).status == 0

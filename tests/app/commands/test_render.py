@@ -71,7 +71,7 @@ def test_what_lies_past_or_outside_the_training_is_told(run, small_preset: Path,
     found = run(*render(small_preset, folder / "a.wav", "--seconds", 0.2, position=0.1))
     assert found.err.splitlines() == [
         "learned-strings: warning: position 0.1 is outside the trained 0.3 … 0.7",
-        "learned-strings: note: from 0.1 s on, the model is past its training",
+        "learned-strings: note: from 0.1 s on, the model is past its training (marked in the file)",
     ]
 
 
@@ -93,7 +93,9 @@ def test_silence_is_explained(run, small_preset: Path, folder: Path) -> None:
         (["--width", 0.6], "--width: must lie in 0.02 … 0.5, not 0.6"),
         (["--rate", 999], "--rate: must lie in 1000 … 384000 Hz, not 999"),
         (["--bits", 8], "--bits"),
-        (["--source", "both"], "--source"),
+        (["--source", "all"], "--source"),
+        (["--source", "both", "--listen-right", 0.2], "--source: model and truth cannot share one file in stereo"),
+        (["--decay-db", 5], "--decay-db: must lie in 10 … 120 dB, not 5"),
         (["--shape", "square"], "--shape"),
     ],
 )

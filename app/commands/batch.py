@@ -1,0 +1,118 @@
+"""batch: many plucks of many presets to WAV files, with an index."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.commands import arguments
+from app.commands.console import Failure, progress, say
+from app.commands.render import (
+    BitsOption,
+    DecayDb,
+    GainDb,
+    Listen,
+    ListenRight,
+    Normalise,
+    PickupOption,
+    Rate,
+    check_sound,
+)
+from engine.pluck import DEFAULT_LISTEN
+
+if TYPE_CHECKING:
+    from app.sound import Source
+
+
+def batch(
+    presets: Annotated[str, typer.Option(help="Names or paths of presets, a comma between two.")],
+    positions: Annotated[str, typer.Option(help="Where to pluck, 0 … 1, a comma between two.")],
+    amplitudes: Annotated[str, typer.Option(help="Peak displacements in mm, a comma between two.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder; made where it is not there.")],
+    seconds: arguments.Seconds,
+    sources: Annotated[str, typer.Option(help="Of model, truth, difference, both; a comma between two.")] = "model",
+    rate: Rate = None,
+    bits: BitsOption = "24",
+    listen: Listen = DEFAULT_LISTEN,
+    listen_right: ListenRight = None,
+    pickup: PickupOption = "displacement",
+    difference_gain_db: GainDb = 0.0,
+    decay_db: DecayDb = None,
+    shape: arguments.Shape = arguments.DEFAULT_SHAPE,
+    width: arguments.Width = arguments.DEFAULT_WIDTH,
+    normalise: Normalise = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Render again what is there already.")] = False,
+) -> None:
+    """Render positions × amplitudes × presets × sources to WAV files; index.csv lists them with peaks and errors.
+
+    A batch that was stopped goes on with the same command: whole files are kept.
+    """
+    places, heights = _numbers("--positions", positions), _numbers("--amplitudes", amplitudes)
+    for place in places:
+        for height in heights:
+            pluck = arguments.check_pluck(place, height, shape, width)
+    check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
+    from app.batch import INDEX, BatchPlan, run_batch
+    from app.preset_folders import usable_files
+    from app.wav import WavSettings
+    from engine.preset import find_preset
+
+    files = usable_files()
+    paths = tuple(find_preset(name, files) for name in _words(presets))
+    try:
+        plan = BatchPlan(
+            paths,
+            places,
+            heights,
+            _sources(sources),
+            out,
+            seconds,
+            listen,
+            pluck,
+            listen_right,
+            pickup,
+            difference_gain_db,
+            decay_db,
+            WavSettings(bits, rate, normalise),
+            overwrite,
+        )
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    with progress("batch") as report:
+        rows = run_batch(plan, report)
+    for message in dict.fromkeys(row.message for row in rows if row.message):
+        say(message)
+    counts = Counter(row.status for row in rows)
+    print(f"{out / INDEX}: {counts['written']} written, {counts['kept']} kept, {counts['failed']} failed")
+    clipped = sum(row.clipped or 0 for row in rows)
+    if clipped:
+        say(f"note: {clipped} samples were clipped; lower the amplitudes, or choose --bits 32f or --normalise")
+    if counts["failed"]:
+        raise Failure(f"{counts['failed']} of {len(rows)} files were not made; {out / INDEX} says why")
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _numbers(option: str, text: str) -> tuple[float, ...]:
+    try:
+        found = tuple(float(word) for word in _words(text))
+    except ValueError as error:
+        raise typer.BadParameter(f"must be numbers with commas between, not {text!r}", param_hint=option) from error
+    if not found:
+        raise typer.BadParameter("give at least one number", param_hint=option)
+    return found
+
+
+def _sources(text: str) -> tuple[Source, ...]:
+    from app.sound import SOURCES
+
+    known = {str(source): source for source in SOURCES}
+    for word in _words(text):
+        if word not in known:
+            raise typer.BadParameter(f"{word!r} is not one of {', '.join(SOURCES)}", param_hint="--sources")
+    return tuple(known[word] for word in _words(text))

@@ -1,0 +1,38 @@
+"""info: what a WAV file says of how it was made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.commands.arguments import Json
+from app.commands.console import print_json, say
+
+
+def info(
+    file: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A file that render, batch or the app wrote.")],
+    json: Json = False,
+) -> None:
+    """Show the recipe of a WAV file; `render --recipe FILE.wav` makes it again."""
+    from app.preset_folders import usable_files
+    from app.recipe import RecipeError, preset_of, read_recipe
+
+    recipe = read_recipe(file)
+    facts = recipe.model_dump(mode="json")
+    try:
+        path, exact = preset_of(recipe, usable_files())
+        here = f"{path}" if exact else f"{path} (another version of it)"
+    except RecipeError:
+        here = "none; the preset is not here"
+    if json:
+        print_json({**facts, "preset_file": here})
+        return
+    pluck = facts.pop("pluck")
+    lines = {**{f"pluck {name}": value for name, value in pluck.items()}, **facts, "preset file": here}
+    width = max(map(len, lines))
+    for name, value in lines.items():
+        print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else value}")
+    if recipe.source != "truth" and (recipe.decay_db is not None or recipe.seconds > recipe.horizon_s):
+        say(f"note: from {recipe.horizon_s:g} s on, the model is past its training")

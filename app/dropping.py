@@ -1,0 +1,71 @@
+"""What a dropped file means: a preset becomes one of the user's own, a WAV's recipe is restored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app.library import Library
+from app.preset_folders import user_folder
+from app.preset_install import SUFFIX, InstallError, install_preset
+from app.recipe import Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
+from app.session import SECONDS_RANGE, Choices
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """What follows: new choices of the session, and a line for the user."""
+
+    choices: dict[str, Any] = field(default_factory=dict)
+    notice: str = ""
+
+
+def receive(file: Path, library: Library) -> Dropped:
+    """Takes a file in. A preset is in the library afterwards; errors are notices."""
+    try:
+        if file.suffix.lower() == SUFFIX:
+            return _preset(file, library)
+        if file.suffix.lower() == ".wav":
+            return _recipe(file, library)
+    except (InstallError, RecipeError) as error:
+        return Dropped(notice=str(error))
+    return Dropped(notice=f"{file}: neither a preset ({SUFFIX}) nor an exported WAV; drop one of these")
+
+
+def _preset(file: Path, library: Library) -> Dropped:
+    installed = install_preset(file, user_folder(), [entry.path for entry in library.entries])
+    library.refresh()
+    if library.find(installed.name) is None:
+        return Dropped(notice=f"{installed.path}: cannot be used; see whether the file is still there")
+    return Dropped({"preset": installed.name})
+
+
+def _recipe(file: Path, library: Library) -> Dropped:
+    recipe = read_recipe(file)
+    path, exact = preset_of(recipe, [entry.path for entry in library.entries])
+    notices = [] if exact else [changed_preset_notice(recipe)]
+    if not SECONDS_RANGE[0] <= recipe.seconds <= SECONDS_RANGE[1]:
+        notices.append(f"its duration of {recipe.seconds:g} s is not one that the window plays, and was limited")
+    notice = f"{file.name}: {'; '.join(notices)}." if notices else ""
+    return Dropped({"preset": path.stem, **restored_choices(recipe)}, notice)
+
+
+def restored_choices(recipe: Recipe) -> dict[str, Any]:
+    """Fields of `Choices` for what a recipe says, but for the preset."""
+    low, high = SECONDS_RANGE
+    found: dict[str, Any] = {
+        "position": recipe.pluck.position,
+        "amplitude_mm": recipe.pluck.amplitude_mm,
+        "shape": recipe.pluck.shape,
+        "width": recipe.pluck.width,
+        "listen": recipe.listen,
+        "seconds": min(max(recipe.seconds, low), high),
+    }
+    if recipe.source in ("model", "truth"):
+        found["heard"] = recipe.source
+    more: dict[str, Any] = {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
+    if recipe.listen_right is not None:
+        more["listen_right"] = recipe.listen_right
+    # what this version's window cannot choose it cannot restore
+    return found | {name: value for name, value in more.items() if name in Choices.model_fields}

@@ -1,0 +1,57 @@
+"""A preset's facts in a musician's words."""
+
+from __future__ import annotations
+
+from engine.preset import PresetInfo
+
+_MODELS = {
+    "dmd": ("DMD", "fixed partials fitted to the data: each has one frequency and one decay"),
+    "koopman": ("Koopman", "learned partials, each of one frequency and one decay"),
+    "koopman_var": ("Koopman, variable", "learned partials whose pitch and decay follow how hard it is plucked"),
+    "koopman_integrated": (
+        "Koopman, integrated phase",
+        "learned partials whose pitch glides as the string comes to rest, as tension does",
+    ),
+    "lru": ("LRU", "a deep recurrent network of linear resonances"),
+    "s5": ("S5", "a deep state-space network"),
+    "fgru": ("Fourier GRU", "a gated recurrent network over the whole string"),
+    "frnn": ("Fourier RNN", "a recurrent network over the whole string"),
+}
+
+
+def model_word(model: str) -> str:
+    """The model's name as it is shown; one that has none here keeps its own."""
+    return _MODELS.get(model, (model, ""))[0]
+
+
+def model_meaning(model: str) -> str:
+    """What such a model does, in one phrase; empty where nothing is known."""
+    return _MODELS.get(model, ("", ""))[1]
+
+
+def string_word(tension_modulated: bool) -> str:
+    return "pitch glide (tension-modulated)" if tension_modulated else "linear"
+
+
+def initial_word(initial: str) -> str:
+    return {"gaussian": "plucked", "noise": "random shapes", "pluck": "plucked anywhere"}.get(initial, initial)
+
+
+def rate_word(rate_hz: int) -> str:
+    return f"{rate_hz / 1000:g} kHz"
+
+
+def size_word(size_bytes: int) -> str:
+    return f"{size_bytes / 2**20:.1f} MB" if size_bytes >= 2**20 else f"{size_bytes / 2**10:.0f} kB"
+
+
+def time_word(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    if minutes < 1:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def error_word(info: PresetInfo) -> str:
+    """The relative mean absolute error on data it has not seen, in percent."""
+    return "–" if info.rel_mae is None else f"{100 * info.rel_mae:.2g} %"

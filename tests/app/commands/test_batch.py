@@ -1,0 +1,150 @@
+"""batch on the command line, and what it is made of."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+import soundfile
+
+from app import batch, sound
+from app.batch import BatchPlan, ExportCancelled, run_batch
+from app.export import SoundRequest, export_sound
+from engine.pluck import Pluck
+from engine.preset import load_preset
+from engine.sources import Runaway
+
+
+@pytest.fixture
+def words(small_preset: Path, tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """A command line for two presets, two positions and one amplitude."""
+    shipped = tmp_path / "shipped"
+    shipped.mkdir()
+    for name in ("a", "b"):
+        shutil.copy(small_preset, shipped / f"{name}.safetensors")
+    monkeypatch.setattr("engine.preset.SHIPPED", shipped)
+    lists = ["--presets", "a,b", "--positions", "0.3, 0.45", "--amplitudes", "2"]
+    return ["batch", *lists, "--seconds", 0.15, "--out", folder / "out"]
+
+
+def index(folder: Path) -> list[dict[str, str]]:
+    with (folder / "out" / "index.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def plan(small_preset: Path, folder: Path) -> BatchPlan:
+    return BatchPlan((small_preset,), (0.3, 0.4), (1.0, 2.0), ("model", "truth"), folder / "out", 0.15, 0.37)
+
+
+def test_every_combination_is_a_file_and_a_row(run, words: list[object], folder: Path, small_preset: Path) -> None:
+    found = run(*words, "--sources", "model,truth")
+    assert (found.status, found.err) == (0, "")
+    assert found.out == f"{folder / 'out' / 'index.csv'}: 8 written, 0 kept, 0 failed\n"
+    rows = index(folder)
+    assert len(rows) == 8
+    assert sorted(row["file"] for row in rows) == sorted(p.name for p in (folder / "out").glob("*.wav"))
+    one = next(row for row in rows if row["file"] == "b_x0.45_a2.0_4000_model.wav")
+    assert (one["status"], one["preset"], one["clipped"], float(one["seconds"])) == ("written", "b", "0", 0.15)
+    assert 0 < float(one["rel_mae_trained"]) < 2
+    assert all((row["rel_mae"] == "") == (row["source"] == "truth") for row in rows)
+    expected = folder / "one.wav"
+    request = SoundRequest(load_preset(small_preset), Pluck(0.45, 2.0), 0.37, 0.15)
+    report = export_sound(request, expected)
+    assert float(one["peak_db"]) == pytest.approx(report.peak_db, abs=0.01)
+    assert (soundfile.read(folder / "out" / one["file"])[0] == soundfile.read(expected)[0]).all()
+
+
+def test_it_goes_on_where_it_was(run, words: list[object], folder: Path) -> None:
+    run(*words)
+    before = index(folder)
+    gone = folder / "out" / "a_x0.30_a2.0_4000_model.wav"
+    gone.unlink()
+    times = {path: path.stat().st_mtime_ns for path in (folder / "out").glob("*.wav")}
+    assert "1 written, 3 kept, 0 failed" in run(*words).out
+    assert gone.exists()
+    assert {path: path.stat().st_mtime_ns for path in times} == times
+    assert {row["file"]: row["rel_mae"] for row in index(folder)} == {row["file"]: row["rel_mae"] for row in before}
+    assert "4 written, 0 kept, 0 failed" in run(*words, "--overwrite").out
+
+
+def test_a_kept_file_without_its_row_is_listed(run, words: list[object], folder: Path) -> None:
+    run(*words)
+    (folder / "out" / "index.csv").write_text("something else")
+    assert "0 written, 4 kept" in run(*words).out
+    assert {row["seconds"] for row in index(folder)} == {"0.15"}
+
+
+def test_another_sound_of_the_name_is_told_and_stays(run, words: list[object], folder: Path) -> None:
+    run(*words)
+    path = folder / "out" / "a_x0.30_a2.0_4000_model.wav"
+    before = path.read_bytes()
+    found = run(*words, "--listen", 0.2)
+    assert found.status == 1
+    assert "there is another sound of this name" in found.err
+    assert path.read_bytes() == before
+    assert run(*words, "--listen", 0.2, "--overwrite").status == 0
+    with soundfile.SoundFile(path) as file:
+        assert json.loads(file.comment)["listen"] == 0.2
+
+
+def test_a_broken_preset_hinders_no_other(run, words: list[object], folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "shipped" / "a.safetensors").write_bytes(b"?")
+    found = run(*words)
+    assert found.status == 1
+    assert "2 written, 0 kept, 2 failed" in found.out
+    assert "a.safetensors: not a whole safetensors file" in found.err
+    assert "2 of 4 files were not made" in found.err.splitlines()[-1]
+
+
+def test_a_model_that_runs_away_leaves_the_truth(
+    small_preset: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Away(sound.ModelSource):
+        def advance(self, *_: object) -> None:
+            raise Runaway(0.01)
+
+    monkeypatch.setattr(sound, "ModelSource", Away)
+    rows = run_batch(plan(small_preset, folder))
+    assert {(row.source, row.status) for row in rows} == {("model", "failed"), ("truth", "written")}
+    assert all("runs away" in row.message for row in rows if row.source == "model")
+    assert len(list((folder / "out").glob("*.wav"))) == 4
+
+
+def test_cancelling_keeps_whole_files_and_their_rows(small_preset: Path, folder: Path) -> None:
+    seen: list[tuple[float, str, float | None]] = []
+    with pytest.raises(ExportCancelled):
+        run_batch(plan(small_preset, folder), lambda *told: seen.append(told), lambda: seen[-1][0] > 0.3)
+    assert 0 < len(index(folder)) < 8
+    assert sorted(row["file"] for row in index(folder)) == sorted(p.name for p in (folder / "out").glob("*.wav"))
+    assert [share for share, _, _ in seen] == sorted(share for share, _, _ in seen)
+    assert "position 0.3, 1 mm" in seen[0][1]
+    assert any(left_s is not None for _, _, left_s in seen)
+    assert {row.status for row in run_batch(plan(small_preset, folder))} == {"kept", "written"}
+    assert list((folder / "out").glob(".*")) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--positions", "0.2,x"], "--positions: must be numbers"),
+        (["--positions", ","], "--positions: give at least one number"),
+        (["--positions", "0"], "--position: must lie in 0.02 … 0.98"),
+        (["--amplitudes", "1,1"], "amplitudes mm: one is given twice"),
+        (["--sources", "all"], "all is not one of model, truth, difference, both"),
+        (["--seconds", "0"], ""),
+    ],
+)
+def test_lists_that_are_no_lists_are_bad_usage(run, words: list[object], more: list[str], message: str) -> None:
+    if more[0] == "--seconds":
+        assert "seconds must be above 0" in run(*words, *more).err
+    else:
+        assert message in run(*words, *more).usage.replace("'", "")
+
+
+def test_an_unwritable_folder_is_told(run, words: list[object], folder: Path) -> None:
+    (folder / "out").write_text("in the way")
+    assert "cannot be made" in run(*words).failure
+    assert batch.INDEX == "index.csv"

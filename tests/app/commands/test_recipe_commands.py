@@ -1,0 +1,122 @@
+"""A WAV's recipe on the command line: shown, and rendered again."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+PLUCK = ("--position", 0.41, "--amplitude-mm", 3.3, "--seconds", 0.15)
+
+
+@pytest.fixture
+def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One shipped preset `good`, and a folder of the user's own that is not made yet."""
+    shipped = tmp_path / "shipped"
+    shipped.mkdir()
+    shutil.copy(small_preset, shipped / "good.safetensors")
+    monkeypatch.setattr("engine.preset.SHIPPED", shipped)
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    return shipped / "good.safetensors"
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ["--bits", "16", "--rate", 44_100],
+        ["--bits", "32f", "--normalise", "--pickup", "velocity"],
+        ["--source", "both", "--shape", "triangular"],
+        ["--source", "difference", "--difference-gain-db", 12, "--listen-right", 0.7],
+        ["--decay-db", 10],
+    ],
+)
+def test_a_recipe_makes_the_same_bytes(run, installed: Path, folder: Path, more: list[object]) -> None:
+    first, again = folder / "first.wav", folder / "again.wav"
+    assert run("render", "good", first, *PLUCK, *more).status == 0
+    found = run("render", "--recipe", first, again)
+    assert (found.status, found.out[: len(str(again))]) == (0, str(again))
+    assert again.read_bytes() == first.read_bytes()
+
+
+def test_without_a_name_it_lies_in_this_folder_and_replaces_nothing(
+    run, installed: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = folder / "first.wav"
+    run("render", "good", first, *PLUCK)
+    monkeypatch.chdir(folder)
+    assert run("render", "--recipe", "first.wav").status == 0
+    assert (folder / "good_x0.41_a3.3_4000_model.wav").read_bytes() == first.read_bytes()
+    assert "is there already" in run("render", "--recipe", "first.wav").failure
+
+
+def test_a_preset_is_found_by_its_content_under_another_name(run, installed: Path, folder: Path) -> None:
+    first, again = folder / "first.wav", folder / "again.wav"
+    run("render", "good", first, *PLUCK)
+    own = installed.parents[1] / "own"
+    own.mkdir()
+    installed.rename(own / "renamed.safetensors")
+    found = run("render", "--recipe", first, again)
+    assert found.status == 0
+    assert "another version" not in found.err
+    assert (soundfile.read(again)[0] == soundfile.read(first)[0]).all()
+    assert "renamed.safetensors" in run("info", first).out
+
+
+def test_another_version_of_a_preset_is_told(run, installed: Path, folder: Path) -> None:
+    first = folder / "first.wav"
+    run("render", "good", first, *PLUCK)
+    data = installed.read_bytes()
+    installed.write_bytes(data.replace(b"A small string", b"A SMALL string"))
+    os.utime(installed, ns=(1, 1))
+    found = run("render", "--recipe", first, folder / "again.wav")
+    assert found.status == 0
+    assert "the preset good is not the one that made this file" in found.err
+
+
+def test_a_recipe_whose_preset_is_gone_is_told(run, installed: Path, folder: Path) -> None:
+    first = folder / "first.wav"
+    run("render", "good", first, *PLUCK)
+    installed.unlink()
+    assert "the preset good of this recipe is not here" in run("render", "--recipe", first, folder / "a.wav").failure
+    assert "the preset is not here" in run("info", first).out
+
+
+def test_info_shows_every_choice(run, installed: Path, folder: Path) -> None:
+    first = folder / "first.wav"
+    run("render", "good", first, *PLUCK, "--listen-right", 0.6)
+    facts = json.loads(run("info", first, "--json").out)
+    assert facts["pluck"] == {"position": 0.41, "amplitude_mm": 3.3, "shape": "gaussian", "width": 0.06}
+    assert (facts["listen_right"], facts["preset"], facts["preset_file"]) == (0.6, "good", str(installed))
+    shown = run("info", first)
+    assert "pluck position      0.41\n" in shown.out
+    assert "past its training" in shown.err
+
+
+def test_files_without_a_usable_recipe_are_told_in_one_line(run, folder: Path) -> None:
+    path = folder / "foreign.wav"
+    assert f"{path}: no sound file that can be read" in run("info", path).failure
+    path.write_bytes(b"RIFF nothing")
+    assert f"{path}: no sound file that can be read" in run("render", "--recipe", path).failure
+    soundfile.write(path, np.zeros(10), 8000)
+    assert f"{path}: has no recipe" in run("info", path).failure
+    for comment, field in (('{"format":2}', "format: "), ("{broken", "the text: "), ('{"program":"x"}', "version: ")):
+        with soundfile.SoundFile(path, "w", 8000, 1) as file:
+            file.comment = comment
+            file.write(np.zeros(10))
+        failure = run("info", path).failure
+        assert "its recipe cannot be used" in failure
+        assert field in failure or "pluck" in failure
+
+
+def test_recipe_and_other_choices_exclude_each_other(run, folder: Path) -> None:
+    assert "--recipe: holds preset" in run("render", "a", "b.wav", "--recipe", "c.wav").usage.replace("'", "")
+    assert "--recipe: holds preset" in run("render", "--recipe", "c.wav", "--position", 0.3).usage.replace("'", "")
+    assert "PRESET: is missing" in run("render").usage.replace("'", "")
+    assert "--seconds: is missing" in run(
+        "render", "a", "b.wav", "--position", 0.3, "--amplitude-mm", 1
+    ).usage.replace("'", "")
