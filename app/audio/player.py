@@ -25,9 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.audio.devices import AudioDevice, default_device, find
-from app.audio.mixer import DECLICK_S, METER_FLOOR_DB, Mixer
+from app.audio.levels import Levels
+from app.audio.mixer import METER_FLOOR_DB, Mixer
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, vanished
 from app.audio.silent import SilentOutput
+from app.audio.strand import DECLICK_S
 from app.audio.stream import BUFFER_S, OutputStream
 from app.audio.timeline import Timeline
 from app.audio.track import Track
@@ -87,7 +89,7 @@ def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
 
 
 class Player:
-    """Plays one track at a time through a device, or silently against a clock as long as there is none.
+    """Plays tracks through a device, or silently against a clock as long as there is none.
 
     Every public method may be called from any thread and returns at once. After `close` commands do nothing.
 
@@ -130,13 +132,13 @@ class Player:
         """
         self._commands.put(lambda: self._change_output(device, buffer_s))
 
-    def load(self, track: Track, keep_position: bool = False) -> None:
-        """Takes another track, from its beginning or at the same position; see `Mixer.load`."""
+    def load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
+        """Takes another track: from its beginning, at the same position, or beside the last; see `Mixer.load`."""
         rate_hz = self.rate_hz
         if track.rate_hz != rate_hz:
             raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
         self._track = track
-        self._commands.put(lambda: self._load(track, keep_position))
+        self._commands.put(lambda: self._load(track, keep_position, ring))
 
     def play(self) -> None:
         self._commands.put(lambda: self._mixer.play())
@@ -164,6 +166,10 @@ class Player:
         if math.isnan(volume_db) or volume_db == math.inf:
             raise ValueError(f"The volume cannot be {volume_db} dB.")
         self._commands.put(lambda: self._mixer.set_volume_db(volume_db))
+
+    def set_levels(self, levels: Levels) -> None:
+        """How loud each source is played; see `Levels`."""
+        self._commands.put(lambda: self._mixer.set_levels(levels))
 
     @property
     def rate_hz(self) -> int:
@@ -221,10 +227,10 @@ class Player:
                 return
             command()
 
-    def _load(self, track: Track, keep_position: bool) -> None:
+    def _load(self, track: Track, keep_position: bool, ring: bool) -> None:
         # If the device has changed meanwhile, the caller will see the new rate in status() and load again.
         if track.rate_hz == self._mixer.rate_hz:
-            self._mixer.load(track, keep_position)
+            self._mixer.load(track, keep_position, ring)
 
     def _select(self, source: str) -> None:
         # select() has checked the source; only a track that another thread loaded meanwhile may refuse it.

@@ -7,7 +7,7 @@ import pytest
 
 from app.audio import Mixer, Track
 from app.audio.limiter import CEILING
-from app.audio.mixer import ATTACK_S, CROSS_FADE_S, DECLICK_S, RESUME_RESERVE_S
+from app.audio.strand import ATTACK_S, CROSS_FADE_S, DECLICK_S, RESUME_RESERVE_S
 
 RATE_HZ = 48_000
 TONE_HZ = 220.0
