@@ -17,6 +17,13 @@ class PresetEntry:
     info: PresetInfo
     parameters: int
 
+    @property
+    def unplayable(self) -> str:
+        """Why its model cannot be let go from rest, or nothing."""
+        if self.info.model_configuration.get("input") == "two_frames":
+            return "its model needs the frame before the first, which a string at rest does not have"
+        return ""
+
 
 class Library:
     """The presets in the order of the list, found by name."""

@@ -25,8 +25,9 @@ from app.views.transport_bar import TransportBar
 KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
     ("Return", "pluck_asked", "pluck"),
-    ("X", "switch_asked", "switch between model and truth at the playhead"),
+    ("X", "switch_asked", "switch between A and B at the playhead"),
     ("L", "loop_asked", "loop"),
+    ("Esc", "all_modes_asked", "hear all modes again"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
     ("Ctrl+E", "export_asked", "export WAV"),
@@ -42,6 +43,7 @@ class MainWindow(QMainWindow):
     pluck_asked = Signal()
     switch_asked = Signal()
     loop_asked = Signal()
+    all_modes_asked = Signal()
     previous_asked = Signal()
     next_asked = Signal()
     export_asked = Signal()
@@ -62,6 +64,9 @@ class MainWindow(QMainWindow):
         self.error_label.setToolTip(
             "Model against truth for this pluck: relative mean absolute error, all of the string"
         )
+        self._solo = tool_button("", "Hear all modes", "One mode is heard alone; click, or Esc, to hear all of them")
+        self._solo.setVisible(False)
+        self._solo.clicked.connect(self.all_modes_asked)
         self.rate_label = QLabel()
         self.rate_label.setObjectName("badge")
         self.audio_menu = QMenu(self)
@@ -90,6 +95,7 @@ class MainWindow(QMainWindow):
         facts = QHBoxLayout()
         facts.addWidget(self.presets.card)
         facts.addStretch(1)
+        facts.addWidget(self._solo)
         facts.addWidget(self.error_label)
         decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
@@ -117,6 +123,11 @@ class MainWindow(QMainWindow):
         self._stage.insertWidget(0, view)
         self._stage.setSizes([380, 250])
         view.setFocus()
+
+    def show_solo(self, mode: int) -> None:
+        """Which mode is heard alone; 0: all are heard."""
+        self._solo.setText(f"mode {mode} alone  ✕")
+        self._solo.setVisible(mode > 0)
 
     def geometry_text(self) -> str:
         """Size and place, for `restore_geometry`."""

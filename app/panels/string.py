@@ -27,11 +27,16 @@ class StringPanel(Panel):
         self.view.listening_point_moved.connect(session.move_listening_point)
         self._strobe = Strobe()
 
+    @property
+    def drawing(self) -> bool:
+        """Whether the string is held in the hand and not yet let go."""
+        return self.view.is_dragging_pluck
+
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & PLUCK_FIELDS:
             self._show_pluck()
-        if "heard" in names:
-            self.view.set_heard(self.session.choices.heard)
+        if names & {"heard", "a", "b"}:
+            self.view.set_heard(self.session.source_heard)
 
     def take_started(self, take: Take) -> None:
         self._strobe.restart()

@@ -294,7 +294,7 @@ class StringView(QWidget):
         painter.drawText(QRectF(beside, at.y() - 9, 110, 18), Qt.AlignmentFlag.AlignVCenter, text)
 
     def _paint_motion(self, painter: QPainter, frame: StringFrame) -> None:
-        order = [name for name in frame.shapes if name != self._heard] + [self._heard]
+        order = sorted(frame.shapes, key=lambda name: name == self._heard)
         for name in order:
             colour = theme.SOURCE_COLOURS[name]
             band = self._curve(frame.lowest[name])
@@ -333,14 +333,14 @@ class StringView(QWidget):
     def _paint_words(self, painter: QPainter) -> None:
         painter.setFont(theme.small_font(12, bold=True))
         x = float(MARGIN_X)
-        for name in ("model", "truth"):
+        names = ["model", "truth"]
+        for name in names if self._heard in names else [*names, self._heard]:
             heard = name == self._heard
-            colour = (
-                QColor(theme.SOURCE_COLOURS[name]) if heard else theme.translucent(theme.SOURCE_COLOURS[name], 140)
-            )
+            hue = theme.SOURCE_COLOURS[theme.source_kind(name)]
+            colour = QColor(hue) if heard else theme.translucent(hue, 140)
             painter.setPen(QPen(colour, 3))
             painter.drawLine(QPointF(x, 18), QPointF(x + 18, 18))
-            text = f"{name} (heard)" if heard else name
+            text = f"{name.removeprefix('preset:')} (heard)" if heard else name
             painter.drawText(QPointF(x + 24, 22), text)
             x += 44 + painter.fontMetrics().horizontalAdvance(text)
         if self._warning:

@@ -14,10 +14,24 @@ TEXT = "#d8dde6"
 FAINT = "#8a93a3"
 MODEL = "#ffb03a"  # what the model says is amber, everywhere
 TRUTH = "#4cc3e8"  # and the physics blue
+DIFFERENCE = "#e58fd0"  # what lies between them
+OTHER = "#b5a3ff"  # another preset's model
 WARNING = "#ff6b5e"
 GOOD = "#58c98b"
 
-SOURCE_COLOURS = {"model": MODEL, "truth": TRUTH}
+SOURCE_COLOURS = {"model": MODEL, "truth": TRUTH, "difference": DIFFERENCE, "other": OTHER}
+
+
+def source_kind(source: str) -> str:
+    """The key of `SOURCE_COLOURS` for a source: "other" for "preset:NAME"."""
+    return source if source in SOURCE_COLOURS else "other"
+
+
+_SLOTS = "\n".join(
+    f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
+    f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; }}"
+    for kind, colour in SOURCE_COLOURS.items()
+)
 
 _STYLE = f"""
 QWidget {{ color: {TEXT}; font-size: 12px; }}
@@ -37,8 +51,7 @@ QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {T
 QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus
     {{ border: 1px solid {TEXT}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: {LINE}; }}
-QPushButton#model:checked {{ background: {MODEL}; color: {BACKGROUND}; border-color: {MODEL}; font-weight: 600; }}
-QPushButton#truth:checked {{ background: {TRUTH}; color: {BACKGROUND}; border-color: {TRUTH}; font-weight: 600; }}
+{_SLOTS}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
 QToolButton::menu-indicator {{ image: none; }}

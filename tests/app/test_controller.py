@@ -63,7 +63,7 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_X)
-    assert session.choices.heard == "truth"
+    assert session.source_heard == "truth"
     qtbot.waitUntil(lambda: controller.player.status().source == "truth", timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_L)
     assert session.choices.loop
@@ -149,7 +149,7 @@ def test_a_broken_preset_is_told_and_the_app_goes_on(
 
 
 def test_choices_are_restored(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
-    controller.session.update(position=0.61, heard="truth", volume_db=-12)
+    controller.session.update(position=0.61, heard="b", a="preset:second", volume_db=-12)
     controller.window.resize(1190, 610)
     geometry = controller.window.geometry_text()
     controller.window.close()

@@ -48,9 +48,9 @@ def test_gestures_are_clamped_to_what_is_allowed() -> None:
 def test_switching_source_goes_there_and_back() -> None:
     session = Session()
     session.switch_source()
-    assert session.choices.heard == "truth"
+    assert (session.choices.heard, session.source_heard) == ("b", "truth")
     session.switch_source()
-    assert session.choices.heard == "model"
+    assert (session.choices.heard, session.source_heard) == ("a", "model")
 
 
 def test_presets_go_round() -> None:

@@ -11,7 +11,7 @@ from app.settings import DeviceChoice, ExportChoices, Settings, load_settings, s
 def test_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "new folder" / "settings.json"
     settings = Settings(
-        choices=Choices(position=0.7, heard="truth", loop=True),
+        choices=Choices(position=0.7, heard="b", b="difference", loop=True),
         export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         window_geometry="AdnQyw==",
