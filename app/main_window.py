@@ -54,7 +54,7 @@ class MainWindow(QMainWindow):
     def __init__(self) -> None:
         super().__init__()
         self.setWindowTitle("Learned Strings")
-        self.setMinimumSize(1180, 560)
+        self.setMinimumSize(1256, 560)
         self.resize(1280, 800)
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")

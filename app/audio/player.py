@@ -71,6 +71,7 @@ class PlayerStatus:
     position_s: float = 0.0  # of what is heard now: written to the device, less its latency
     playing: bool = False  # as rendered: the last of it is heard a queue and `latency_s` later
     waiting: bool = False  # playing, but rendering has not arrived at the playhead
+    ringing: int = 0  # earlier plucks that still sound
     source: str | None = None
     peak_db: float = METER_FLOOR_DB  # dBFS, after volume and limiter
     gain_reduction_db: float = 0.0
@@ -306,6 +307,7 @@ class Player:
             position_s=self._timeline.position_at(heard_frame) / output.rate_hz,
             playing=state.playing,
             waiting=state.waiting,
+            ringing=state.ringing,
             source=state.source,
             peak_db=state.peak_db,
             gain_reduction_db=state.gain_reduction_db,

@@ -5,13 +5,17 @@ from __future__ import annotations
 from app.library import Library
 from app.motion import Strobe, frame_at
 from app.panels.base import Moment, Panel
-from app.rendering import Take
+from app.rendering import DIFFERENCE, Take
 from app.session import Session
+from app.silence import why_difference_silent, why_silent
 from app.views.string_view import StringView
+from engine.metrics import ErrorSums
 from engine.preset import outside_training
 
 MM = 1000.0
-PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "listen"}
+PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset"}
+HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
+WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
 
 
 class StringPanel(Panel):
@@ -26,6 +30,7 @@ class StringPanel(Panel):
         self.view.pluck_released.connect(self.pluck_asked)
         self.view.listening_point_moved.connect(session.move_listening_point)
         self._strobe = Strobe()
+        self._take: Take | None = None  # the complete one of this pluck
 
     @property
     def drawing(self) -> bool:
@@ -34,12 +39,18 @@ class StringPanel(Panel):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & PLUCK_FIELDS:
+            self._take = None
+        if names & WARNING_FIELDS:
             self._show_pluck()
         if names & {"heard", "a", "b"}:
             self.view.set_heard(self.session.source_heard)
 
     def take_started(self, take: Take) -> None:
         self._strobe.restart()
+
+    def take_finished(self, take: Take, errors: ErrorSums) -> None:
+        self._take = take
+        self.view.set_warning(self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
         take, position_s, speed = moment.take, moment.position_s, self.session.choices.speed
@@ -54,14 +65,15 @@ class StringPanel(Panel):
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
         points = entry.info.grid_points if entry else 101
         view.set_pluck(choices.position, choices.amplitude_mm, choices.pluck.displacement(points).numpy() * MM)
-        view.set_listening_point(choices.listen)
+        view.set_listening_point(choices.listen, choices.listen_right if choices.stereo else None)
         view.set_trained_positions(entry.info.trained_range.position if entry else None)
         view.set_warning(self._pluck_warning())
 
     def _pluck_warning(self) -> str:
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
-        if choices.amplitude_mm == 0:
-            return "silent: the amplitude is 0"
-        if choices.listen in (0.0, 1.0):
-            return "silent: the listening point is at a fixed end"
+        silent = why_silent(choices, self.library)
+        if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
+            silent = why_difference_silent(choices, self._take)
+        if silent:
+            return silent
         return "; ".join(outside_training(entry.info, choices.pluck)) if entry else ""

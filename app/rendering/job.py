@@ -15,6 +15,7 @@ from engine.sources import ModelSource, TruthSource
 
 FIRST_STEPS = 256  # small, so that a pluck sounds at once
 BLOCK_FRAMES = 512  # what a processor's cache holds: four times as much takes six times as long
+TAIL_BLOCK_FRAMES = 1024  # without the motion more fit
 
 
 class Job:
@@ -164,7 +165,7 @@ class Job:
         if self._take is not None:  # what was rendered but not yet heard, then the motion is forgotten
             take, self._take = self._take, None
             self._feed_motion(take, sound)
-        end_s = self._rendered_s + BLOCK_FRAMES / self._lines["truth"].rate_hz
+        end_s = self._rendered_s + TAIL_BLOCK_FRAMES / self._lines["truth"].rate_hz
         reads = {}
         for name in sound.frames_read:
             line = self._lines[name]

@@ -12,7 +12,7 @@ _KAISER_BETA = 8.0
 class Differentiator:
     """The derivative of a band-limited signal: a Kaiser-windowed ideal differentiator of 65 taps.
 
-    Its phase is exact (the taps are odd about the middle) and its gain is true within 0.02 % up to 0.9 of half
+    Its phase is exact (the taps are odd about the middle) and its gain is true within 0.05 % up to 0.9 of half
     the rate. Before its first frame a string is at rest, and one without damping would move through that frame
     symmetrically in time, so the signal is continued backwards as its mirror image: the velocity begins at zero.
     Behind its last frame the signal is turned about that frame, which keeps its slope.

@@ -64,6 +64,7 @@ class RenderWorker:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._waiting or self._closing or self._most_urgent() is not None)
                 if self._closing:
+                    self._stage, self._tails = None, []
                     return
                 self._take_request()
             job = self._most_urgent()

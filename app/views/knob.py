@@ -91,7 +91,7 @@ class Knob(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:
-        return QSize(70, 82)
+        return QSize(60, 82)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:

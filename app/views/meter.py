@@ -26,7 +26,7 @@ class Meter(QWidget):
         self._hold = 0
 
     def sizeHint(self) -> QSize:
-        return QSize(170, 40)
+        return QSize(150, 40)
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)

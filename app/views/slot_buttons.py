@@ -15,7 +15,8 @@ from app.views.parts import tool_button
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)
-LONGEST_TITLE = 15  # characters of another preset's title on a button
+WIDTH = 138  # fixed, so that a longer title moves nothing
+LONGEST_TITLE = 10  # characters of another preset's title on a button
 
 _SOURCES = (
     ("model", "Model of the chosen preset"),
@@ -38,12 +39,12 @@ class SlotButtons(QWidget):
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(3)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
         group = QButtonGroup(self)
         for row, slot in enumerate(SLOTS):
             button = QPushButton()
             button.setCheckable(True)
-            button.setMinimumWidth(148)
-            button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
+            button.setFixedWidth(WIDTH)
             button.clicked.connect(lambda _=False, slot=slot: self.change_asked.emit("heard", slot))
             group.addButton(button)
             self._buttons[slot] = button
@@ -72,7 +73,7 @@ class SlotButtons(QWidget):
             title = self._title(source)
             short = title if len(title) <= LONGEST_TITLE else title[: LONGEST_TITLE - 1].rstrip() + "…"
             gain = self._gain_text(slot)
-            button.setText(f"{slot.upper()}   {short.upper()}" + (f"   {gain}" if gain else ""))
+            button.setText(f"{slot.upper()}  {short.upper()}" + (f"  {gain}" if gain else ""))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
             told = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
@@ -101,6 +102,7 @@ class SlotButtons(QWidget):
     def _menu_button(self, slot: str) -> QToolButton:
         letter = slot.upper()
         button = tool_button("▾", f"What {letter} holds", f"What {letter} holds, and how loud it is")
+        button.setObjectName("narrow")
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(button)
         menu.setToolTipsVisible(True)

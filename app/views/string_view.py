@@ -71,6 +71,7 @@ class StringView(QWidget):
         self._preview_mm: NDArray[np.float64] | None = None
         self._pluck = (0.35, 4.0)
         self._listen = DEFAULT_LISTEN
+        self._listen_right: float | None = None
         self._trained: tuple[float, float] | None = None
         self._warning = ""
         self._heard = "model"
@@ -87,8 +88,9 @@ class StringView(QWidget):
         self._preview_mm = shape_mm
         self.update()
 
-    def set_listening_point(self, listen: float) -> None:
-        self._listen = listen
+    def set_listening_point(self, listen: float, right: float | None = None) -> None:
+        """The listening point; in stereo the left one, and the right one beside it."""
+        self._listen, self._listen_right = listen, right
         self.update()
 
     def set_trained_positions(self, trained: tuple[float, float] | None) -> None:
@@ -214,7 +216,7 @@ class StringView(QWidget):
         else:
             self._paint_motion(painter, self._frame)
         self._paint_ends(painter)
-        self._paint_listening_point(painter)
+        self._paint_listening_points(painter)
         self._paint_words(painter)
 
     def _ground(self) -> QPixmap:
@@ -314,8 +316,15 @@ class StringView(QWidget):
         for x in (self._x(0), self._x(1)):
             painter.drawRoundedRect(QRectF(x - 3, self._middle() - 22, 6, 44), 3, 3)
 
-    def _paint_listening_point(self, painter: QPainter) -> None:
-        x = self._x(self._listen)
+    def _paint_listening_points(self, painter: QPainter) -> None:
+        if self._listen_right is None:
+            self._paint_listening_point(painter, self._listen, "listen")
+        else:
+            self._paint_listening_point(painter, self._listen_right, "right")
+            self._paint_listening_point(painter, self._listen, "left")
+
+    def _paint_listening_point(self, painter: QPainter, listen: float, name: str) -> None:
+        x = self._x(listen)
         bottom = self._middle() + self._half_height()
         painter.setPen(QPen(theme.translucent(theme.GOOD, 120), 1, Qt.PenStyle.DashLine))
         painter.drawLine(QPointF(x, self._middle() - self._half_height()), QPointF(x, bottom))
@@ -326,9 +335,7 @@ class StringView(QWidget):
         )
         painter.setPen(QColor(theme.GOOD))
         painter.setFont(theme.small_font(11))
-        painter.drawText(
-            QRectF(x - 60, bottom + 16, 120, 18), Qt.AlignmentFlag.AlignCenter, f"listen {self._listen:.2f}"
-        )
+        painter.drawText(QRectF(x - 60, bottom + 16, 120, 18), Qt.AlignmentFlag.AlignCenter, f"{name} {listen:.2f}")
 
     def _paint_words(self, painter: QPainter) -> None:
         painter.setFont(theme.small_font(12, bold=True))

@@ -54,6 +54,7 @@ QPushButton:disabled, QToolButton:disabled {{ color: {LINE}; }}
 {_SLOTS}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
+QToolButton#narrow {{ padding: 6px 5px; }}
 QToolButton::menu-indicator {{ image: none; }}
 QComboBox, QLineEdit, QDoubleSpinBox {{
     background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.rendering import FULL_SCALE_M_S, PICKUPS
+from app.rendering import FULL_SCALE_M_S
 from app.session import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
 from app.views.knob import Knob, KnobRange
 from app.views.meter import Meter
@@ -22,7 +22,6 @@ from app.views.slot_buttons import SlotButtons
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
 from engine.sources import FULL_SCALE_M
 
-_PICKUP_NAMES = {"displacement": "Displacement", "velocity": "Velocity"}
 _SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
 
 KNOBS = {  # field of `Choices` -> (label, range, tip)
@@ -77,7 +76,7 @@ class TransportBar(QFrame):
         self.meter = Meter()
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
-        row.setSpacing(10)
+        row.setSpacing(5)
         row.addLayout(self._build_transport())
         row.addWidget(vertical_rule())
         self.slots = SlotButtons()
@@ -106,10 +105,10 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
-        self.knobs["listen_right"].setEnabled(choices.stereo)
-        with QSignalBlocker(self._stereo), QSignalBlocker(self._pickup):
+        self.knobs["listen_right"].setVisible(choices.stereo)
+        with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
             self._stereo.setChecked(choices.stereo)
-            self._pickup.setCurrentIndex(PICKUPS.index(choices.pickup))
+            self._velocity.setChecked(choices.pickup == "velocity")
         self.slots.show_choices(choices)
 
     def show_playing(self, playing: bool) -> None:
@@ -133,22 +132,27 @@ class TransportBar(QFrame):
     def _build_pickup(self) -> QVBoxLayout:
         self._stereo = tool_button("Stereo", "Stereo", "Two listening points: “listen” for the left ear, “right”")
         self._stereo.setCheckable(True)
-        self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
-        self._pickup = combo_box("Pick-up", [(_PICKUP_NAMES[pickup], pickup) for pickup in PICKUPS])
-        self._pickup.setToolTip(
-            f"What is heard: displacement (full scale {1000 * FULL_SCALE_M:g} mm), "
-            f"or velocity as from a magnetic pick-up (full scale {FULL_SCALE_M_S:g} m/s)"
+        self._velocity = tool_button(
+            "Velocity",
+            "Velocity pick-up",
+            f"Hear the string's velocity, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s).\n"
+            f"Otherwise its displacement (full scale {1000 * FULL_SCALE_M:g} mm)",
         )
-        self._pickup.activated.connect(lambda row: self.change_asked.emit("pickup", PICKUPS[row]))
+        self._velocity.setCheckable(True)
+        self._velocity.toggled.connect(
+            lambda on: self.change_asked.emit("pickup", "velocity" if on else "displacement")
+        )
         column = QVBoxLayout()
-        column.addWidget(self._stereo)
-        column.addWidget(self._pickup)
+        for button in (self._stereo, self._velocity):
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+            column.addWidget(button)
         return column
 
     def _build_shape(self) -> QVBoxLayout:
         self._shape = combo_box("Pluck shape", [(_SHAPE_NAMES[shape], shape) for shape in SHAPES])
         self._shape.setToolTip("The shape of the pluck")
+        self._shape.setFixedWidth(106)
         self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
         label = QLabel("PLUCK")
         label.setObjectName("faint")

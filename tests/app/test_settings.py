@@ -50,3 +50,11 @@ def test_a_broken_file_is_set_aside_and_told(tmp_path: Path, text: str, names: s
 def test_the_place_can_be_given(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(tmp_path / "x.json"))
     assert settings_file() == tmp_path / "x.json"
+
+
+def test_a_file_from_before_the_slots_loads_without_a_notice(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text('{"choices": {"heard": "truth", "position": 0.4}}')
+    settings, notice = load_settings(path)
+    assert notice == ""
+    assert settings.choices.source_heard == "truth"
