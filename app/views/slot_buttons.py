@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.library import PresetEntry
@@ -16,7 +16,7 @@ from app.views.parts import tool_button
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)
 WIDTH = 138  # fixed, so that a longer title moves nothing
-LONGEST_TITLE = 10  # characters of another preset's title on a button
+PADDING = 18  # of the style sheet, with the borders
 
 _SOURCES = (
     ("model", "Model of the chosen preset"),
@@ -70,10 +70,10 @@ class SlotButtons(QWidget):
     def _show(self) -> None:
         for slot, button in self._buttons.items():
             source = getattr(self._choices, slot)
-            title = self._title(source)
-            short = title if len(title) <= LONGEST_TITLE else title[: LONGEST_TITLE - 1].rstrip() + "…"
+            title, short = self._title(source)
             gain = self._gain_text(slot)
-            button.setText(f"{slot.upper()}  {short.upper()}" + (f"  {gain}" if gain else ""))
+            parts = [slot.upper(), self._fitted(short.upper(), f"{slot.upper()}    {gain}"), gain]
+            button.setText("  ".join(part for part in parts if part))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
             told = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
@@ -87,11 +87,20 @@ class SlotButtons(QWidget):
             with QSignalBlocker(button):
                 button.setChecked(self._choices.heard == slot)
 
-    def _title(self, source: str) -> str:
+    def _title(self, source: str) -> tuple[str, str]:
+        """In full, and as short as a button needs it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
-                return entry.info.title
-        return source.removeprefix("preset:")
+                return entry.info.title, entry.info.model
+        name = source.removeprefix("preset:")
+        return name, "diff." if source == "difference" else name
+
+    @staticmethod
+    def _fitted(text: str, beside: str) -> str:
+        """`text`, cut where it does not fit on a button with `beside`."""
+        metrics = QFontMetrics(theme.small_font(12, bold=True))
+        room = WIDTH - PADDING - metrics.horizontalAdvance(beside)
+        return metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
 
     def _gain_text(self, slot: str) -> str:
         gain_db = self._gains_db.get(slot)

@@ -29,7 +29,7 @@ def source_kind(source: str) -> str:
 
 _SLOTS = "\n".join(
     f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
-    f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; }}"
+    f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; padding: 6px; }}"
     for kind, colour in SOURCE_COLOURS.items()
 )
 
