@@ -227,12 +227,12 @@ class Controller(QObject):
     # Session → everything
 
     def _choices_changed(self, names: frozenset[str]) -> None:
-        self._choices_shown(names)
         asked, request = self._asked, self._request()
-        if request is not None and request != asked:
+        if request is not None and request != asked:  # first of all: a pluck may be waiting for it
             if not request.same_motion(asked) and not self._string.drawing:
                 self._stage.play_when_ready |= self.player.status().playing
             self._render()
+        self._choices_shown(names)
 
     def _choices_shown(self, names: frozenset[str]) -> None:
         choices, window = self.session.choices, self.window
@@ -289,13 +289,12 @@ class Controller(QObject):
                 self.player.play()
             return
         stage.take, stage.track = take, track
+        # While the string is drawn the last pluck rings on until this one is let go. The sound comes first.
+        if not self._string.drawing and self._load(track, ring=struck) and stage.play_when_ready:
+            self._begin()
         for panel in self.panels:
             panel.take_started(take)
         self.window.error_label.setText("rendering …")
-        if self._string.drawing:
-            return  # the last pluck rings on until this one is let go
-        if self._load(track, ring=struck) and stage.play_when_ready:
-            self._begin()
 
     def _begin(self) -> None:
         self._stage.play_when_ready = False
