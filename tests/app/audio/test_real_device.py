@@ -171,7 +171,7 @@ def test_overlapping_plucks_switches_and_the_loop_arrive_as_mixed(
         assert said["problems"] == []
         if said["rate_hz"] != RATE_HZ:
             pytest.skip(f"PortAudio wants {said['rate_hz']} Hz here")
-        mixed = np.load(tmp_path / "mixed.npy")[:, 0]
+        mixed = np.trim_zeros(np.load(tmp_path / "mixed.npy")[:, 0])  # what came last was not all played
         assert len(mixed) > 2.5 * RATE_HZ
         heard = aligned(recorded[:, 0], mixed[: round(0.8 * RATE_HZ)], mixed.size)
         depth_db = null_depth_db(heard, mixed)
