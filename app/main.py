@@ -10,7 +10,9 @@ def run() -> int:
     """Opens the app and returns its exit status when it is closed."""
     import torch  # before Qt: on Windows the other order fails
 
-    sys.setswitchinterval(0.0005)  # the audio callback must get the interpreter in time, whoever holds it
+    sys.setswitchinterval(
+        0.0001
+    )  # callback and rendering of a pluck must get the interpreter in time from the picture
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
     from PySide6.QtWidgets import QApplication
