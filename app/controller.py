@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
@@ -45,12 +45,14 @@ from app.preset_desk import PresetDesk
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import Settings, save_settings
+from app.slots import gain_db, levels, missing_presets, render_request
 from app.views.about_dialog import AboutDialog
 from app.views.abx_dialog import AbxDialog
 from app.views.export_dialog import ExportDialog
 from app.views.help_dialog import HelpDialog
 from app.views.knob import Knob
 from app.views.preset_browser import PresetBrowser
+from app.views.slot_buttons import SLOTS
 from app.views.string_view import StringView
 from engine.metrics import ErrorSums
 from engine.preset import SHIPPED
@@ -60,7 +62,6 @@ RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel,
 
 FRAME_MS = 16
 ProblemListener = Callable[[AudioProblem], None]
-MOTION_FIELDS = {"preset", "position", "amplitude_mm", "shape", "width", "seconds"}
 
 
 class _Mail(QObject):
@@ -69,6 +70,7 @@ class _Mail(QObject):
     started = Signal(object, object)
     replaced = Signal(object, object)
     finished = Signal(object, object)
+    other_refused = Signal(str, str)
     failed = Signal(str, str)
     audio_problem = Signal(object)
 
@@ -81,17 +83,28 @@ class _Mail(QObject):
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self.finished.emit(take, errors)
 
+    def other_failed(self, preset: str, message: str) -> None:
+        self.other_refused.emit(preset, message)
+
     def render_failed(self, message: str, detail: str) -> None:
         self.failed.emit(message, detail)
 
 
 @dataclass
 class _Stage:
-    """What is on stage: the take that is shown and its track, and whether it shall sound as soon as it is there."""
+    """What is on stage.
+
+    Attributes:
+        take, track: what is shown, and its sound.
+        play_when_ready: whether the next take shall sound as soon as it is there.
+        awaited: plucks that were struck before they were rendered, as `_key`: each sounds when it is there, even
+            if the next one is on stage by then.
+    """
 
     take: Take | None = None
     track: Track | None = None
     play_when_ready: bool = False
+    awaited: list[tuple[object, ...]] = field(default_factory=list)
 
 
 class Controller(QObject):
@@ -116,7 +129,8 @@ class Controller(QObject):
         self.appearance = Appearance(window, settings.look)
         self._stage = _Stage()
         self._last_tick_s = time.monotonic()
-        self._asked_rate_hz = 0
+        self._asked: RenderRequest | None = None
+        self._loaded: Track | None = None  # the latest in the player
         self._abx: AbxDialog | None = None  # while it is open, the player is its own
         self._help: HelpDialog | None = None
         self.library = Library([])
@@ -129,6 +143,9 @@ class Controller(QObject):
         self._connect()
         if self.entry is None and (first := self.library.first()):
             self.session.update(preset=first.name)
+        for slot, name in missing_presets(self.session.choices, self.library).items():
+            self.session.update(**{slot: "model" if slot == "a" else "truth"})
+            problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session)
         self._connect_history()
         self.instruments = Instruments(window, self.session, self.library, settings.midi)
@@ -149,14 +166,14 @@ class Controller(QObject):
     def _make_panels(self) -> list[Panel]:
         """Every panel, its view in its place in the window."""
         session, window = self.session, self.window
-        string = StringPanel(session, self.library)
+        string = self._string = StringPanel(session, self.library)
         window.show_string(string.view)
         panels: list[Panel] = [string]
-        for field, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
+        for choice, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
             for panel in (kind(session, self.library) for kind in kinds):
                 deck.add(panel.key, panel.title, panel.view)
                 panels.append(panel)
-            deck.chosen.connect(lambda key, field=field: session.update(**{field: key}))
+            deck.chosen.connect(lambda key, choice=choice: session.update(**{choice: key}))
         for panel in panels:
             panel.seek_asked.connect(self.player.seek)
             panel.pluck_asked.connect(self.pluck)
@@ -172,6 +189,8 @@ class Controller(QObject):
         window.next_asked.connect(lambda: self.presets.step(1))
         window.browse_asked.connect(self.presets.toggle)
         window.file_dropped.connect(lambda path: self.take_file(Path(path)))
+        window.transport.slots.set_entries(self.library.entries)
+        self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.transport.export_asked.connect(self.export)
@@ -183,10 +202,12 @@ class Controller(QObject):
         window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
         window.help_asked.connect(self.show_help)
         window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
+        window.all_modes_asked.connect(lambda: session.update(solo=0))
         window.closing.connect(self.close)
         self._mail.started.connect(self._take_started)
         self._mail.replaced.connect(self._track_replaced)
         self._mail.finished.connect(self._take_finished)
+        self._mail.other_refused.connect(self._other_refused)
         self._mail.failed.connect(self._render_failed)
         self._mail.audio_problem.connect(self.audio.tell)
 
@@ -211,17 +232,20 @@ class Controller(QObject):
     # Intents
 
     def pluck(self) -> None:
-        """Lets the string go: from the start, with sound."""
+        """Lets the string go: from the start, with sound, beside the plucks that still ring."""
         stage = self._stage
-        stage.play_when_ready = True
+        self.worker.strike()
         if stage.take is None or stage.track is None or self._is_stale(stage.take):
-            return  # the rendering is on its way, and begins to sound when it starts
-        if self._load(stage.track, keep_position=False):
+            stage.play_when_ready = True  # the rendering is on its way, and begins to sound when it starts
+            if (key := self._wanted_key()) is not None:
+                stage.awaited.append(key)
+        elif self._load(stage.track, ring=True):
             self._begin()
 
     def play_or_stop(self) -> None:
         if self.player.status().playing:
             self._stage.play_when_ready = False
+            self._stage.awaited.clear()
             self.player.stop()
         else:
             self.pluck()
@@ -314,12 +338,12 @@ class Controller(QObject):
     # Session → everything
 
     def _choices_changed(self, names: frozenset[str]) -> None:
+        asked, request = self._asked, self._request()
+        if request is not None and request != asked:  # first of all: a pluck may be waiting for it
+            if not request.same_motion(asked) and not self._string.drawing:
+                self._stage.play_when_ready |= self.player.status().playing
+            self._render()
         self._choices_shown(names)
-        if names & MOTION_FIELDS:
-            self._stage.play_when_ready |= self.player.status().playing
-            self._render()
-        elif "listen" in names:
-            self._render()
 
     def _choices_shown(self, names: frozenset[str]) -> None:
         choices, window = self.session.choices, self.window
@@ -330,8 +354,10 @@ class Controller(QObject):
         window.right.show_key(choices.right_view)
         for panel in self.panels:
             panel.choices_changed(names)
-        if "heard" in names and self._stage.track is not None:
-            self.player.select(choices.heard)
+        window.show_solo(choices.solo)
+        self._select()
+        if names & {"level_match", "difference_gain_db"}:
+            self.player.set_levels(levels(choices))
         if "loop" in names:
             self.player.set_loop(choices.loop)
         if "volume_db" in names:
@@ -339,30 +365,44 @@ class Controller(QObject):
 
     # Rendering
 
+    def _request(self) -> RenderRequest | None:
+        entry = self.entry
+        if entry is None:
+            return None
+        return render_request(self.session.choices, entry.path, self.library, self.player.rate_hz)
+
     def _render(self) -> None:
+        self._asked = self._request()
+        if self._asked is None:
+            self.window.notices.tell("No preset was found: train one, or get the presets again.")
+        else:
+            self.worker.submit(self._asked)
+
+    def _wanted_key(self) -> tuple[object, ...] | None:
         entry, choices = self.entry, self.session.choices
         if entry is None:
-            self.window.notices.tell("No preset was found: train one, or get the presets again.")
-            return
-        self._asked_rate_hz = self.player.rate_hz
-        self.worker.submit(
-            RenderRequest(entry.path, choices.pluck, choices.seconds, choices.listen, self._asked_rate_hz)
-        )
+            return None
+        return entry.name, choices.pluck, round(choices.seconds * entry.info.rate_hz) + 1
 
     def _is_stale(self, take: Take) -> bool:
-        choices = self.session.choices
-        wanted = (choices.preset, choices.pluck, round(choices.seconds * take.info.rate_hz) + 1)
-        return (take.preset_name, take.pluck, take.frames) != wanted
+        return _key(take) != self._wanted_key()
 
     def _take_started(self, take: Take, track: Track) -> None:
+        stage = self._stage
+        struck = _key(take) in stage.awaited
+        if struck:
+            stage.awaited.remove(_key(take))
         if self._is_stale(take):
+            if struck and self._load(track, ring=True):  # a quick pluck, overtaken by the next one: it sounds too
+                self.player.play()
             return
-        self._stage = _Stage(take, track, self._stage.play_when_ready)
+        stage.take, stage.track = take, track
+        # While the string is drawn the last pluck rings on until this one is let go. The sound comes first.
+        if not self._string.drawing and self._load(track, ring=struck) and stage.play_when_ready:
+            self._begin()
         for panel in self.panels:
             panel.take_started(take)
         self.window.error_label.setText("rendering …")
-        if self._load(track, keep_position=False) and self._stage.play_when_ready:
-            self._begin()
 
     def _begin(self) -> None:
         self._stage.play_when_ready = False
@@ -373,18 +413,25 @@ class Controller(QObject):
             self._stage.track = track
             self._load(track, keep_position=True)
 
-    def _load(self, track: Track, keep_position: bool) -> bool:
+    def _load(self, track: Track, keep_position: bool = False, ring: bool = False) -> bool:
         """False where the device changed its rate meanwhile: the sound is then made again at the new one."""
         if self._abx is not None:
             self._abx.set_track(track)
             return False
         try:
-            self.player.load(track, keep_position)
+            self.player.load(track, keep_position, ring)
         except ValueError:
             self._render()
             return False
-        self.player.select(self.session.choices.heard)
+        self._loaded = track
+        self._select()
         return True
+
+    def _select(self) -> None:
+        """Lets the chosen slot be heard, as soon as there is a track that has what it holds."""
+        source = self.session.source_heard
+        if self._loaded is not None and source in self._loaded.sources:
+            self.player.select(source)
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
         if take is not self._stage.take:
@@ -404,7 +451,11 @@ class Controller(QObject):
         ]
         self.window.error_label.setText("error of this pluck: " + ", ".join(parts))
 
+    def _other_refused(self, preset: str, message: str) -> None:
+        self.window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
+
     def _render_failed(self, message: str, detail: str) -> None:
+        self._stage.awaited.clear()
         self.window.error_label.setText("")
         self.window.notices.tell(message, detail)
 
@@ -418,8 +469,10 @@ class Controller(QObject):
         window.transport.show_playing(status.playing)
         hidden = self._abx is not None  # a level would give away what is heard
         window.transport.meter.show_level(-math.inf if hidden else status.peak_db, status.limiting and not hidden)
-        if status.rate_hz != self._asked_rate_hz:
+        if self._asked is not None and status.rate_hz != self._asked.sound_rate_hz:
             self._render()
+        choices, track = self.session.choices, self._stage.track
+        window.transport.slots.show_gains({s: gain_db(choices, track, getattr(choices, s)) for s in SLOTS})
         take = self._stage.take
         self.audio.show(status, take)
         position_s = min(status.position_s, take.seconds) if take is not None else 0.0
@@ -427,3 +480,8 @@ class Controller(QObject):
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)
+
+
+def _key(take: Take) -> tuple[object, ...]:
+    """What tells the motion of a take from others."""
+    return take.preset_name, take.pluck, take.frames

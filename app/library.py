@@ -22,6 +22,13 @@ class PresetEntry:
     parameters: int
     size_bytes: int = 0
 
+    @property
+    def unplayable(self) -> str:
+        """Why its model cannot be let go from rest, or nothing."""
+        if self.info.model_configuration.get("input") == "two_frames":
+            return "its model needs the frame before the first, which a string at rest does not have"
+        return ""
+
 
 class Library:
     """The presets in the order of the list, found by name. `changed` tells that there are others now."""

@@ -74,7 +74,7 @@ def load_engine() -> None:
 
 def run() -> int:
     """Opens the app and returns its exit status when it is closed."""
-    sys.setswitchinterval(0.0005)  # the audio callback must get the interpreter in time, whoever holds it
+    sys.setswitchinterval(0.0001)  # callback and rendering must get the interpreter in time from the picture
     path = settings_file()
     settings, notice = load_settings(path)
     if settings.look.size_percent != 100:  # Qt reads it when the application is made

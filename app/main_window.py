@@ -38,7 +38,8 @@ from app.views.transport_bar import TransportBar
 KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
     ("Return", "pluck_asked", "pluck"),
-    ("X", "switch_asked", "switch between model and truth at the playhead"),
+    ("X", "switch_asked", "switch between A and B at the playhead"),
+    ("Esc", "all_modes_asked", "hear all modes again"),
     ("Ctrl+L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
@@ -71,6 +72,7 @@ class MainWindow(QMainWindow):
     pluck_asked = Signal()
     switch_asked = Signal()
     loop_asked = Signal()
+    all_modes_asked = Signal()
     previous_asked = Signal()
     next_asked = Signal()
     undo_asked = Signal()
@@ -104,6 +106,9 @@ class MainWindow(QMainWindow):
         self.error_label.setToolTip(
             "Model against truth for this pluck: relative mean absolute error, all of the string"
         )
+        self._solo = tool_button("", "Hear all modes", "One mode is heard alone; click, or Esc, to hear all of them")
+        self._solo.setVisible(False)
+        self._solo.clicked.connect(self.all_modes_asked)
         self.rate_label = QLabel()
         self.rate_label.setObjectName("badge")
         self._audio_button = tool_button("Audio …", "Audio settings", "Where the sound goes, and how (Ctrl+,)")
@@ -135,6 +140,7 @@ class MainWindow(QMainWindow):
         facts = QHBoxLayout()
         facts.setSpacing(24)
         facts.addWidget(self.presets.card, 1)
+        facts.addWidget(self._solo)
         facts.addWidget(self.error_label)
         self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
@@ -193,6 +199,11 @@ class MainWindow(QMainWindow):
             part.setEnabled(alive)
         self._decks.setVisible(alive)
         self.rate_label.setVisible(alive)
+
+    def show_solo(self, mode: int) -> None:
+        """Which mode is heard alone; 0: all are heard."""
+        self._solo.setText(f"mode {mode} alone  ✕")
+        self._solo.setVisible(mode > 0)
 
     def geometry_text(self) -> str:
         """Size and place, for `restore_geometry`."""

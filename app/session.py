@@ -8,14 +8,17 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from psygnal import Signal
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
-Heard = Literal["model", "truth"]
+Slot = Literal["a", "b"]  # two sources to compare; each holds "model", "truth", "difference" or "preset:NAME"
+SLOT_PATTERN = r"^(model|truth|difference|preset:.+)$"
 
 SECONDS_RANGE = (0.5, 12.0)
 VOLUME_RANGE_DB = (-60.0, 12.0)
+DIFFERENCE_GAIN_RANGE_DB = (0.0, 60.0)
+HIGHEST_MODE = 9_999  # of any grid that a preset may have
 SPEED_RANGE = (0.001, 1.0)  # 1 is real time; a thousandth shows one period of a low string in seconds
 
 
@@ -31,19 +34,38 @@ class Choices(BaseModel):
     width: float = Field(0.06, ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])
     listen: float = Field(DEFAULT_LISTEN, ge=0, le=1)
     seconds: float = Field(4.0, ge=SECONDS_RANGE[0], le=SECONDS_RANGE[1])
-    heard: Heard = "model"
+    listen_right: float = Field(1 - DEFAULT_LISTEN, ge=0, le=1)  # where `listen` is then the left
+    stereo: bool = False
+    pickup: Literal["displacement", "velocity"] = "displacement"
+    solo: int = Field(0, ge=0, le=HIGHEST_MODE)  # above 0: this mode is heard alone
+    a: str = Field("model", pattern=SLOT_PATTERN)
+    b: str = Field("truth", pattern=SLOT_PATTERN)
+    heard: Slot = "a"
+    level_match: bool = True
+    difference_gain_db: float = Field(20.0, ge=DIFFERENCE_GAIN_RANGE_DB[0], le=DIFFERENCE_GAIN_RANGE_DB[1])
     loop: bool = False
     volume_db: float = Field(0.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
     speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
-    solo: int = Field(0, ge=0, le=1000)  # the mode that is heard alone; 0: all of them
     left_view: str = "spectrum"  # keys of panels
     right_view: str = "waveform"
     motion: bool = True  # of the string's picture
     envelope: bool = True
 
+    @model_validator(mode="before")
+    @classmethod
+    def _take_old_heard(cls, data: Any) -> Any:
+        """Settings from before there were slots name the source itself."""
+        if isinstance(data, dict) and data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
+            return {**data, "a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
+        return data
+
     @property
     def pluck(self) -> Pluck:
         return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
+
+    @property
+    def source_heard(self) -> str:
+        return self.a if self.heard == "a" else self.b
 
 
 class Session:
@@ -84,9 +106,14 @@ class Session:
     def move_listening_point(self, listen: float) -> None:
         self.update(listen=_clamp(listen, (0, 1)))
 
+    @property
+    def source_heard(self) -> str:
+        """What the slot that is heard holds."""
+        return self._choices.source_heard
+
     def switch_source(self) -> None:
-        """From model to truth and back."""
-        self.update(heard="truth" if self._choices.heard == "model" else "model")
+        """From slot a to slot b and back."""
+        self.update(heard="b" if self._choices.heard == "a" else "a")
 
     def step_preset(self, names: list[str], step: int) -> None:
         """The next or previous of `names`, going round."""

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from app.analysis.job import Cancelled, Job
 from app.library import PresetEntry
-from app.rendering.worker import BLOCK_FRAMES
+from app.rendering.job import BLOCK_FRAMES
 from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, load_preset

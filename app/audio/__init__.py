@@ -1,6 +1,7 @@
 """Playback: tracks that grow, a mixer that never clicks, and a player that also runs without a device."""
 
 from app.audio.devices import AudioDevice, default_device, find, output_devices
+from app.audio.levels import Levels
 from app.audio.mixer import Mixer, MixerStatus
 from app.audio.player import DEFAULT_RATE_HZ, Player, PlayerStatus
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
@@ -11,6 +12,7 @@ __all__ = [
     "AudioDevice",
     "AudioProblem",
     "AudioUnavailable",
+    "Levels",
     "Mixer",
     "MixerStatus",
     "Player",

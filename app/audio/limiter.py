@@ -19,7 +19,8 @@ class Limiter:
     """Peak limiter without look-ahead: instant attack, exponential release, then a hard clip at the ceiling.
 
     The level is `e[n] = max(|x[n]|, r·e[n-1])` and the gain `min(1, ceiling / e[n])`, so a signal that stays
-    below the ceiling passes bit for bit. It belongs to playback only; exported files never see it.
+    below the ceiling passes bit for bit. Channels are linked: the louder one sets the gain of both, so that
+    the picture in stereo does not wander. It belongs to playback only; exported files never see it.
     """
 
     def __init__(self, rate_hz: int) -> None:
@@ -33,20 +34,23 @@ class Limiter:
         return self._gain_reduction_db
 
     def process(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Limits finite samples, shape (frames,); any splitting into blocks gives the same result."""
+        """Limits finite samples, (frames,) or (frames, channels); any splitting into blocks gives the same."""
         if samples.size == 0:
             return samples
         believed = np.clip(samples, -RUNAWAY, RUNAWAY)
-        levels = np.empty_like(believed)
-        for start in range(0, samples.size, _LONGEST_CHUNK_FRAMES):
+        magnitudes = np.abs(believed).reshape(len(samples), -1)
+        loudest = magnitudes[:, 0] if magnitudes.shape[1] == 1 else magnitudes.max(axis=1)
+        levels = np.empty_like(loudest)
+        for start in range(0, len(samples), _LONGEST_CHUNK_FRAMES):
             chunk = slice(start, start + _LONGEST_CHUNK_FRAMES)
-            levels[chunk] = self._follow(np.abs(believed[chunk]))
+            levels[chunk] = self._follow(loudest[chunk])
         highest = float(levels.max())
         if highest <= CEILING:
             self._gain_reduction_db = 0.0
             return samples
         self._gain_reduction_db = 20 * math.log10(highest / CEILING)
-        return np.clip(believed * np.minimum(1.0, CEILING / np.maximum(levels, CEILING)), -CEILING, CEILING)
+        gains = np.minimum(1.0, CEILING / np.maximum(levels, CEILING))
+        return np.clip(believed * (gains if samples.ndim == 1 else gains[:, np.newaxis]), -CEILING, CEILING)
 
     def _follow(self, magnitudes: NDArray[np.float64]) -> NDArray[np.float64]:
         # The recursion, unrolled: e[n] = r^n · max over k ≤ n of |x[k]|·r^-k, with the old level as x[-1].

@@ -25,9 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.audio.devices import AudioDevice, default_device, find
-from app.audio.mixer import DECLICK_S, METER_FLOOR_DB, Mixer
+from app.audio.levels import Levels
+from app.audio.mixer import METER_FLOOR_DB, Mixer
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, vanished
 from app.audio.silent import SilentOutput
+from app.audio.strand import DECLICK_S
 from app.audio.stream import BUFFER_S, OutputStream
 from app.audio.timeline import Timeline
 from app.audio.tone import Side, Tone
@@ -70,6 +72,7 @@ class PlayerStatus:
     position_s: float = 0.0  # of what is heard now: written to the device, less its latency
     playing: bool = False  # as rendered: the last of it is heard a queue and `latency_s` later
     waiting: bool = False  # playing, but rendering has not arrived at the playhead
+    ringing: int = 0  # earlier plucks that still sound
     source: str | None = None
     peak_db: float = METER_FLOOR_DB  # dBFS, after volume and limiter
     gain_reduction_db: float = 0.0
@@ -109,7 +112,7 @@ def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
 
 
 class Player:
-    """Plays one track at a time through a device, or silently against a clock as long as there is none.
+    """Plays tracks through a device, or silently against a clock as long as there is none.
 
     Every public method may be called from any thread and returns at once. After `close` commands do nothing.
 
@@ -172,13 +175,13 @@ class Player:
         """A soft tone for a second on one side, whatever else is playing."""
         self._commands.put(lambda: self._start_tone(side))
 
-    def load(self, track: Track, keep_position: bool = False) -> None:
-        """Takes another track, from its beginning or at the same position; see `Mixer.load`."""
+    def load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
+        """Takes another track: from its beginning, at the same position, or beside the last; see `Mixer.load`."""
         rate_hz = self.rate_hz
         if track.rate_hz != rate_hz:
             raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
         self._track = track
-        self._commands.put(lambda: self._load(track, keep_position))
+        self._commands.put(lambda: self._load(track, keep_position, ring))
 
     def play(self) -> None:
         self._commands.put(lambda: self._mixer.play())
@@ -206,6 +209,10 @@ class Player:
         if math.isnan(volume_db) or volume_db == math.inf:
             raise ValueError(f"The volume cannot be {volume_db} dB.")
         self._commands.put(lambda: self._mixer.set_volume_db(volume_db))
+
+    def set_levels(self, levels: Levels) -> None:
+        """How loud each source is played; see `Levels`."""
+        self._commands.put(lambda: self._mixer.set_levels(levels))
 
     @property
     def rate_hz(self) -> int:
@@ -263,10 +270,10 @@ class Player:
                 return
             command()
 
-    def _load(self, track: Track, keep_position: bool) -> None:
+    def _load(self, track: Track, keep_position: bool, ring: bool) -> None:
         # If the device has changed meanwhile, the caller will see the new rate in status() and load again.
         if track.rate_hz == self._mixer.rate_hz:
-            self._mixer.load(track, keep_position)
+            self._mixer.load(track, keep_position, ring)
 
     def _select(self, source: str) -> None:
         # select() has checked the source; only a track that another thread loaded meanwhile may refuse it.
@@ -373,6 +380,7 @@ class Player:
             position_s=self._timeline.position_at(heard_frame) / output.rate_hz,
             playing=state.playing,
             waiting=state.waiting,
+            ringing=state.ringing,
             source=state.source,
             peak_db=state.peak_db,
             gain_reduction_db=state.gain_reduction_db,

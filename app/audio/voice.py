@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from app.audio.levels import Levels, SmoothGain
 from app.audio.track import Track
 
 
@@ -29,6 +30,7 @@ class Voice:
         self._fade_in_done = 0
         self._fade_out_frames = 0
         self._fade_out_done: int | None = None
+        self._gain: SmoothGain | None = None  # at its target when the first samples sound
 
     @property
     def silent(self) -> bool:
@@ -50,11 +52,18 @@ class Voice:
             self._fade_out_frames = min(frames, self.track.ready_frames - self.position_frames)
             self._fade_out_done = 0
 
-    def add_to(self, out: NDArray[np.float64]) -> None:
-        """Adds the next samples to `out`, shape (frames,); while fading out, `frames_left` at most."""
-        frames = out.size if self._fade_out_done is None else min(out.size, self.frames_left)
-        samples = self.track.read(self.source, self.position_frames, self.position_frames + frames)
-        samples = samples.astype(np.float64)
+    def add_to(self, out: NDArray[np.float64], levels: Levels) -> None:
+        """Adds the next samples to `out`, shape (frames, channels); while fading out, `frames_left` at most.
+
+        A mono track sounds in every channel; a stereo one needs two.
+        """
+        frames = len(out) if self._fade_out_done is None else min(len(out), self.frames_left)
+        read = self.track.read(self.source, self.position_frames, self.position_frames + frames)
+        samples = read.astype(np.float64).reshape(frames, -1)
+        gain = levels.gain(self.track, self.source)
+        if self._gain is None:
+            self._gain = SmoothGain(gain, self.track.rate_hz)
+        self._gain.apply(samples, gain)
         rising = min(frames, self._fade_in_frames - self._fade_in_done)
         if rising > 0:
             samples[:rising] *= _rise(self._fade_in_done, rising, self._fade_in_frames)
@@ -67,5 +76,5 @@ class Voice:
 
 
 def _rise(start: int, count: int, length: int) -> NDArray[np.float64]:
-    """Samples `start` … `start + count` of a raised cosine that climbs from 0 to 1 in `length` frames."""
-    return 0.5 - 0.5 * np.cos(np.pi / length * (np.arange(start, start + count) + 0.5))
+    """Samples `start` … `start + count` of a raised cosine from 0 to 1 in `length` frames, (count, 1)."""
+    return 0.5 - 0.5 * np.cos(np.pi / length * (np.arange(start, start + count)[:, np.newaxis] + 0.5))

@@ -35,8 +35,8 @@ class SpectrumPanel(Panel):
         self.view.hovered.connect(self._hover)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if "heard" in names:
-            self.view.set_heard(self.session.choices.heard)
+        if names & {"heard", "a", "b"}:
+            self.view.set_heard(self.session.source_heard)
 
     def take_started(self, take: Take) -> None:
         if take.info.rate_hz != self.view.analyser.rate_hz:

@@ -5,17 +5,21 @@ from __future__ import annotations
 from app.library import Library
 from app.motion import Envelope, Strobe, frame_at
 from app.panels.base import Moment, Panel
-from app.rendering import Take
+from app.rendering import DIFFERENCE, Take
 from app.session import Choices, Session
+from app.silence import why_difference_silent, why_silent
 from app.views.string_ground import TrainedPlucks
 from app.views.string_ink import ShownPluck
 from app.views.string_view import StringView
+from engine.metrics import ErrorSums
 from engine.pluck import SHAPES, WIDTH_RANGE
 from engine.preset import PresetInfo, outside_training
 
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
-PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "listen"}
+PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset"}
+HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
+WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
 
 
 class StringPanel(Panel):
@@ -43,19 +47,31 @@ class StringPanel(Panel):
         self._strobe = Strobe()
         self._envelope: Envelope | None = None
         self._shown: tuple[object, ...] = ()
+        self._take: Take | None = None  # the complete one of this pluck
+
+    @property
+    def drawing(self) -> bool:
+        """Whether the string is held in the hand and not yet let go."""
+        return self.view.is_dragging_pluck
 
     def choices_changed(self, names: frozenset[str]) -> None:
         choices = self.session.choices
         if names & PLUCK_FIELDS:
+            self._take = None
+        if names & WARNING_FIELDS:
             self._show_pluck()
-        if "heard" in names:
-            self.view.set_heard(choices.heard)
+        if names & {"heard", "a", "b"}:
+            self.view.set_heard(self.session.source_heard)
         if names & {"motion", "envelope"}:
             self.view.set_shown(choices.motion, choices.envelope)
 
     def take_started(self, take: Take) -> None:
         self._strobe.restart()
         self._envelope = Envelope(take)
+
+    def take_finished(self, take: Take, errors: ErrorSums) -> None:
+        self._take = take
+        self.view.set_warning(self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
         take, position_s, choices = moment.take, moment.position_s, self.session.choices
@@ -77,16 +93,17 @@ class StringPanel(Panel):
         points = entry.info.grid_points if entry else 101
         shape_mm = choices.pluck.displacement(points).numpy() * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
-        view.set_listening_points(choices.listen)
+        view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
         view.set_trained(_trained(entry.info) if entry else TrainedPlucks())
         view.set_warning(self._pluck_warning())
 
     def _pluck_warning(self) -> str:
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
-        if choices.amplitude_mm == 0:
-            return "silent: the amplitude is 0"
-        if choices.listen in (0.0, 1.0):
-            return "silent: the listening point is at a fixed end"
+        silent = why_silent(choices, self.library)
+        if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
+            silent = why_difference_silent(choices, self._take)
+        if silent:
+            return silent
         return "; ".join(outside_training(entry.info, choices.pluck)) if entry else ""
 
     # Gestures
@@ -107,10 +124,13 @@ class StringPanel(Panel):
         self.session.update(shape=SHAPES[(here + steps) % len(SHAPES)])
 
     def _move_listening_point(self, side: str, position: float) -> None:
-        self.session.move_listening_point(position)
+        if side == "right":
+            self.session.update(listen_right=min(max(position, 0.0), 1.0))
+        else:
+            self.session.move_listening_point(position)
 
     def _reset_listening_point(self, side: str) -> None:
-        self.session.move_listening_point(Choices().listen)
+        self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)
 
 
 def _label(choices: Choices) -> str:

@@ -37,8 +37,8 @@ class WaveformPanel(Panel):
         self._shown: tuple[object, ...] = ()
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if "heard" in names:
-            self.view.set_heard(self.session.choices.heard)
+        if names & {"heard", "a", "b"}:
+            self.view.set_heard(self.session.source_heard)
 
     def take_started(self, take: Take) -> None:
         listen = self.session.choices.listen

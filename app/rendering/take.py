@@ -14,8 +14,32 @@ from engine.sine_transform import listening_weights
 SOURCES = ("model", "truth")
 
 
+class Motion:
+    """Displacement of one source on its grid, (frames, grid_points) in m, growing at its end."""
+
+    def __init__(self, rate_hz: int, grid_points: int, seconds: float) -> None:
+        self.rate_hz = rate_hz
+        self.frames = round(seconds * rate_hz) + 1
+        self.ready_frames = 0
+        self._m = np.zeros((self.frames, grid_points), np.float32)
+
+    @property
+    def complete(self) -> bool:
+        return self.ready_frames == self.frames
+
+    def append(self, frames_m: NDArray[np.float32]) -> None:
+        start, stop = self.ready_frames, self.ready_frames + len(frames_m)
+        self._m[start:stop] = frames_m
+        self.ready_frames = stop
+
+    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
+        """What is ready of frames start … stop."""
+        ready = self.ready_frames
+        return self._m[min(start, ready) : ready if stop is None else min(stop, ready)]
+
+
 class Take:
-    """Displacement of both sources on the grid at the preset's rate.
+    """Displacement of both sources on the grid at the preset's rate, and of other presets' models beside them.
 
     One thread appends and any thread reads: frames are written first, then `ready_frames` is raised; what lies
     below it never changes.
@@ -23,16 +47,22 @@ class Take:
     Attributes:
         frames: number of frames when complete, the initial displacement among them.
         model_ends_s: when the model's output ran away, the time of its last believable frame; it is at rest then.
+        others: motions of other presets' models for the same pluck, by source, each at its own rate and on its
+            own grid.
     """
 
     def __init__(self, preset_name: str, info: PresetInfo, pluck: Pluck, seconds: float) -> None:
         self.preset_name = preset_name
         self.info = info
         self.pluck = pluck
-        self.frames = round(seconds * info.rate_hz) + 1
-        self.ready_frames = 0
         self.model_ends_s: float | None = None
-        self._motion_m = {name: np.zeros((self.frames, info.grid_points), np.float32) for name in SOURCES}
+        self._motions = {name: Motion(info.rate_hz, info.grid_points, seconds) for name in SOURCES}
+        self.frames = self._motions["truth"].frames
+        self.others: dict[str, Motion] = {}
+
+    @property
+    def ready_frames(self) -> int:
+        return self._motions["truth"].ready_frames
 
     @property
     def complete(self) -> bool:
@@ -46,16 +76,18 @@ class Take:
     def fundamental_hz(self) -> float:
         return float(self.info.string.undamped_frequencies(1)) / (2 * np.pi)
 
+    def motion(self, source: str) -> Motion:
+        """The growing motion of a source, of "model", "truth" or one of `others`."""
+        return self._motions[source] if source in self._motions else self.others[source]
+
     def append(self, model_m: NDArray[np.float32], truth_m: NDArray[np.float32]) -> None:
         """Adds frames (frames, grid_points) of both sources."""
-        start, stop = self.ready_frames, self.ready_frames + len(truth_m)
-        self._motion_m["model"][start:stop] = model_m
-        self._motion_m["truth"][start:stop] = truth_m
-        self.ready_frames = stop
+        self._motions["model"].append(model_m)
+        self._motions["truth"].append(truth_m)
 
     def motion_m(self, source: str) -> NDArray[np.float32]:
         """The frames so far, (ready_frames, grid_points), in m."""
-        return self._motion_m[source][: self.ready_frames]
+        return self.motion(source).read(0, self.ready_frames if source in SOURCES else None)
 
     def shape_m(self, source: str, time_s: float) -> NDArray[np.float32]:
         """The string (grid_points,) at any time, between two frames by linear interpolation, in m."""

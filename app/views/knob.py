@@ -101,7 +101,7 @@ class Knob(QWidget):
         return self.limits.text.format(self._value)
 
     def sizeHint(self) -> QSize:
-        return QSize(70, 82)
+        return QSize(60, 82)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(62, 82)

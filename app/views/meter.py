@@ -26,7 +26,7 @@ class Meter(QWidget):
         self._hold = 0
 
     def sizeHint(self) -> QSize:
-        return QSize(170, 40)
+        return QSize(150, 40)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(110, 40)

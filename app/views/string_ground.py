@@ -72,10 +72,12 @@ def paint_legend(painter: QPainter, heard: str, warning: str, right: float) -> N
     """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`."""
     painter.setFont(theme.small_font(12, bold=True))
     x = float(MARGIN_X)
-    for name in ("model", "truth"):
-        painter.setPen(QPen(theme.translucent(theme.SOURCE_COLOURS[name], 255 if name == heard else 150), 3))
+    names = ["model", "truth"]
+    for name in names if heard in names else [*names, heard]:
+        hue = theme.SOURCE_COLOURS[theme.source_kind(name)]
+        painter.setPen(QPen(theme.translucent(hue, 255 if name == heard else 150), 3))
         painter.drawLine(QPointF(x, 18), QPointF(x + 18, 18))
-        text = f"{name} (heard)" if name == heard else name
+        text = f"{name.removeprefix('preset:')} (heard)" if name == heard else name
         painter.drawText(QPointF(x + 24, 22), text)
         x += 44 + painter.fontMetrics().horizontalAdvance(text)
     if warning:

@@ -55,7 +55,7 @@ class ShownPluck:
 
 def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
     """Both sources, the heard one in front. Opaque fills and thin pens only: this is drawn sixty times a second."""
-    order = [name for name in frame.shapes if name != heard] + [heard]
+    order = sorted(frame.shapes, key=lambda name: name == heard)
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in order:
         if name in frame.envelopes:

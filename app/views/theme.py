@@ -30,6 +30,8 @@ class Face:
     disabled: str
     model: str  # what the model says is amber, everywhere
     truth: str  # and the physics blue
+    difference: str  # what lies between them
+    other: str  # another preset's model
     warning: str
     good: str
     ground_top: str  # behind the string, from here
@@ -48,6 +50,8 @@ DARK = Face(
     disabled="#555d6b",
     model="#ffb03a",
     truth="#4cc3e8",
+    difference="#e58fd0",
+    other="#b5a3ff",
     warning="#ff6b5e",
     good="#58c98b",
     ground_top="#171b22",
@@ -65,6 +69,8 @@ LIGHT = Face(
     disabled="#9aa2b0",
     model="#a05a00",
     truth="#00698f",
+    difference="#a3327f",
+    other="#5b45b8",
     warning="#b3261e",
     good="#1a7044",
     ground_top="#fdfdfe",
@@ -90,7 +96,13 @@ BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT = (
 )
 MODEL, TRUTH, WARNING, GOOD = DARK.model, DARK.truth, DARK.warning, DARK.good
 DISABLED = DARK.disabled
-SOURCE_COLOURS = {"model": MODEL, "truth": TRUTH}
+DIFFERENCE, OTHER = DARK.difference, DARK.other
+SOURCE_COLOURS = {"model": MODEL, "truth": TRUTH, "difference": DIFFERENCE, "other": OTHER}
+
+
+def source_kind(source: str) -> str:
+    """The key of `SOURCE_COLOURS` for a source: "other" for "preset:NAME"."""
+    return source if source in SOURCE_COLOURS else "other"
 
 
 class _Changes(QObject):
@@ -102,12 +114,13 @@ changes = _Changes()
 
 def use(new: Face) -> None:
     """Makes `new` the present face and tells of it; the application's style sheet is `apply_theme`'s business."""
-    global face, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, MODEL, TRUTH, WARNING, GOOD, DISABLED
+    global face, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, DISABLED
+    global MODEL, TRUTH, DIFFERENCE, OTHER, WARNING, GOOD
     old, face = face, new
     BACKGROUND, PANEL, RAISED, LINE = new.background, new.panel, new.raised, new.line
     TEXT, FAINT, WARNING, GOOD, DISABLED = new.text, new.faint, new.warning, new.good, new.disabled
-    MODEL, TRUTH = new.model, new.truth
-    SOURCE_COLOURS.update(model=MODEL, truth=TRUTH)
+    MODEL, TRUTH, DIFFERENCE, OTHER = new.model, new.truth, new.difference, new.other
+    SOURCE_COLOURS.update(model=MODEL, truth=TRUTH, difference=DIFFERENCE, other=OTHER)
     if new != old:
         changes.face_changed.emit(old, new)
 
@@ -127,6 +140,11 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
+    slots = "\n".join(
+        f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
+        f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; padding: 6px; }}"
+        for kind, colour in SOURCE_COLOURS.items()
+    )
     return f"""
 QWidget {{ color: {TEXT}; font-size: 12px; }}
 QMainWindow, QDialog {{ background: {BACKGROUND}; }}
@@ -158,10 +176,10 @@ QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleS
 QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, QMenuBar:focus
     {{ border: 1px solid {TEXT}; }}
 QPushButton:disabled, QToolButton:disabled, QComboBox:disabled {{ color: {DISABLED}; }}
-QPushButton#model:checked {{ background: {MODEL}; color: {BACKGROUND}; border-color: {MODEL}; font-weight: 600; }}
-QPushButton#truth:checked {{ background: {TRUTH}; color: {BACKGROUND}; border-color: {TRUTH}; font-weight: 600; }}
+{slots}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
+QToolButton#narrow {{ padding: 6px 5px; }}
 QToolButton::menu-indicator {{ image: none; }}
 QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}
 QToolButton#chip:checked {{ color: {TEXT}; background: {LINE}; border-color: {LINE}; }}

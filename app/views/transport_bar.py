@@ -1,23 +1,26 @@
-"""The controls beneath: play, source switch, loop, the pluck's knobs, slow motion, volume and export."""
+"""The controls beneath: play, loop, the slots A and B, pluck, listening points, slow motion, volume and export."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import (
-    QButtonGroup,
     QFrame,
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
+from app.rendering import FULL_SCALE_M_S
 from app.session import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
 from app.views.knob import Knob, KnobRange
 from app.views.meter import Meter
 from app.views.parts import combo_box, tool_button, vertical_rule
+from app.views.slot_buttons import SlotButtons
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
+from engine.sources import FULL_SCALE_M
 
 _SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
 
@@ -38,6 +41,11 @@ KNOBS = {  # field of `Choices` -> (label, range, tip)
         "How wide the pluck is",
     ),
     "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Where the string is heard"),
+    "listen_right": (
+        "right",
+        KnobRange(0, 1, 1 - DEFAULT_LISTEN, 0.01),
+        "In stereo, where the right ear hears the string; the left is at “listen”",
+    ),
     "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "How long a pluck is rendered"),
     "speed": (
         "motion",
@@ -68,16 +76,22 @@ class TransportBar(QFrame):
         self.meter = Meter()
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
-        row.setSpacing(8)
+        row.setSpacing(5)
         row.addLayout(self._build_transport())
         row.addWidget(vertical_rule())
-        row.addLayout(self._build_sources())
+        self.slots = SlotButtons()
+        self.slots.change_asked.connect(self.change_asked)
+        row.addWidget(self.slots)
         row.addWidget(vertical_rule())
         row.addLayout(self._build_shape())
         for field in ("position", "amplitude_mm", "width"):
             row.addWidget(self.knobs[field])
         row.addWidget(vertical_rule())
-        for field in ("listen", "seconds", "speed"):
+        for field in ("listen", "listen_right"):
+            row.addWidget(self.knobs[field])
+        row.addLayout(self._build_pickup())
+        row.addWidget(vertical_rule())
+        for field in ("seconds", "speed"):
             row.addWidget(self.knobs[field])
         row.addStretch(1)
         row.addWidget(vertical_rule())
@@ -91,7 +105,11 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
-        self._sources[choices.heard].setChecked(True)
+        self.knobs["listen_right"].setVisible(choices.stereo)
+        with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
+            self._stereo.setChecked(choices.stereo)
+            self._velocity.setChecked(choices.pickup == "velocity")
+        self.slots.show_choices(choices)
 
     def show_playing(self, playing: bool) -> None:
         self._play.setChecked(playing)
@@ -111,25 +129,30 @@ class TransportBar(QFrame):
         column.addWidget(self._loop)
         return column
 
-    def _build_sources(self) -> QVBoxLayout:
-        self._sources = {}
-        group = QButtonGroup(self)
+    def _build_pickup(self) -> QVBoxLayout:
+        self._stereo = tool_button("Stereo", "Stereo", "Two listening points: “listen” for the left ear, “right”")
+        self._stereo.setCheckable(True)
+        self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
+        self._velocity = tool_button(
+            "Velocity",
+            "Velocity pick-up",
+            f"Hear the string's velocity, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s).\n"
+            f"Otherwise its displacement (full scale {1000 * FULL_SCALE_M:g} mm)",
+        )
+        self._velocity.setCheckable(True)
+        self._velocity.toggled.connect(
+            lambda on: self.change_asked.emit("pickup", "velocity" if on else "displacement")
+        )
         column = QVBoxLayout()
-        for name, tip in (("model", "Hear the learned model"), ("truth", "Hear the physics")):
-            button = QPushButton(name.upper())
-            button.setObjectName(name)
-            button.setCheckable(True)
-            button.setToolTip(f"{tip} (X switches at the playhead)")
-            button.setAccessibleName(tip)
-            button.clicked.connect(lambda _=False, name=name: self.change_asked.emit("heard", name))
-            group.addButton(button)
-            self._sources[name] = button
+        for button in (self._stereo, self._velocity):
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
             column.addWidget(button)
         return column
 
     def _build_shape(self) -> QVBoxLayout:
         self._shape = combo_box("Pluck shape", [(_SHAPE_NAMES[shape], shape) for shape in SHAPES])
         self._shape.setToolTip("The shape of the pluck")
+        self._shape.setFixedWidth(106)
         self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
         label = QLabel("PLUCK")
         label.setObjectName("faint")

@@ -121,7 +121,7 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_X)
-    assert session.choices.heard == "truth"
+    assert session.source_heard == "truth"
     qtbot.waitUntil(lambda: controller.player.status().source == "truth", timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert session.choices.loop
@@ -243,7 +243,7 @@ def test_a_broken_preset_is_told_and_the_app_goes_on(
 
 
 def test_choices_are_restored(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
-    controller.session.update(position=0.61, heard="truth", volume_db=-12)
+    controller.session.update(position=0.61, heard="b", a="preset:second", volume_db=-12)
     controller.window.resize(1190, 610)
     geometry = controller.window.geometry_text()
     controller.window.close()
@@ -285,3 +285,103 @@ def test_decks_and_session_agree_on_the_views(controller: Controller) -> None:
     assert session.choices.left_view == "spectrum"
     session.update(left_view="none such")  # of another version: what is in front stays
     assert left.currentWidget() is view(controller, "spectrum")
+
+
+def sounding(controller: Controller) -> int:
+    """How many earlier plucks ring."""
+    return controller.player.status().ringing
+
+
+def test_plucks_ring_beside_each_other_and_a_knob_replaces(qtbot: QtBot, controller: Controller) -> None:
+    controller.session.update(seconds=3.0)
+    wait_for_take(qtbot, controller)
+    controller.pluck()
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
+    controller.pluck()  # the same again
+    qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=5_000)
+    controller.session.update(position=0.5)
+    controller.pluck()  # another one
+    qtbot.waitUntil(lambda: sounding(controller) == 2, timeout=20_000)
+    track = controller._loaded
+    controller.session.update(position=0.6)  # a knob that is turned
+    qtbot.waitUntil(lambda: controller._loaded is not track, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.player.status().position_s > 0, timeout=5_000)
+    assert sounding(controller) <= 2
+    controller.play_or_stop()
+    qtbot.waitUntil(lambda: sounding(controller) == 0, timeout=5_000)
+
+
+def test_a_pluck_that_is_overtaken_sounds_all_the_same(qtbot: QtBot, controller: Controller) -> None:
+    controller.session.update(seconds=3.0)
+    wait_for_take(qtbot, controller)
+    for position in (0.45, 0.55):  # before the first is rendered
+        controller.session.update(position=position)
+        controller.pluck()
+    qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=20_000)
+    assert controller._stage.awaited == []
+
+
+def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, controller: Controller) -> None:
+    controller.session.update(seconds=3.0)
+    wait_for_take(qtbot, controller)
+    controller.pluck()
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
+    loaded, take, string = controller._loaded, controller._stage.take, view(controller, "string")
+    at = QPoint(string.width() // 2, string.height() // 4)
+    qtbot.mousePress(string, LEFT, pos=at)
+    qtbot.waitUntil(lambda: controller._stage.take is not take, timeout=20_000)
+    assert controller._loaded is loaded
+    qtbot.mouseRelease(string, LEFT, pos=at)
+    assert controller._loaded is controller._stage.track
+    qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=5_000)
+
+
+def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -> None:
+    slots, session = controller.window.transport.slots, controller.session
+    wait_for_take(qtbot, controller)
+    slots.change_asked.emit("b", "preset:second")
+    qtbot.waitUntil(lambda: "preset:second" in controller._loaded.sources, timeout=20_000)  # type: ignore[union-attr]
+    qtbot.mouseClick(slots._buttons["b"], LEFT)
+    assert session.source_heard == "preset:second"
+    qtbot.waitUntil(lambda: controller.player.status().source == "preset:second", timeout=5_000)
+    assert slots._buttons["b"].objectName() == "other"
+    qtbot.keyClick(controller.window, Qt.Key.Key_X)
+    qtbot.waitUntil(lambda: controller.player.status().source == "model", timeout=5_000)
+    session.update(a="difference", difference_gain_db=30)
+    qtbot.waitUntil(lambda: controller.player.status().source == "difference", timeout=5_000)
+    qtbot.waitUntil(lambda: "+30 dB" in slots._buttons["a"].text(), timeout=5_000)
+
+
+def test_a_slot_whose_preset_is_gone_falls_back(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    made = Controller(window, Settings(choices=Choices(seconds=0.5, b="preset:gone")), tmp_path / "settings.json")
+    assert made.session.choices.b == "truth"
+    assert any("gone" in text for text, _ in window.notices.kept)
+    window.close()
+
+
+def test_solo_is_shown_and_left_with_escape(qtbot: QtBot, controller: Controller) -> None:
+    window, session = controller.window, controller.session
+    session.update(solo=3)
+    assert window._solo.isVisible()
+    assert "mode 3" in window._solo.text()
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    assert session.choices.solo == 0
+    assert not window._solo.isVisible()
+
+
+def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) -> None:
+    transport, session = controller.window.transport, controller.session
+    assert not transport.knobs["listen_right"].isVisible()
+    transport._stereo.click()
+    transport._velocity.click()
+    assert session.choices.stereo
+    assert session.choices.pickup == "velocity"
+    assert transport.knobs["listen_right"].isVisible()
+    wait_for_take(qtbot, controller)
+    qtbot.waitUntil(lambda: controller._loaded is not None and controller._loaded.channels == 2, timeout=20_000)
+    session.update(stereo=False, pickup="displacement")
+    assert not transport._stereo.isChecked()
+    assert not transport._velocity.isChecked()
+    qtbot.waitUntil(lambda: controller._loaded.channels == 1, timeout=20_000)  # type: ignore[union-attr]

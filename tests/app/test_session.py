@@ -48,9 +48,26 @@ def test_gestures_are_clamped_to_what_is_allowed() -> None:
 def test_switching_source_goes_there_and_back() -> None:
     session = Session()
     session.switch_source()
-    assert session.choices.heard == "truth"
+    assert (session.choices.heard, session.source_heard) == ("b", "truth")
     session.switch_source()
-    assert session.choices.heard == "model"
+    assert (session.choices.heard, session.source_heard) == ("a", "model")
+
+
+def test_slots_hold_any_two_sources() -> None:
+    session = Session(Choices(a="preset:other one", b="difference"))
+    assert session.source_heard == "preset:other one"
+    session.switch_source()
+    assert session.source_heard == "difference"
+    for wrong in ("noise", "preset:", "model "):
+        with pytest.raises(ValueError, match="a: "):
+            session.update(a=wrong)
+
+
+@pytest.mark.parametrize("source", ["model", "truth"])
+def test_choices_from_before_the_slots_are_understood(source: str) -> None:
+    choices = Choices.model_validate_json(f'{{"heard": "{source}", "position": 0.4}}')
+    assert (choices.a, choices.b, choices.source_heard) == ("model", "truth", source)
+    assert choices.position == 0.4
 
 
 def test_presets_go_round() -> None:

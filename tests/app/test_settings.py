@@ -21,7 +21,7 @@ from app.settings import (
 def test_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "new folder" / "settings.json"
     settings = Settings(
-        choices=Choices(position=0.7, heard="truth", loop=True),
+        choices=Choices(position=0.7, heard="b", b="difference", loop=True),
         export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         sound=SoundChoice(rate_hz=44_100, buffer=512),
@@ -91,3 +91,11 @@ def test_a_file_of_the_first_version_still_loads(tmp_path: Path) -> None:
 def test_the_place_can_be_given(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(tmp_path / "x.json"))
     assert settings_file() == tmp_path / "x.json"
+
+
+def test_a_file_from_before_the_slots_loads_without_a_notice(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text('{"choices": {"heard": "truth", "position": 0.4}}')
+    settings, notice = load_settings(path)
+    assert notice == ""
+    assert settings.choices.source_heard == "truth"

@@ -4,6 +4,7 @@ A script of its own, because ALSA and PulseAudio read their settings once per pr
 
     python play_through_device.py TRACK.npz switch        select the truth on the way, play to the end
     python play_through_device.py TRACK.npz kill PID      end the sound server PID on the way
+    python play_through_device.py TRACK.npz live OUT.npy  pluck, switch, loop; OUT: what the mixer gave
 """
 
 import json
@@ -15,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.audio import AudioProblem, Player, Track
+from app.audio import AudioProblem, Mixer, Player, Track
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
@@ -24,7 +25,36 @@ def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
         time.sleep(0.005)
 
 
-def main(track_file: str, action: str, *pid: str) -> None:
+def kept_blocks() -> list[np.ndarray]:
+    """All blocks that any mixer gives from now on."""
+    blocks: list[np.ndarray] = []
+    next_block = Mixer.next_block
+
+    def keep(mixer: Mixer, frames: int) -> np.ndarray:
+        blocks.append(next_block(mixer, frames))
+        return blocks[-1]
+
+    Mixer.next_block = keep  # type: ignore[method-assign]
+    return blocks
+
+
+def play_live(player: Player, track: Track, out_file: str) -> None:
+    blocks = kept_blocks()
+    player.set_loop(True)
+    for source in ("truth", "model", "truth"):
+        player.load(track, ring=True)
+        player.play()
+        wait_until(lambda: player.status().position_s > 0.25)
+        player.select(source)
+        wait_until(lambda: player.status().position_s > 0.45)
+    wait_until(lambda: player.status().position_s > 1.8)
+    wait_until(lambda: player.status().position_s < 0.5)  # the loop
+    player.stop()
+    time.sleep(0.5)
+    np.save(out_file, np.concatenate(blocks))
+
+
+def main(track_file: str, action: str, *argument: str) -> None:
     sources = np.load(track_file)
     problems: list[AudioProblem] = []
     with Player(problems.append) as player:
@@ -36,12 +66,15 @@ def main(track_file: str, action: str, *pid: str) -> None:
         player.load(track)
         player.play()
         wait_until(lambda: player.status().position_s > 0.4)
-        if action == "kill":
-            os.kill(int(pid[0]), signal.SIGKILL)
+        if action == "live":
+            play_live(player, track, argument[0])
+        elif action == "kill":
+            os.kill(int(argument[0]), signal.SIGKILL)
             wait_until(lambda: player.status().device is None)
         else:
             player.select("truth")
-        wait_until(lambda: player.status().position_s >= track.length_frames / track.rate_hz)
+        if action != "live":
+            wait_until(lambda: player.status().position_s >= track.length_frames / track.rate_hz)
         time.sleep(0.2)  # the end is still on its way through the sound server
         status = player.status()
     print(

@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.audio import Mixer, Track
+from app.audio import Levels, Mixer, Track
 from app.audio.limiter import CEILING
-from app.audio.mixer import ATTACK_S, CROSS_FADE_S, DECLICK_S, RESUME_RESERVE_S
+from app.audio.mixer import MOST_PLUCKS
+from app.audio.strand import ATTACK_S, CROSS_FADE_S, DECLICK_S, RESUME_RESERVE_S
 
 RATE_HZ = 48_000
 TONE_HZ = 220.0
@@ -395,3 +396,186 @@ def test_the_meter_shows_the_peak_and_falls() -> None:
     assert mixer.status().peak_db == pytest.approx(20 * np.log10(0.5), abs=0.1)
     mono(mixer, SECOND)
     assert mixer.status().peak_db == pytest.approx(20 * np.log10(0.5) - 20, abs=0.2)
+
+
+# Plucks that ring on
+
+
+def plucked_again(mixer: Mixer, track: Track) -> None:
+    mixer.load(track, ring=True)
+    mixer.play()
+
+
+def test_a_new_pluck_sounds_beside_the_last_which_rings_to_its_end() -> None:
+    first, second = make_track(0.5, peak=0.2), make_track(1.0, peak=0.2, phase=1.0)
+    mixer = playing(first)
+    mono(mixer, 5000)
+    plucked_again(mixer, second)
+    assert mixer.status().position_frames == 0
+    out = mono(mixer, SECOND)
+    until = frames(0.5) - frames(DECLICK_S) - 5000
+    attack = frames(ATTACK_S)
+    both = first.read("model", 5000, SECOND)[:until].astype(np.float64) + second.read("model", 0, until)
+    np.testing.assert_allclose(out[attack:until], both[attack:], atol=1e-7)
+    alone = slice(frames(0.5) - 5000, SECOND - frames(DECLICK_S))
+    np.testing.assert_array_equal(out[alone], second.read("model", alone.start, alone.stop))
+
+
+def test_the_same_track_plucked_again_rings_beside_itself() -> None:
+    track = make_track(0.5, peak=0.2)
+    mixer = playing(track)
+    mono(mixer, 5000)
+    plucked_again(mixer, track)
+    out = mono(mixer, 10_000)
+    both = track.read("model", 5000, 15_000).astype(np.float64) + track.read("model", 0, 10_000)
+    np.testing.assert_allclose(out[frames(ATTACK_S) :], both[frames(ATTACK_S) :], atol=1e-7)
+
+
+def test_too_many_plucks_fade_the_oldest() -> None:
+    mixer = playing(make_track(peak=0.01))
+    for _ in range(MOST_PLUCKS + 3):
+        mono(mixer, 500)
+        plucked_again(mixer, make_track(peak=0.01))
+    assert mixer.status().ringing == MOST_PLUCKS - 1
+    mono(mixer, 2 * SECOND)
+    assert mixer.status().ringing == 0
+
+
+def test_stop_and_seek_end_what_rings() -> None:
+    for end in (Mixer.stop, lambda mixer: mixer.seek(0.9)):
+        mixer = playing(make_track(peak=0.2))
+        mono(mixer, 5000)
+        track = make_track(peak=0.2, phase=1.0)
+        plucked_again(mixer, track)
+        mono(mixer, 5000)
+        end(mixer)
+        out = mono(mixer, 2000)
+        start = mixer.status().position_frames - 2000
+        rest = track.read("model", start, start + 2000) if mixer.status().playing else np.zeros(2000)
+        np.testing.assert_array_equal(out[frames(CROSS_FADE_S) :], rest[frames(CROSS_FADE_S) :])
+        assert mixer.status().ringing == 0
+
+
+def test_a_switch_reaches_what_rings_and_the_loop_does_not() -> None:
+    first, second = make_track(0.3, peak=0.2), make_track(0.4, peak=0.2, phase=1.0)
+    mixer = playing(first)
+    mixer.set_loop(True)
+    mono(mixer, 2000)
+    plucked_again(mixer, second)
+    mono(mixer, 2000)
+    mixer.select("truth")
+    out = mono(mixer, 4000)[frames(CROSS_FADE_S) :]
+    fade = frames(CROSS_FADE_S)
+    both = first.read("truth", 4000 + fade, 8000).astype(np.float64) + second.read("truth", 2000 + fade, 6000)
+    np.testing.assert_allclose(out, both, atol=1e-7)
+    out = mono(mixer, SECOND)
+    assert mixer.status().ringing == 0
+    assert mixer.status().playing
+    np.testing.assert_array_equal(out[-100:], second.read("truth", 0, SECOND)[mixer.position_frames - 100 :][:100])
+
+
+def test_a_replaced_track_does_not_ring_and_leaves_what_rings_alone() -> None:
+    first, second, third = (make_track(1.0, 0.2, phase) for phase in (0.0, 1.0, 2.0))
+    mixer = playing(first)
+    mono(mixer, 1000)
+    plucked_again(mixer, second)
+    mono(mixer, 1000)
+    mixer.load(third)
+    out = mono(mixer, 3000)[1000:]
+    both = first.read("model", 3000, 5000).astype(np.float64) + third.read("model", 1000, 3000)
+    np.testing.assert_allclose(out, both, atol=1e-7)
+
+
+def test_a_pluck_that_waits_for_its_rendering_rings_too() -> None:
+    late = Track(RATE_HZ, SECOND, ("model", "truth"))
+    mixer = playing(late)
+    mono(mixer, 100)
+    plucked_again(mixer, make_track(peak=0.2))
+    mono(mixer, 1000)
+    samples = tone(1.0, 0.2, 1.0)
+    late.append({"model": samples, "truth": samples})
+    out = mono(mixer, 5000)[200:]
+    both = make_track(peak=0.2).read("model", 1200, 6000).astype(np.float64) + samples[200:5000].astype(np.float32)
+    np.testing.assert_allclose(out, both, atol=1e-7)
+
+
+@pytest.mark.parametrize("block_frames", [1, 65])
+def test_any_splitting_gives_the_same_plucks(block_frames: int) -> None:
+    def perform(size: int) -> np.ndarray:
+        mixer, out = playing(make_track(0.02)), []
+        for count in (300, 400, 500, 2000):
+            out += [mono(mixer, min(size, count - k)) for k in range(0, count, size)]
+            plucked_again(mixer, make_track(0.02, phase=count))
+        return np.concatenate(out)
+
+    np.testing.assert_allclose(perform(block_frames), perform(100_000), atol=1e-6)
+
+
+@pytest.mark.parametrize("event", ["source", "stop", "new pluck"])
+def test_nothing_clicks_while_plucks_ring(event: str) -> None:
+    mixer = playing(make_track(2.0, 0.2))
+    mono(mixer, 3000)
+    mixer.load(make_track(2.0, 0.2, phase=0.1), ring=True)
+    before = mono(mixer, frames(0.3) + 17)
+    if event == "new pluck":
+        mixer.load(make_track(2.0, 0.2), ring=True)  # a sine begins at zero: its attack is no click
+    else:
+        EVENTS[event](mixer)
+    after = mono(mixer, frames(0.4))
+    assert click_db(np.concatenate([before[frames(0.1) :], after])) < -80
+
+
+# Stereo and levels
+
+
+def make_stereo_track(peak: float = 0.4) -> Track:
+    track = Track(RATE_HZ, SECOND, ("model", "truth"), channels=2)
+    both = np.stack([tone(1.0, peak), tone(1.0, peak / 2, 1.0)], axis=1)
+    track.append({"model": both, "truth": both[:, ::-1]})
+    return track
+
+
+def test_a_stereo_track_keeps_its_sides_beside_a_mono_one_in_the_middle() -> None:
+    stereo, middle = make_stereo_track(), make_track(peak=0.1)
+    mixer = playing(stereo)
+    out = mixer.next_block(5000)
+    np.testing.assert_array_equal(out[100:], stereo.read("model", 100, 5000))
+    mixer.load(middle, ring=True)
+    out = mixer.next_block(5000)[200:]
+    sum_of_both = stereo.read("model", 5200, 10_000) + middle.read("model", 200, 5000)[:, np.newaxis]
+    np.testing.assert_allclose(out, sum_of_both, atol=1e-6)
+
+
+def test_from_stereo_to_mono_and_back_nothing_clicks() -> None:
+    mixer = playing(make_stereo_track())
+    parts = [mixer.next_block(frames(0.2))]
+    mixer.load(make_track(peak=0.4), keep_position=True)
+    parts.append(mixer.next_block(frames(0.2)))
+    mixer.load(make_stereo_track(), keep_position=True)
+    parts.append(mixer.next_block(frames(0.2)))
+    for side in np.concatenate(parts).T:
+        assert click_db(side) < -90
+
+
+def test_the_limiter_keeps_the_sides_in_proportion() -> None:
+    out = playing(make_stereo_track(peak=4.0)).next_block(SECOND // 2)[1000:]
+    expected = make_stereo_track(peak=4.0).read("model", 1000, SECOND // 2)
+    loud = np.abs(expected).min(axis=1) > 0.05
+    np.testing.assert_allclose((out[:, 0] / out[:, 1])[loud], (expected[:, 0] / expected[:, 1])[loud], rtol=1e-4)
+
+
+def test_levels_are_matched_and_gains_stated() -> None:
+    track = make_track(peak=0.1)
+    mixer = playing(track)
+    mixer.set_levels(Levels(matched=True, gains_db={"truth": 6.0}))
+    np.testing.assert_array_equal(mono(mixer, 5000)[100:], track.read("model", 100, 5000))  # not known yet
+    track.set_match_gains({"model": 0.5})
+    parts = [mono(mixer, frames(0.3))]
+    np.testing.assert_allclose(parts[0][-100:], 0.5 * track.read("model", 19_300, 19_400), atol=1e-6)
+    mixer.select("truth")
+    parts.append(mono(mixer, frames(0.2)))
+    np.testing.assert_allclose(parts[1][-100:], 10**0.3 * track.read("truth", 28_900, 29_000), atol=1e-6)
+    mixer.set_levels(Levels())
+    parts.append(mono(mixer, frames(0.2)))
+    np.testing.assert_allclose(parts[2][-100:], track.read("truth", 38_500, 38_600), atol=1e-6)
+    assert click_db(np.concatenate(parts)) < -90

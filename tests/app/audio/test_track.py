@@ -96,3 +96,18 @@ def test_a_reader_in_another_thread_sees_only_complete_samples() -> None:
         ready = track.ready_frames
         np.testing.assert_array_equal(track.read("truth", 0, ready), ramp[:ready])
     writer.join()
+
+
+def test_a_stereo_track_takes_pairs_only() -> None:
+    track = Track(RATE_HZ, 100, ("model",), channels=2)
+    pairs = np.random.default_rng(0).uniform(-1, 1, (100, 2)).astype(np.float32)
+    with pytest.raises(ValueError, match=r"\(frames, 2\)"):
+        track.append({"model": pairs[:, 0]})
+    broken = pairs.copy()
+    broken[48, 1] = np.nan
+    with pytest.raises(ValueError, match=r"0\.001000 s"):
+        track.append({"model": broken})
+    track.append({"model": pairs})
+    np.testing.assert_array_equal(track.read("model", 10, 20), pairs[10:20])
+    with pytest.raises(ValueError, match="1 or 2 channels"):
+        Track(RATE_HZ, 100, ("model",), channels=3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,12 +15,14 @@ import torch
 
 from app.audio import Track
 from app.export import SoundRequest, render_sound
-from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering import FULL_SCALE_M_S, RenderRequest, RenderWorker, Take
+from app.rendering.velocity import Differentiator
 from engine.metrics import ErrorSums
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
 from engine.pluck import Pluck
 from engine.preset import load_preset
+from engine.sources import FULL_SCALE_M
 
 DEADLINE_S = 30.0
 
@@ -32,6 +35,7 @@ class Heard:
         self.replaced: list[tuple[Take, Track]] = []
         self.finished: list[tuple[Take, ErrorSums]] = []
         self.failed: list[str] = []
+        self.others_failed: list[str] = []
 
     def take_started(self, take: Take, track: Track) -> None:
         self.started.append((take, track))
@@ -41,6 +45,9 @@ class Heard:
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self.finished.append((take, errors))
+
+    def other_failed(self, preset: str, message: str) -> None:
+        self.others_failed.append(f"{preset}: {message}")
 
     def render_failed(self, message: str, detail: str) -> None:
         self.failed.append(message)
@@ -153,3 +160,82 @@ def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
     assert np.abs(track.read("model", 2_000, 8_000)).max() < 1e-3
     assert np.abs(track.read("truth", 2_000, 8_000)).max() > 0.01
     assert np.isfinite(take.motion_m("model")).all()
+
+
+def test_struck_plucks_sound_to_their_ends(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
+    for position in (0.3, 0.4, 0.5):
+        worker.submit(request_of(small_preset, pluck=Pluck(position, 3.0), seconds=3.0))
+        worker.strike()
+    wait_until(lambda: bool(heard.finished) and all(track.complete for _, track in heard.started))
+    assert [take.pluck.position for take, _ in heard.started] == [0.3, 0.4, 0.5]
+    assert [take.pluck.position for take, _ in heard.finished] == [0.5]  # the others have left the stage
+    preset = load_preset(small_preset)
+    for take, track in heard.started:
+        assert track.ready_frames == pytest.approx(3 * 8_000, abs=8)
+        expected = render_sound(SoundRequest(preset, take.pluck, 0.37, 3.0, "truth"))
+        found = track.read("truth", 0, 2 * len(expected))[::2]
+        late = slice(8_000, 11_900)  # rendered off stage
+        assert found[late] == pytest.approx(expected[late], abs=3e-3 * np.abs(expected).max())
+
+
+def test_a_tail_that_nobody_plays_is_given_up(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
+    worker.submit(request_of(small_preset, seconds=12.0))
+    worker.strike()
+    wait_until(lambda: bool(heard.started))
+    worker.submit(request_of(small_preset, pluck=Pluck(0.6, 3.0)))
+    wait_until(lambda: len(heard.started) == 2)
+    heard.started.clear()
+    wait_until(lambda: bool(heard.finished) and not worker._tails)
+
+
+def test_stereo_solo_and_velocity_are_other_sounds_of_one_motion(
+    small_preset: Path, worker: RenderWorker, heard: Heard
+) -> None:
+    worker.submit(request_of(small_preset, sound_rate_hz=4_000))
+    wait_until(lambda: bool(heard.finished))
+    changes: list[dict[str, object]] = [{"listen_right": 0.63}, {"pickup": "velocity"}, {"solo": 2}]
+    for count, change in enumerate(changes, 1):
+        worker.submit(request_of(small_preset, sound_rate_hz=4_000, **change))
+        wait_until(lambda count=count: len(heard.replaced) == count)  # type: ignore[misc]
+    take = heard.started[0][0]
+    stereo, velocity, solo = (track for _, track in heard.replaced)
+    for side, listen in enumerate((0.37, 0.63)):
+        expected = take.signal_m("model", listen) / FULL_SCALE_M
+        assert stereo.read("model", 0, 4_000)[:, side] == pytest.approx(expected[:4_000], abs=1e-6)
+    signal_m = take.signal_m("truth", 0.37)[:, np.newaxis]
+    expected = Differentiator(4_000).feed(signal_m, last=True)[:4_000, 0] / FULL_SCALE_M_S
+    assert velocity.read("truth", 0, 4_000) == pytest.approx(expected, abs=1e-5)
+    spectrum = np.abs(np.fft.rfft(solo.read("truth", 0, 4_000) * np.hanning(4_000)))
+    assert 480 < spectrum.argmax() < 510  # the second partial of B3
+    assert spectrum[230:260].max() < 1e-3 * spectrum.max()
+
+
+def test_the_difference_and_the_matched_levels(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
+    worker.submit(request_of(small_preset))
+    wait_until(lambda: bool(heard.finished))
+    _, track = heard.started[0]
+    model, truth, difference = (track.read(name, 0, 8_000) for name in ("model", "truth", "difference"))
+    np.testing.assert_array_equal(difference, model - truth)
+    assert track.match_gains is not None
+    assert set(track.match_gains) == {"model", "truth"}
+    level = np.sqrt(np.mean(np.square(model * track.match_gains["model"])))
+    assert level == pytest.approx(np.sqrt(np.mean(np.square(truth))), rel=1e-4)
+
+
+def test_another_presets_model_is_a_source_at_its_own_rate(
+    small_preset: Path, tmp_path: Path, worker: RenderWorker, heard: Heard
+) -> None:
+    other = tmp_path / "other.safetensors"
+    shutil.copy(small_preset, other)
+    broken = tmp_path / "broken.safetensors"
+    broken.write_bytes(b"damaged")
+    worker.submit(request_of(small_preset, others=(other,)))
+    wait_until(lambda: bool(heard.finished))
+    take, track = heard.started[0]
+    assert track.sources == ("model", "truth", "preset:other", "difference")
+    np.testing.assert_array_equal(track.read("preset:other", 0, 8_000), track.read("model", 0, 8_000))
+    worker.submit(request_of(small_preset, others=(other, broken)))
+    wait_until(lambda: bool(heard.replaced))
+    assert "broken.safetensors" in heard.others_failed[0]
+    assert heard.replaced[0][0] is take
+    assert not heard.replaced[0][1].read("preset:broken", 0, 8_000).any()

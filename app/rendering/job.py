@@ -1,0 +1,174 @@
+"""One pluck in the worker's hands: its motion and its sound, made block by block."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from app.rendering.line import Line
+from app.rendering.request import OTHER, RenderListener, RenderRequest
+from app.rendering.sound import Read, Sound
+from app.rendering.take import SOURCES, Motion, Take
+from engine.preset import Preset, PresetError
+from engine.sources import ModelSource, TruthSource
+
+FIRST_STEPS = 256  # small, so that a pluck sounds at once
+BLOCK_FRAMES = 512  # what a processor's cache holds: four times as much takes six times as long
+TAIL_BLOCK_FRAMES = 1024  # without the motion more fit
+
+
+class Job:
+    """Renders a request; `advance` does the next piece of it.
+
+    Attributes:
+        struck: it is to sound to its end, even when it is no longer on stage.
+    """
+
+    def __init__(self, request: RenderRequest, load: Callable[[Path], Preset], listener: RenderListener) -> None:
+        self.request = request
+        self.struck = request.struck
+        self._started_s: float | None = None
+        self._load = load
+        self._listener = listener
+        self._lines: dict[str, Line] = {}
+        self._take: Take | None = None  # while it is on stage
+        self._sound: Sound | None = None
+        self._on_stage = True
+        self._measured = False
+
+    def ask_again(self, request: RenderRequest) -> None:
+        """The same motion is to be heard otherwise: the next `advance` makes its sound anew."""
+        self.request, self.struck = request, self.struck or request.struck
+        self._sound = None
+
+    def leave_stage(self) -> None:
+        """Another pluck takes over: only what sounds is rendered on, read off at the listening points."""
+        self._on_stage = False
+        if self._sound is not None:
+            self._sound.let_go()
+
+    def give_up(self) -> None:
+        if self._sound is not None:
+            self._sound.finish()
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing left to do, or, off stage, nobody who still plays it."""
+        if self._sound is None:
+            return not self._on_stage
+        if self._on_stage:
+            return self._measured and not self._sound.unfinished
+        return not self._sound.unfinished or self._sound.track is None
+
+    def ahead_s(self, now_s: float) -> float:
+        """How far the rendering is ahead of a playhead that has moved since the start."""
+        return 0.0 if self._started_s is None else self._rendered_s - (now_s - self._started_s)
+
+    @property
+    def started(self) -> bool:
+        """Whether its first block was told."""
+        return self._started_s is not None
+
+    @property
+    def _rendered_s(self) -> float:
+        truth = self._lines["truth"]
+        return truth.done / truth.rate_hz
+
+    def advance(self) -> None:
+        """Does a block.
+
+        Raises:
+            PresetError: the preset cannot be used.
+        """
+        if not self._on_stage:
+            self._advance_sound()
+            return
+        take = self._take = self._take or self._begin()
+        self._find_others(take)
+        if not take.complete:
+            model, truth = self._lines["model"], self._lines["truth"]
+            frames = min(BLOCK_FRAMES if truth.done else FIRST_STEPS + 1, take.frames - truth.done)
+            take.append(model.advance(frames), truth.advance(frames))
+            take.model_ends_s = model.ends_s
+        if self._advance_others(take):
+            self._make_sound(take)
+            if take.complete and not self._measured:
+                self._measured = True
+                self._listener.take_finished(take, take.error_sums())
+
+    def _begin(self) -> Take:
+        pluck, seconds = self.request.pluck, self.request.seconds
+        preset = self._load(self.request.preset)
+        self._lines["model"] = Line(ModelSource(preset), preset.info, pluck, seconds)
+        self._lines["truth"] = Line(TruthSource(preset.info), preset.info, pluck, seconds)
+        return Take(preset.name, preset.info, pluck, seconds)
+
+    def _find_others(self, take: Take) -> None:
+        """Begins the models of other presets that are asked for now and have not been yet."""
+        for path in self.request.others:
+            name = OTHER + path.stem
+            if name in self._lines:
+                continue
+            try:
+                preset = self._load(path)
+                line = Line(ModelSource(preset), preset.info, take.pluck, take.seconds)
+            except (PresetError, ValueError) as error:
+                line = Line(None, take.info, take.pluck, take.seconds)
+                self._listener.other_failed(path.stem, str(error))
+            self._lines[name] = line
+            take.others[name] = Motion(line.rate_hz, line.grid_points, take.seconds)
+
+    def _wanted(self) -> list[str]:
+        return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
+
+    def _advance_others(self, take: Take) -> bool:
+        """Renders a block of those that are behind; whether all have caught up."""
+        end_s = take.seconds + 1.0 if take.complete else take.ready_frames / take.info.rate_hz
+        left = 0
+        for name in self._wanted()[len(SOURCES) :]:
+            line = self._lines[name]
+            if frames := min(BLOCK_FRAMES, line.until(end_s)):
+                take.others[name].append(line.advance(frames))
+            left += line.until(end_s)
+        return left == 0
+
+    def _make_sound(self, take: Take) -> None:
+        """Feeds the track with what is new; one that is made anew is told when it is as long as the motion."""
+        sound, anew = self._sound, self._sound is None
+        if sound is None:
+            rates_hz = {name: self._lines[name].rate_hz for name in self._wanted()}
+            sound = Sound(rates_hz, take.seconds, self.request.listening, self.request.sound_rate_hz)
+            self._sound = sound
+        self._feed_motion(take, sound)
+        track = sound.track
+        assert track is not None
+        if not self.started:
+            self._started_s = time.monotonic()
+            self._listener.take_started(take, track)
+        elif anew:
+            self._listener.track_replaced(take, track)
+
+    def _feed_motion(self, take: Take, sound: Sound) -> None:
+        reads = {}
+        for name, done in sound.frames_read.items():
+            motion = take.motion(name)
+            frames = motion.read(done)
+            weights = sound.listening.weights(frames.shape[1]).float().numpy()
+            reads[name] = Read(frames @ weights, done + len(frames) == motion.frames)
+        sound.feed(reads)
+
+    def _advance_sound(self) -> None:
+        """Off stage: read off at the listening points at once, which costs a fraction of the motion."""
+        sound = self._sound
+        assert sound is not None
+        if self._take is not None:  # what was rendered but not yet heard, then the motion is forgotten
+            take, self._take = self._take, None
+            self._feed_motion(take, sound)
+        end_s = self._rendered_s + TAIL_BLOCK_FRAMES / self._lines["truth"].rate_hz
+        reads = {}
+        for name in sound.frames_read:
+            line = self._lines[name]
+            signal = line.advance(line.until(end_s), sound.listening.weights(line.grid_points))
+            reads[name] = Read(signal, line.done == line.frames)
+        sound.feed(reads)

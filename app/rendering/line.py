@@ -1,0 +1,63 @@
+"""One source of a take on its way: rendered onwards by blocks, silent from where it runs away."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from engine.pluck import Pluck
+from engine.preset import PresetInfo
+from engine.sources import Runaway, StringSource, project
+
+
+class Line:
+    """Frames of a source for a pluck, the initial displacement first.
+
+    Args:
+        source: None is a string at rest.
+
+    Attributes:
+        frames: how many there are in all.
+        done: frames rendered so far.
+        ends_s: the time of the last believable frame, where the source ran away; it is at rest from there on.
+    """
+
+    def __init__(self, source: StringSource | None, info: PresetInfo, pluck: Pluck, seconds: float) -> None:
+        self.rate_hz = info.rate_hz
+        self.grid_points = info.grid_points
+        self.frames = round(seconds * info.rate_hz) + 1
+        self.done = 0
+        self.ends_s: float | None = None
+        self._source = source
+        initial = project(pluck.displacement(info.grid_points), info.modes)[None]
+        self._initial = initial if source is not None else torch.zeros_like(initial)
+        self._state = None if source is None else source.start(initial)
+
+    def until(self, time_s: float) -> int:
+        """How many more frames there are before a time."""
+        return max(0, min(self.frames, math.ceil(time_s * self.rate_hz)) - self.done)
+
+    def advance(self, frames: int, readout: Tensor | None = None) -> NDArray[np.float32]:
+        """The next `frames` in m, (frames, grid_points), or (frames, points) where `readout` says."""
+        points = self.grid_points if readout is None else readout.shape[1]
+        blocks = [torch.zeros(0, points)]
+        first = self.done == 0 and frames > 0
+        if first:
+            blocks.append((self._initial if readout is None else self._initial @ readout).float())
+        if frames > first:
+            blocks.append(self._steps(frames - first, points, readout).float())
+        self.done += frames
+        return torch.cat(blocks).numpy()
+
+    def _steps(self, steps: int, points: int, readout: Tensor | None) -> Tensor:
+        if self._source is not None and self._state is not None and self.ends_s is None:
+            try:
+                block, self._state = self._source.advance(self._state, steps, readout)
+                return block[0]
+            except Runaway:  # at rest from here on: it must never reach a loudspeaker
+                self.ends_s = max(self.done - 1, 0) / self.rate_hz
+        return torch.zeros(steps, points)
