@@ -17,7 +17,8 @@ import torch
 from app.batch_index import INDEX, BatchIndex, BatchRow
 from app.export import ExportError, WavReport, default_file_name, export_sounds, settings_of
 from app.recipe import Recipe, RecipeError, read_recipe
-from app.sound import Cancelled, ExportCancelled, Pickup, SoundRequest, Source, Voices
+from app.sound import Cancelled, ExportCancelled, SoundRequest, Voices
+from app.sound_names import Pickup, Source
 from app.wav import WavSettings
 from engine.metrics import relative_error
 from engine.pluck import Pluck

@@ -252,11 +252,18 @@ class Controller(QObject):
         self.window.transport.show_playing(self.player.status().playing)
 
     def export(self) -> None:
-        entry = self.entry
-        if entry is None:
+        choices = self.session.choices
+        if self.entry is None:
             self.window.notices.tell("There is no preset to export: choose one first.")
             return
-        dialog = ExportDialog(self.library.entries, self.session.choices, self._settings.export, self.window)
+        dialog = ExportDialog(
+            self.library.entries,
+            choices,
+            self._settings.export,
+            self.window,
+            listen_right=choices.listen_right if choices.stereo else None,
+            pickup=choices.pickup,
+        )
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 

@@ -10,7 +10,7 @@ from app.library import Library
 from app.preset_folders import user_folder
 from app.preset_install import SUFFIX, InstallError, install_preset
 from app.recipe import Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
-from app.session import SECONDS_RANGE, Choices
+from app.session import DIFFERENCE_GAIN_RANGE_DB, SECONDS_RANGE
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,11 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
         "listen": recipe.listen,
         "seconds": min(max(recipe.seconds, low), high),
     }
-    if recipe.source in ("model", "truth"):
-        found["heard"] = recipe.source
-    more: dict[str, Any] = {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
+    found |= {"a": "model", "b": "truth", "heard": "b" if recipe.source == "truth" else "a", "solo": 0}
+    if recipe.source == "difference":
+        low, high = DIFFERENCE_GAIN_RANGE_DB
+        found |= {"a": "difference", "difference_gain_db": min(max(recipe.difference_gain_db, low), high)}
+    found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
     if recipe.listen_right is not None:
-        more["listen_right"] = recipe.listen_right
-    # what this version's window cannot choose it cannot restore
-    return found | {name: value for name, value in more.items() if name in Choices.model_fields}
+        found["listen_right"] = recipe.listen_right
+    return found

@@ -14,7 +14,9 @@ from typing import Any
 from app.session import Choices, Session
 
 # Not what is only looked at or listened to: views, speed, volume, loop, model or truth.
-RECORDED = frozenset({"preset", "position", "amplitude_mm", "shape", "width", "listen", "seconds"})
+PLUCK = ("preset", "position", "amplitude_mm", "shape", "width", "seconds")
+EARS = ("listen", "listen_right", "stereo", "pickup")
+RECORDED = frozenset({*PLUCK, *EARS})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 

@@ -38,11 +38,12 @@ TURNED = {  # field of `Choices` -> what it is
     "amplitude_mm": Turned("amplitude", 0.0, LARGEST_AMPLITUDE_MM),
     "width": Turned("width", *WIDTH_RANGE, logarithmic=True),
     "listen": Turned("listening point", 0.0, 1.0),
+    "listen_right": Turned("right listening point", 0.0, 1.0),
     "seconds": Turned("duration", *SECONDS_RANGE),
     "speed": Turned("slow motion", *SPEED_RANGE, logarithmic=True),
     "volume_db": Turned("volume", *VOLUME_RANGE_DB),
 }
-TurnedField = Literal["position", "amplitude_mm", "width", "listen", "seconds", "speed", "volume_db"]
+TurnedField = Literal["position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db"]
 Controller = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
 
 

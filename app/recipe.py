@@ -11,7 +11,8 @@ from typing import Literal
 import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from app.sound import LONGEST_S, Pickup, SoundRequest, Source
+from app.sound import LONGEST_S, SoundRequest
+from app.sound_names import Pickup, Source
 from app.version import PROGRAM, program_version
 from app.wav import RATE_RANGE_HZ, Bits, WavSettings
 from engine.pluck import Pluck

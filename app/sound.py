@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from app.rendering.velocity import Differentiator
-from app.sound_names import PICKUPS, Pickup, Source
+from app.sound_names import FULL_SCALE_M_S, PICKUPS, Pickup, Source
 from engine.pluck import Pluck
 from engine.preset import Preset
 from engine.sine_transform import listening_weights
@@ -25,7 +25,6 @@ from engine.sources import FULL_SCALE_M, ModelSource, Runaway, StringSource, Tru
 Voice = Literal["model", "truth"]
 VOICES: tuple[Voice, ...] = get_args(Voice)
 SOURCES: tuple[Source, ...] = get_args(Source)
-FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
 DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)

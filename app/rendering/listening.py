@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, get_args
 
 import torch
 from torch import Tensor
 
+from app.sound_names import FULL_SCALE_M_S, Pickup
 from engine.sine_transform import analysis_matrix, listening_weights
 from engine.sources import FULL_SCALE_M
-
-Pickup = Literal["displacement", "velocity"]
-PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
-FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Protocol
 
 from app.audio import Track
-from app.rendering.listening import Listening, Pickup
+from app.rendering.listening import Listening
 from app.rendering.take import Take
+from app.sound_names import Pickup
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 

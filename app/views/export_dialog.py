@@ -26,7 +26,7 @@ from app.export_job import ExportJob, Work
 from app.library import PresetEntry
 from app.session import Choices
 from app.settings import ExportChoices
-from app.sound import Pickup
+from app.sound_names import Pickup
 from app.views.export_pages import BatchPage, SoundPage
 from app.views.sound_form import SoundForm, wav_settings
 from engine.preset import load_preset

@@ -22,7 +22,8 @@ from app.export import Source, default_file_name
 from app.library import PresetEntry
 from app.session import Choices
 from app.settings import BatchChoices, ExportChoices
-from app.sound import SOURCES, Pickup
+from app.sound import SOURCES
+from app.sound_names import Pickup
 from app.views.parts import combo_box, tool_button
 from app.views.sound_form import label, row_of, wav_settings
 from engine.pluck import Pluck

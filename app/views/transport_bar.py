@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.rendering import FULL_SCALE_M_S
 from app.session import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
+from app.sound_names import FULL_SCALE_M_S
 from app.views.knob import Knob, KnobRange
 from app.views.meter import Meter
 from app.views.parts import combo_box, tool_button, vertical_rule

@@ -22,9 +22,10 @@ coordinates (a near-identity transform):
 
 with real matrices on [Re z², Im z²] that yield log gain (bounded as above) and phase.
 
-Adiabatic change. What a falling tension leaves alone is a mode's action, ω q²: as the pitch falls the amplitude
-gains. With A_in and A_out, real, the exponents have A |z|² beside M z², so that |z| may be the action's root, which
-decays by σ alone; then E(s) above is right long after the start.
+Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, κ = Im K E, so that f has ω√(1 + 2κ/ω) - ω in place of κ,
+which matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the pitch
+falls the amplitude gains. With A_in and A_out, real, the exponents have ± log(1 + 4|a|)/4, a = A |z|², beside M z², so
+that |z| may be the action's root, which decays by σ alone; then E(s) above is right long after the start.
 
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
 parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
@@ -80,7 +81,8 @@ class IntegratedPhaseConfiguration:
         multiplier_widths: hidden widths of Koopman_var's multiplier, 1 + MLP(|z|²). Evaluated at every frame.
         decoder_widths: hidden widths of an MLP that is added to the linear decoder. Evaluated at every frame.
         modulation: whether there are M_in and M_out. Evaluated at every frame.
-        adiabatic: whether there are A_in and A_out, too; they need the modulation.
+        adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out, too, which need
+            the modulation.
         node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
         rate_unit: unit of K E and of g in radians and nepers a sample. A weight of 1 turns a phase by one radian in
             1/rate_unit samples, the order of a training horizon, so that an optimiser's usual steps suit.
@@ -123,7 +125,7 @@ class IntegratedPhaseState:
     Attributes:
         origin: z(0), complex (batch, state_size).
         time: samples of the trained rate since then. A fraction, so that thirds of a sample add up exactly.
-        integral: ∫ g(E) - g(0) from 0 to the node before the last one that `time` has reached, float64
+        integral: ∫ f(E) - K E from 0 to the node before the last one that `time` has reached, float64
             (batch, 2 state_size) with the real parts first.
     """
 
@@ -374,8 +376,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         f = (energy * fading) @ rates.coupling
         integral = (energy * ((1 - fading) / (2 * rates.sigma))) @ rates.coupling
         integral_at_end = state.integral
-        if self.g is not None:
-            to_times, slopes, to_end = self._integrate_network(state, rates, energy, times, end)
+        if self.g is not None or self.configuration.adiabatic:
+            to_times, slopes, to_end = self._integrate_higher_orders(state, rates, energy, times, end)
             integral = integral + state.integral[:, None] + to_times
             f = f + slopes
             integral_at_end = integral_at_end + to_end
@@ -391,30 +393,40 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         )
         return motion, integral_at_end
 
-    def _integrate_network(
+    def _integrate_higher_orders(
         self, state: IntegratedPhaseState, rates: _Rates, energy: Tensor, times: Tensor, end: Fraction
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """g(E) - g(0) integrated from where the state's integral ends.
+        """What f has beside K E, integrated from where the state's integral ends.
 
         Returns:
             to each of `times`, and the slopes there, float64 (batch, times, 2 state_size); to where the integral of a
             state at the time `end` ends, (batch, 2 state_size).
         """
-        assert self.g is not None
-        spacing, dtype = self.configuration.node_spacing, self.K.dtype
+        spacing = self.configuration.node_spacing
         first, last = _integrated_nodes(state.time, spacing), _integrated_nodes(end, spacing)
         segments = max(1, math.ceil(float(times.max()) / spacing) - first, last - first)
         nodes = torch.arange(2 * segments + 1, device=times.device).double() * (spacing / 2) + first * spacing
-        energies = energy * torch.exp(-2 * rates.sigma * nodes[:, None])
-        if self.energy_units is not None:
-            energies = energies * self.energy_units
-        f = self.g(energies.to(dtype)) - self.g(energy.new_zeros(energy.shape[-1], dtype=dtype))
-        f = f.double() * self._rate_units
-        if self.configuration.second_order:
-            f = f * energies.sum(-1, keepdim=True)
+        f = self._higher_orders(energy * torch.exp(-2 * rates.sigma * nodes[:, None]), rates)
         positions = torch.cat([times / spacing - first, times.new_tensor([float(last - first)])])
         integrals, slopes = integrate_parabolas(f, positions)
         return integrals[:, :-1] * spacing, slopes[:, :-1], integrals[:, -1] * spacing
+
+    def _higher_orders(self, energies: Tensor, rates: _Rates) -> Tensor:
+        """f(E) - K E of energies (..., state_size), float64 (..., 2 state_size)."""
+        f = energies.new_zeros(*energies.shape[:-1], 2 * len(rates.omega))
+        if self.g is not None:
+            told = energies if self.energy_units is None else energies * self.energy_units
+            dtype = self.K.dtype
+            network = self.g(told.to(dtype)) - self.g(told.new_zeros(told.shape[-1], dtype=dtype))
+            f = network.double() * self._rate_units
+            if self.configuration.second_order:
+                f = f * told.sum(-1, keepdim=True)
+        if self.configuration.adiabatic:
+            linear = (energies @ rates.coupling).chunk(2, dim=-1)[1]
+            share = (linear / rates.omega).clamp(min=-0.4)  # a string's is above 0
+            stiffer = rates.omega * ((1 + 2 * share).sqrt() - 1 - share)
+            f = torch.cat([f[..., : len(rates.omega)], f[..., len(rates.omega) :] + stiffer], dim=-1)
+        return f
 
     @property
     def _has_linear_decoder(self) -> bool:
@@ -458,7 +470,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         growth, turn = exponent.chunk(2, dim=-1)
         if adiabatic is not None:
             weight = (adiabatic * self._modulation_units[..., :n])[alive][:, alive]
-            growth = growth + nn.functional.linear(real.square() + imag.square(), weight)
+            change = nn.functional.linear(real.square() + imag.square(), weight)
+            growth = growth + change.sign() * torch.log1p(4 * change.abs()) / 4
         gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
         cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
         return real * cosine - imag * sine, real * sine + imag * cosine

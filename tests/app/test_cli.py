@@ -11,7 +11,7 @@ import typer
 from app import cli
 from app.commands import arguments, render
 from app.export import BITS, SOURCES
-from app.sound import PICKUPS
+from app.sound_names import PICKUPS
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = [

@@ -26,6 +26,7 @@ from app.export import (
     write_wav,
 )
 from app.recipe import Recipe
+from app.sound_names import FULL_SCALE_M_S
 from app.wav_chunks import Marker, read_markers
 from engine.pluck import Pluck
 from engine.preset import load_preset
@@ -210,7 +211,7 @@ def test_a_right_listening_point_makes_stereo(request_: SoundRequest) -> None:
 
 def test_velocity_is_the_derivative_of_displacement(request_: SoundRequest) -> None:
     displacement_m = render_sound(request_) * FULL_SCALE_M
-    expected = np.gradient(displacement_m, 1 / 4000) / sound.FULL_SCALE_M_S
+    expected = np.gradient(displacement_m, 1 / 4000) / FULL_SCALE_M_S
     found = render_sound(replace(request_, pickup="velocity"))
     slow = np.convolve(found - expected, np.ones(16) / 16, "valid")  # central differences are low at high partials
     assert np.abs(slow[4:]).max() < 0.05 * np.abs(found).max()

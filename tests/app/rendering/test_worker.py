@@ -15,8 +15,9 @@ import torch
 
 from app.audio import Track
 from app.export import SoundRequest, render_sound
-from app.rendering import FULL_SCALE_M_S, RenderRequest, RenderWorker, Take
+from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering.velocity import Differentiator
+from app.sound_names import FULL_SCALE_M_S
 from engine.metrics import ErrorSums
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
