@@ -32,6 +32,7 @@ from training.pursuit import LatentFit, pursue
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
+PURSUIT = "matching pursuit"  # see `pursuit`
 TELL_EVERY_S = 5.0  # within an epoch
 EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
 COUPLING = "K"  # of an integrated phase: too
@@ -129,6 +130,10 @@ def initialisation_of(configuration: TrainingConfiguration) -> str:
     """How a run's model starts: the recipe's choice, or its source's own."""
     if configuration.model == "dmd":
         return LEAST_SQUARES
+    return PURSUIT if configuration.recipe.latent_epochs else _start(configuration)
+
+
+def _start(configuration: TrainingConfiguration) -> str:
     return configuration.recipe.initialisation or MODELS[configuration.model][0].initialisations[0]
 
 
@@ -137,7 +142,7 @@ def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringMod
     data = configuration.data
     model = build_model(configuration.model, configuration.model_configuration)
     model.initialise(
-        initialisation_of(configuration),
+        _start(configuration),
         Physics(data.string, data.modes, data.rate_hz, scale_m, data.tension_modulated),
         torch.Generator().manual_seed(configuration.recipe.seed),
     )

@@ -22,10 +22,10 @@ coordinates (a near-identity transform):
 
 with real matrices on [Re z², Im z²] that yield log gain (bounded as above) and phase.
 
-Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, κ = Im K E, so that f has ω√(1 + 2κ/ω) - ω in place of κ,
-which matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the pitch
-falls the amplitude gains. With A_in and A_out, real, the exponents have ± log(1 + 4|a|)/4, a = A |z|², beside M z², so
-that |z| may be the action's root, which decays by σ alone; then E(s) above is right long after the start.
+Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, κ = Im K E, so that f has ω√(1 + 2κ/ω) - ω in place of
+κ, which matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the
+pitch falls the amplitude gains. With A_in and A_out, real, the exponents have ± log(1 + 4|a|)/4, a = A |z|², beside
+M z², so that |z| may be the action's root, which decays by σ alone; then E(s) above is right long after the start.
 
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
 parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
