@@ -437,7 +437,7 @@ class Controller(QObject):
     def _select(self) -> None:
         """Lets the chosen slot be heard, as soon as there is a track that has what it holds."""
         source = self.session.source_heard
-        if self._loaded is not None and source in self._loaded.sources:
+        if self._abx is None and self._loaded is not None and source in self._loaded.sources:
             self.player.select(source)
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:

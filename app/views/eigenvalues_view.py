@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.poles import PoleFigure, Poles
 from app.views import theme
-from app.views.parts import ENTER_KEYS, combo_box, keeps_enter, words_label
+from app.views.parts import ENTER_KEYS, combo_box, keeps_own_keys, words_label
 
 NEAR_PIXELS = 16
 CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
@@ -271,8 +271,8 @@ class _Plane(pg.PlotWidget):
         super().leaveEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Enter is the plane's own while it has the keyboard, whatever the window's shortcuts say."""
-        return keeps_enter(event) or bool(super().event(event))
+        """Enter and Esc are the plane's own while it has the keyboard, whatever the window's shortcuts say."""
+        return keeps_own_keys(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()))

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, PlanePicture, nearest_cell, refine
 from app.views import theme
-from app.views.parts import ENTER_KEYS, keeps_enter, words_label
+from app.views.parts import ENTER_KEYS, keeps_own_keys, words_label
 from app.views.progress_strip import ProgressStrip
 
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
@@ -190,8 +190,8 @@ class _Map(pg.PlotWidget):
         super().leaveEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Enter is the map's own while it has the keyboard, whatever the window's shortcuts say."""
-        return keeps_enter(event) or bool(super().event(event))
+        """Enter and Esc are the map's own while it has the keyboard, whatever the window's shortcuts say."""
+        return keeps_own_keys(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {

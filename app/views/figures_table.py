@@ -26,7 +26,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.views import theme
-from app.views.parts import ENTER_KEYS, keeps_enter
+from app.views.parts import ENTER_KEYS, keeps_own_keys
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
@@ -127,8 +127,8 @@ class FiguresTable(QTableView):
         QGuiApplication.clipboard().setText(self.text())
 
     def event(self, event: QEvent) -> bool:
-        """Enter is the table's own while it has the keyboard, whatever the window's shortcuts say."""
-        return keeps_enter(event) or super().event(event)
+        """Enter and Esc are the table's own while it has the keyboard, whatever the window's shortcuts say."""
+        return keeps_own_keys(event) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Copy):

@@ -38,10 +38,10 @@ def words_label() -> QLabel:
     return label
 
 
-def keeps_enter(event: QEvent) -> bool:
-    """True, and the event accepted, where it asks whether Enter is the focused widget's own or a shortcut's."""
+def keeps_own_keys(event: QEvent) -> bool:
+    """True, and the event accepted, where it asks whether Enter or Esc is the focused widget's own."""
     asks = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
-    if asks and event.key() in ENTER_KEYS:  # type: ignore[attr-defined]
+    if asks and event.key() in (*ENTER_KEYS, Qt.Key.Key_Escape):  # type: ignore[attr-defined]
         event.accept()
         return True
     return False

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
-from app.library import PresetEntry
 from app.session import Choices
 from app.views import theme
 from app.views.parts import tool_button
+
+if TYPE_CHECKING:
+    from app.library import PresetEntry
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)

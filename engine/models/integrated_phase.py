@@ -22,10 +22,11 @@ coordinates (a near-identity transform):
 
 with real matrices on [Re z², Im z²] that yield log gain (bounded as above) and phase.
 
-Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, κ = Im K E, so that f has ω√(1 + 2κ/ω) - ω in place of
-κ, which matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the
-pitch falls the amplitude gains. With A_in and A_out, real, the exponents have ± log(1 + 4|a|)/4, a = A |z|², beside
-M z², so that |z| may be the action's root, which decays by σ alone; then E(s) above is right long after the start.
+Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, so that f has ω√(1 + 2κ/ω) - ω in place of κ, which
+matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the pitch
+falls the amplitude gains. So |z| may be the action's root, which decays by σ alone, for then E(s) above is right long
+after the start: κ = Im K q² is taken of the amplitudes that the actions E mean, q² = E / √(1 + 2κ/ω), and with A_in
+and A_out, real, the exponents have ± log(1 + 4|A q²|)/4 beside M z².
 
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
 parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
@@ -66,6 +67,8 @@ MOST_PRODUCTS = 1024  # frames of a listening point's segment: rounding grows wi
 MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
 LISTENING_POINTS = 8  # at most: more are better read off with matrix products
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
+FIXED_POINT_STEPS = 2  # from an action to the amplitude that it means: the error is of fourth order in ΔT/T₀
+LEAST_SHARE = -0.4  # of κ/ω; a string's is above 0
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
 
 
@@ -422,10 +425,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             if self.configuration.second_order:
                 f = f * told.sum(-1, keepdim=True)
         if self.configuration.adiabatic:
-            linear = (energies @ rates.coupling).chunk(2, dim=-1)[1]
-            share = (linear / rates.omega).clamp(min=-0.4)  # a string's is above 0
-            stiffer = rates.omega * ((1 + 2 * share).sqrt() - 1 - share)
-            f = torch.cat([f[..., : len(rates.omega)], f[..., len(rates.omega) :] + stiffer], dim=-1)
+            f = f + nn.functional.pad(_stiffening(energies, rates), (len(rates.omega), 0))
         return f
 
     @property
@@ -470,8 +470,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         growth, turn = exponent.chunk(2, dim=-1)
         if adiabatic is not None:
             weight = (adiabatic * self._modulation_units[..., :n])[alive][:, alive]
-            change = nn.functional.linear(real.square() + imag.square(), weight)
-            growth = growth + change.sign() * torch.log1p(4 * change.abs()) / 4
+            growth = growth + _adiabatic_change(real.square() + imag.square(), weight)
         gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
         cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
         return real * cosine - imag * sine, real * sine + imag * cosine
@@ -561,6 +560,30 @@ def _imaginary_parts(kind: InputKind, log_eigenvalues: Tensor) -> tuple[Tensor, 
     if kind == "two_frames":
         return -1 / omega.tan(), torch.exp(-sigma) / omega.sin()
     return -sigma / omega, -1 / omega if kind == "displacement_velocity" else None
+
+
+def _stiffening(energies: Tensor, rates: _Rates) -> Tensor:
+    """ω√(1 + 2κ/ω) - ω - Im K E of actions E (..., state_size), where κ = Im K q² of the amplitudes' squares q²."""
+    n = len(rates.omega)
+    coupling = rates.coupling[:, n:] / rates.omega
+    linear = energies @ coupling
+    share = linear
+    for _ in range(FIXED_POINT_STEPS):
+        share = (energies / (1 + 2 * share.clamp(min=LEAST_SHARE)).sqrt()) @ coupling
+    return rates.omega * ((1 + 2 * share.clamp(min=LEAST_SHARE)).sqrt() - 1 - linear)
+
+
+def _adiabatic_change(squares: Tensor, weight: Tensor) -> Tensor:
+    """The nepers by which a mode's amplitude is below its action's root, or above: ± log(1 + 4|A q²|)/4.
+
+    Args:
+        squares: of the amplitudes where A is positive (an encoder's), of the actions' roots where it is negative.
+    """
+    change = nn.functional.linear(squares, weight)
+    falls = (change < 0).to(change.dtype)
+    for _ in range(FIXED_POINT_STEPS):  # q² = |z|² / √(1 + 4|A q²|)
+        change = nn.functional.linear(squares * (1 - falls + falls / (1 + 4 * change.abs()).sqrt()), weight)
+    return change.sign() * torch.log1p(4 * change.abs()) / 4
 
 
 def averaged_coupling(physics: Physics) -> Tensor:

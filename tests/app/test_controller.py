@@ -235,7 +235,8 @@ def test_a_broken_preset_is_told_and_the_app_goes_on(
     qtbot: QtBot, controller: Controller, preset_folder: Path
 ) -> None:
     wait_for_take(qtbot, controller)
-    (preset_folder / "second.safetensors").write_bytes(b"damaged")
+    (preset_folder / "damaged").write_bytes(b"damaged")
+    (preset_folder / "damaged").replace(preset_folder / "second.safetensors")  # not in place, while it may be read
     controller.session.update(preset="second")
     qtbot.waitUntil(lambda: "second.safetensors" in controller.window.notices.text, timeout=5_000)
     controller.session.update(preset="first", position=0.45)

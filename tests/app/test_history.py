@@ -90,13 +90,13 @@ def test_a_drag_back_to_its_start_is_no_step(clock: Clock) -> None:
 def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(clock: Clock) -> None:
     session = Session()
     history = History(session, clock)
-    session.update(volume_db=-6, heard="truth", loop=True, speed=1, left_view="x", motion=False, envelope=False)
+    session.update(volume_db=-6, heard="b", loop=True, speed=1, left_view="x", motion=False, envelope=False)
     assert not history.can_undo
     session.update(position=0.6)
     session.update(volume_db=-9)
     history.undo()
     assert session.choices == Choices(
-        volume_db=-9, heard="truth", loop=True, speed=1, left_view="x", motion=False, envelope=False
+        volume_db=-9, heard="b", loop=True, speed=1, left_view="x", motion=False, envelope=False
     )
     assert set(Choices.model_fields) > RECORDED
 

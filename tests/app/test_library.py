@@ -115,7 +115,12 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
         "width": 0.2,
         "listen": 0.22,
         "seconds": 0.7,
-        "heard": "truth",
+        "a": "model",
+        "b": "truth",
+        "heard": "b",
+        "solo": 0,
+        "stereo": False,
+        "pickup": "displacement",
     }
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
     os.utime(preset_folder / "second.safetensors", ns=(1, 1))
@@ -124,7 +129,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     dropped = receive(tmp_path / "c.wav", library)
     assert "its duration of 0.1 s" in dropped.notice
     assert dropped.choices["seconds"] == 0.5
-    assert "heard" not in dropped.choices
+    assert (dropped.choices["a"], dropped.choices["heard"]) == ("difference", "a")
 
 
 def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Path) -> None:

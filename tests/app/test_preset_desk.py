@@ -85,7 +85,7 @@ def test_keys_of_the_window_rest_while_the_search_is_typed_in(
     qtbot: QtBot, controller: Controller, browser: PresetBrowser
 ) -> None:
     qtbot.keyClick(browser.list, KEY.Key_X)
-    assert controller.session.choices.heard == "model"
+    assert controller.session.choices.heard == "a"
     assert browser.search.text() == "x"
 
 
@@ -179,7 +179,7 @@ def test_dropped_files_are_taken_in(
     drop(controller, tmp_path / "a.wav")
     choices = controller.session.choices
     assert (choices.pluck, choices.listen, choices.seconds) == (Pluck(0.5, 2.0), 0.3, 0.6)
-    assert (choices.preset, choices.heard) == ("first", "truth")
+    assert (choices.preset, choices.source_heard) == ("first", "truth")
     monkeypatch.setattr("app.dropping.restored_choices", lambda recipe: {"listen": 3})
     drop(controller, tmp_path / "a.wav")
     assert "its choices cannot be restored here (listen: " in controller.window.notices.text

@@ -71,7 +71,7 @@ def test_rows_without_figures_say_why(info: PresetInfo, job: Job) -> None:
 def test_a_model_that_ran_away_is_measured_as_far_as_it_goes(info: PresetInfo, job: Job) -> None:
     take = take_of(info, Pluck(0.37, 4.0), [1.0] * 10)
     take.model_ends_s = 0.05
-    take._motion_m["model"][201:] = 0
+    take.motion_m("model")[201:] = 0
     rows = take_partials(take, job)
     assert set(rows) == {"trained", "all"}
     assert rows["all"][0].level_db == pytest.approx(0, abs=0.01)

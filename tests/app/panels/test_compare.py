@@ -62,7 +62,9 @@ def test_enter_loads_a_preset(qtbot: QtBot, controller: Controller, shown: Any) 
 def test_a_bad_preset_is_a_row_with_the_reason(
     qtbot: QtBot, controller: Controller, shown: Any, preset_folder: Path
 ) -> None:
-    (preset_folder / "second.safetensors").write_bytes(b"damaged")
+    damaged = preset_folder / "damaged"
+    damaged.write_bytes(b"damaged")
+    damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
     qtbot.waitUntil(lambda: "second.safetensors" in figures(shown)["second"][-1], timeout=20_000)
     assert is_computed(shown, {"first"})
 

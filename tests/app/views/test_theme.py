@@ -47,7 +47,9 @@ def test_contrast_is_that_of_the_standard() -> None:
 def test_the_names_are_those_of_the_present_face(dark_again: None) -> None:
     theme.use(theme.LIGHT)
     assert (theme.LIGHT.model, theme.LIGHT.text) == (theme.MODEL, theme.TEXT)
-    assert {"model": theme.LIGHT.model, "truth": theme.LIGHT.truth} == theme.SOURCE_COLOURS
+    light = theme.LIGHT
+    wanted = {"model": light.model, "truth": light.truth, "difference": light.difference, "other": light.other}
+    assert wanted == theme.SOURCE_COLOURS
 
 
 def test_plots_take_on_another_face_and_come_back(

@@ -10,7 +10,7 @@ from torch import Tensor
 from engine.excitation import draw_gaussians, draw_noise
 from engine.models import MODELS, IntegratedPhaseConfiguration, KoopmanIntegrated, count_parameters
 from engine.models.base import Physics
-from engine.models.integrated_phase import integrate_parabolas
+from engine.models.integrated_phase import FIXED_POINT_STEPS, integrate_parabolas
 from engine.reference import ModalState, SplittingSolver, solve_linear
 from engine.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
 from engine.string import StringParameters
@@ -73,9 +73,12 @@ def test_agrees_with_a_plain_quadrature(sizes: dict) -> None:
             network = model.g(told) - model.g(torch.zeros(12).double())
             found = found + (network * told.sum(-1, keepdim=True) if c.second_order else network)
         found = found * (c.rate_unit if model.rate_units is None else torch.cat([model.rate_units] * 2))
-        if c.adiabatic:  # ω' ² = ω² + 2ωκ
-            kappa = (told @ model.K.T)[:, 12:] * model.rate_units
-            found[:, 12:] += (omega.square() + 2 * omega * kappa).sqrt() - omega - kappa
+        if c.adiabatic:  # ω' ² = ω² + 2ωκ, κ of the amplitudes of these actions
+            linear = kappa = (told @ model.K.T)[:, 12:] * model.rate_units
+            for _ in range(FIXED_POINT_STEPS):
+                amplitudes = told * omega.sqrt() / (omega + 2 * kappa).sqrt()
+                kappa = (amplitudes @ model.K.T)[:, 12:] * model.rate_units
+            found[:, 12:] += (omega.square() + 2 * omega * kappa).sqrt() - omega - linear
         return found
 
     fine = torch.arange(60 * 100 + 1, dtype=torch.float64) / 100
