@@ -13,6 +13,7 @@ SHAPES: tuple[Shape, ...] = get_args(Shape)
 POSITION_RANGE = (0.02, 0.98)
 WIDTH_RANGE = (0.02, 0.5)
 LARGEST_AMPLITUDE_MM = 20.0
+FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
 DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is still there
 
 

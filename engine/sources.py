@@ -13,11 +13,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from engine.pluck import FULL_SCALE_M
 from engine.preset import Preset, PresetInfo
 from engine.reference import ModalState, SplittingSolver
 from engine.sine_transform import synthesis_matrix, to_grid, to_modes
 
-FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
 RUNAWAY_FACTOR = 20.0  # a string let go never exceeds about its initial peak
 
 

@@ -19,8 +19,7 @@ from app.views.knob import Knob, KnobRange
 from app.views.meter import Meter
 from app.views.parts import combo_box, tool_button, vertical_rule
 from app.views.slot_buttons import SlotButtons
-from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
-from engine.sources import FULL_SCALE_M
+from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
 
 _SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
 
