@@ -84,8 +84,6 @@ class Recipe:
         for name in ("warm_up", "grow_until", "average_decay"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must lie in 0 … 1, not {getattr(self, name)}")
-        if self.latent_epochs > self.epochs:
-            raise ValueError(f"latent_epochs must be at most epochs, {self.epochs}, not {self.latent_epochs}")
 
 
 @dataclass(frozen=True)

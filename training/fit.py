@@ -173,15 +173,16 @@ class _Run:
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
         self._configuration, self._recipe, self._dataset = configuration, recipe, dataset
-        self._model = new_model(configuration, dataset.scale_m).to(device)
+        self._model = new_model(configuration, dataset.scale_m)
+        self._latents: LatentFit | None = None
+        if recipe.latent_epochs:
+            generator = torch.Generator().manual_seed(recipe.seed)
+            self._latents = pursue(self._model, dataset, configuration.steps, generator).to(device)
+        self._model.to(device)
         kind = self._model.configuration.input
         if recipe.random_start and kind != "displacement_velocity":
             raise ValueError("recipe.random_start needs a model of the input 'displacement_velocity'")
         self._data = TrainingData(dataset, configuration.steps, kind, device)
-        self._latents: LatentFit | None = None
-        if recipe.latent_epochs:
-            generator = torch.Generator().manual_seed(recipe.seed)
-            self._latents = pursue(self._model, dataset, configuration.steps, generator)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
         self._optimiser = _optimiser(self._model, recipe)
         self._average: AveragedModel | None = None
@@ -212,7 +213,7 @@ class _Run:
     @property
     def _latent_steps(self) -> int:
         """Those in which the encoder learns the fitted latents; until their end there is no prediction."""
-        return self._recipe.latent_epochs * self._per_epoch
+        return min(self._recipe.latent_epochs, self._recipe.epochs) * self._per_epoch
 
     @property
     def validation_is_due(self) -> bool:

@@ -13,7 +13,7 @@ It uses the string's modes and linear frequencies: prior knowledge that the pape
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor, nn
@@ -51,6 +51,11 @@ class LatentFit:
     mirror: Tensor
     mixing: Tensor
 
+    def to(self, device: torch.device) -> LatentFit:
+        """The same on a device."""
+        moved = {name: getattr(self, name).to(device) for name in ("initial", "targets", "mirror", "mixing")}
+        return replace(self, **moved)
+
     def loss(self, model: StringModel, recipe: Recipe, rows: Tensor, iteration: int) -> tuple[Tensor, Tensor]:
         """The error of the coordinates, and the mean square of the prediction's, of the trajectories `rows`."""
         assert isinstance(model, Koopman)
@@ -71,9 +76,8 @@ class LatentFit:
         assert isinstance(model, Koopman)
         last = model.encoder[-1]
         assert isinstance(last, nn.Linear)
-        mixing = self.mixing.double().to(last.weight.device)
-        last.bias.copy_(mixing @ last.bias.double())
-        last.weight.copy_(mixing @ last.weight.double())
+        last.bias.copy_(self.mixing @ last.bias.double())
+        last.weight.copy_(self.mixing @ last.weight.double())
 
 
 def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator) -> LatentFit:
@@ -119,8 +123,7 @@ def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Ge
     unit = float(targets.square().mean().sqrt())
     model.store_basis(log_eigenvalues, shapes, generator)
     initial = (amplitudes[:, 0] @ sines).float()
-    device = model.nu_log.device
-    return LatentFit(initial.to(device), (targets / unit).float().to(device), unit, mirror.to(device), unit * mixing)
+    return LatentFit(initial, (targets / unit).float(), unit, mirror, unit * mixing)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,68 @@
+"""Koopman's start by matching pursuit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from engine.models import Koopman, KoopmanConfiguration, KoopmanVar, KoopmanVarConfiguration
+from engine.sine_transform import synthesis_matrix
+from training.configuration import Recipe
+from training.dataset import Dataset
+from training.pursuit import pursue
+
+STEPS = 400
+
+
+def koopman(state_size: int = 40) -> Koopman:
+    sizes = KoopmanConfiguration(state_size=state_size, encoder_widths=(24,), decoder_widths=(24, 24))
+    model = Koopman(sizes)
+    model.initialise("paper", None, torch.Generator().manual_seed(0))  # type: ignore[arg-type]
+    return model
+
+
+@torch.no_grad()
+def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(small_dataset: Dataset) -> None:
+    model = koopman()
+    latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0))
+    parts = latents.targets.double() @ latents.mixing.T
+    origin = torch.complex(*parts.chunk(2, dim=1)).to(torch.complex64)
+    found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
+    amplitudes = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m
+    truth = amplitudes @ synthesis_matrix(101, 5).float()
+    assert float((found - truth).square().sum() / truth.square().sum()) < 1e-3
+    energies = latents.targets.square().sum(1) * latents.unit**2
+    assert torch.allclose(energies, amplitudes.square().mean(1).sum(1), rtol=1e-3)
+
+
+@torch.no_grad()
+def test_its_loss_is_the_error_of_the_prediction(small_dataset: Dataset) -> None:
+    """In coordinates as on the string: any encoder will do."""
+    model = koopman()
+    latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0))
+    rows = torch.arange(16)
+    _, error = latents.loss(model, Recipe(epochs=1, flip=False), rows, 0)
+    latents.yield_latents(model)
+    truth = (small_dataset.split("train")[:, : STEPS + 1] / small_dataset.scale_m) @ synthesis_matrix(101, 5).float()
+    found = model(truth[:, 0], STEPS)
+    assert float((found - truth[:, 1:]).square().mean()) == pytest.approx(float(error), rel=0.03)
+
+
+def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> None:
+    """A model that does not care for its input is as wrong about a string as about its mirror image."""
+    latents = pursue(koopman(), small_dataset, STEPS, torch.Generator().manual_seed(0))
+    amplitudes = small_dataset.split("train")[:, 0] / small_dataset.scale_m
+    signs = torch.tensor([1.0, -1, 1, -1, 1])
+    mirrored = (amplitudes * signs) @ synthesis_matrix(101, 5).float()
+    assert torch.allclose(latents.initial.flip(1), mirrored, atol=1e-5)
+    assert set(latents.mirror.tolist()) == {1.0, -1.0}
+
+
+def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> None:
+    with pytest.raises(ValueError, match="needs the model 'koopman'"):
+        pursue(KoopmanVar(KoopmanVarConfiguration()), small_dataset, STEPS, torch.Generator())
+    strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
+    with pytest.raises(ValueError, match="stride must be 1, not 2"):
+        pursue(koopman(), strided, STEPS, torch.Generator())
