@@ -133,7 +133,8 @@ class MainWindow(QMainWindow):
         head.setSpacing(10)
         head.addWidget(self._brand)
         head.addWidget(self.presets, 1)
-        test = tool_button("ABX …", "Listening test", "Can you tell model and truth apart, blind? (Ctrl+T)")
+        tip = "Can you tell model and truth apart, blind? (Ctrl+T)"
+        self._test_button = test = tool_button("ABX …", "Listening test", tip)
         test.clicked.connect(self.abx_asked)
         for widget in (test, self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
             head.addWidget(widget)
@@ -195,7 +196,7 @@ class MainWindow(QMainWindow):
             QWidget.setTabOrder(before, after)
 
     def _set_alive(self, alive: bool) -> None:
-        for part in (self.presets, self.transport, self._audio_button, self._menu_button):
+        for part in (self.presets, self.transport, self._test_button, self._audio_button, self._menu_button):
             part.setEnabled(alive)
         self._decks.setVisible(alive)
         self.rate_label.setVisible(alive)

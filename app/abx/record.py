@@ -15,6 +15,7 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from app.abx.trials import LARGEST_SEED, MOST_TRIALS, Run, Trial, draw_order, p_value
+from app.sound_names import Pickup
 from app.version import program_version
 from app.whole_file import WriteError, explain, whole_file
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Shape
@@ -52,7 +53,10 @@ class HeardPluck(BaseModel):
     amplitude_mm: Annotated[float, Field(ge=0, le=LARGEST_AMPLITUDE_MM)]
     shape: Shape
     width: Annotated[float, Field(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])]
-    listen: Annotated[float, Field(ge=0, le=1)]
+    listen: Annotated[float, Field(ge=0, le=1)]  # the left or only one
+    listen_right: Annotated[float, Field(ge=0, le=1)] | None = None
+    pickup: Pickup = "displacement"
+    solo: Annotated[int, Field(ge=0)] = 0
     seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 

@@ -75,14 +75,19 @@ def make_stimuli(track: Track, sources: Sequence[str], volume_db: float = 0.0) -
     room = min(1.0, LARGEST_PEAK / peak)
     gains = [gain * room for gain in gains]
     levelled = {"A": gains[0] * a, "B": gains[1] * b}
-    made = Track(track.rate_hz, a.size, ("A", "B"))
+    frames = len(a)
+    made = Track(track.rate_hz, frames, ("A", "B"), track.channels)
     made.append(levelled)
     return Stimuli(
         made,
         (min(0.0, 20 * math.log10(gains[0])), min(0.0, 20 * math.log10(gains[1]))),  # not a rounding above 0
-        same=bool(np.array_equal(made.read("A", 0, a.size), made.read("B", 0, a.size))),
-        trivial=_convergence(levelled["A"], levelled["B"]) > TRIVIAL_CONVERGENCE,
+        same=bool(np.array_equal(made.read("A", 0, frames), made.read("B", 0, frames))),
+        trivial=_convergence(_mono(levelled["A"]), _mono(levelled["B"])) > TRIVIAL_CONVERGENCE,
     )
+
+
+def _mono(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    return samples if samples.ndim == 1 else samples.mean(axis=1)
 
 
 def _convergence(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -34,6 +34,9 @@ def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
         shape=choices.shape,
         width=choices.width,
         listen=choices.listen,
+        listen_right=choices.listen_right if choices.stereo else None,
+        pickup=choices.pickup,
+        solo=choices.solo,
         seconds=choices.seconds,
     )
     candidates = tuple(Candidate(source, source.capitalize(), entry.name, digest) for source in ("model", "truth"))

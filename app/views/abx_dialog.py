@@ -270,7 +270,8 @@ class AbxDialog(QDialog):
             self._leave()
             return
         answered, planned = len(self._run.trials), self._run.planned
-        question = f"{answered} of {planned} trials are answered. The test would be recorded as incomplete."
+        kept = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
+        question = f"{answered} of {planned} trials are answered. {kept}"
         if QMessageBox.question(self, "Stop the test?", question) == QMessageBox.StandardButton.Yes and self.testing:
             self._end()
 

@@ -37,12 +37,12 @@ LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, what it tells, how a figure is written, and its colour where it has one."""
+    """A column: its heading, what it tells, how a figure is written, and whose it is."""
 
     title: str
     tip: str
     text: Callable[[Any], str] = str
-    colour: str = theme.TEXT
+    source: str = ""  # of the figures, for their colour
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,10 @@ class TableRow:
     grey: bool = False
     bold: bool = False
     tip: str = ""
+
+
+def _colour(column: Column) -> str:
+    return theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
 
 
 class FiguresTable(QTableView):
@@ -197,7 +201,7 @@ class _Rows(QAbstractTableModel):
         if role == Qt.ItemDataRole.FontRole and row.bold:
             return theme.small_font(12, bold=True)
         if role == Qt.ItemDataRole.ForegroundRole:
-            return QColor(theme.FAINT if row.grey or value is None else column.colour)
+            return QColor(theme.FAINT if row.grey or value is None else _colour(column))
         if role == Qt.ItemDataRole.ToolTipRole:
             return row.tip or None
         return None

@@ -9,7 +9,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.take_partials import WINDOWS, PartialRow
-from app.views import theme
 from app.views.figures_table import Column, FiguresTable, TableRow
 from app.views.parts import combo_box, tool_button, words_label
 from app.views.progress_strip import ProgressStrip
@@ -34,13 +33,13 @@ def signed(value: float, digits: int = 1) -> str:
 _NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
 COLUMNS = (
     Column("n", "The mode: so many half waves along the string", lambda n: f"{n}"),
-    Column("truth Hz", "Frequency of the truth in Hz, its mean over the window", hertz, theme.TRUTH),
-    Column("model Hz", "Frequency of the model in Hz", hertz, theme.MODEL),
+    Column("truth Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
+    Column("model Hz", "Frequency of the model in Hz", hertz, "model"),
     Column("cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
     Column("level dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
     Column("T60 %", "Error of the model's decay time in %", signed),
-    Column("truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, theme.TRUTH),
-    Column("model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, theme.MODEL),
+    Column("truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
+    Column("model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
     Column("note", "Why a row is grey"),
 )
 

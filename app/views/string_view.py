@@ -183,6 +183,8 @@ class StringView(QWidget):
             self._start_drag(on, event.position())
 
     def _start_drag(self, on: str | None, at: QPointF) -> None:
+        if on is None or on == "pluck":  # on the pluck's scale, whatever has decayed meanwhile
+            self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         axes = self._axes()
         self.drag_started.emit()
         self._drag = on or "pluck"
@@ -306,7 +308,7 @@ class StringView(QWidget):
         largest_mm = self._pluck.amplitude_mm
         if self._frame is not None and not self._shows_pluck:
             largest_mm = self._frame.largest_mm()
-        wanted = next((s for s in SPANS_MM if s >= 1.15 * largest_mm), SPANS_MM[-1])
+        wanted = _span_mm(largest_mm)
         too_small = wanted > self._span_mm
         much_too_large = self._drag != "pluck" and 1.4 * largest_mm < wanted < self._span_mm
         if too_small or much_too_large:
@@ -364,3 +366,8 @@ class StringView(QWidget):
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
         return self._ground_pixmap
+
+
+def _span_mm(largest_mm: float) -> float:
+    """The least span that holds a displacement with some air."""
+    return next((span for span in SPANS_MM if span >= 1.15 * largest_mm), SPANS_MM[-1])

@@ -45,5 +45,5 @@ def test_start_and_close(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
     saved = json.loads(settings.read_text())
-    assert saved["choices"]["preset"].startswith("nylon")
+    assert (root / "presets" / f"{saved['choices']['preset']}.safetensors").is_file()
     assert saved["window_geometry"]
