@@ -27,7 +27,6 @@ from app.bench.random_changes import Repertoire, random_change
 from app.bench.stage import Stage, opened
 from app.controller import LEFT, RIGHT
 from app.settings import Settings
-from app.views.notice_bar import Notice
 
 BLOCK_FRAMES = 512
 SIZE = (1280, 800)
@@ -51,8 +50,9 @@ class Soak:
         settled_mib, end_mib, drift_mib: resident memory after the first minute (or half of a shorter time) and at
             the end, and how far it rose above the former meanwhile.
         threads_left: names of those that outlived the window.
-        faults: tracebacks of exceptions that nobody caught, warnings of Python and of Qt; each once, with its number.
-        notices: what the app told its user, with how often.
+        faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
+            and of Qt; each once, with its number.
+        notices: all that the app told its user, with how often.
     """
 
     machine: Machine
@@ -86,6 +86,7 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         watch.stop()
         underruns_after, late_after = _underruns(card)
         notices, platform = stage.window.notices.notices, stage.platform
+        faults.update({notice.details: notice.times for notice in notices if "Traceback" in notice.details})
     left = [thread.name for thread in threading.enumerate() if thread not in threads_before]
     return Soak(
         machine,
@@ -103,7 +104,7 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         watch.highest_mib - watch.settled_mib,
         tuple(sorted(left)),
         tuple(faults.items()),
-        tuple(_told(notices)),
+        tuple((notice.message, notice.times) for notice in notices),
     )
 
 
@@ -211,10 +212,6 @@ def _underruns(card: PretendedCard) -> tuple[int, int]:
     assert card.output is not None
     assert card.stream is not None
     return card.output.underruns, card.stream.late
-
-
-def _told(notices: list[Notice]) -> list[tuple[str, int]]:
-    return [(f"{n.message} {n.details}".strip(), n.times) for n in notices]
 
 
 def _resident_mib() -> float:
