@@ -24,7 +24,7 @@ from app.panels import StringPanel
 from app.settings import Buffer, Settings
 
 SIZE = (1920, 1080)
-PLUCKS = 20
+PLUCKS = 10
 QUIET_S = 0.3  # lets what rings fade before the next pluck
 SETTLING_S = 1.0
 BUFFERS: tuple[Buffer, ...] = ("low", "medium")
