@@ -99,10 +99,8 @@ def _plucks(stage: Stage, buffer: Buffer) -> list[Figure]:
     stage.run_for(SETTLING_S)
     buffer_s = _buffer_s(stage)
     same_s = [_pluck_s(stage) for _ in range(PLUCKS)]
-    new_s = []
-    for number in range(PLUCKS):
-        controller.session.update(position=0.3 + (number + 1 + 0.5 * BUFFERS.index(buffer)) * 0.01)
-        new_s.append(_pluck_s(stage))
+    first = 0.3 + 0.005 * BUFFERS.index(buffer)
+    new_s = [_pluck_s(stage, position=first + 0.01 * (number + 1)) for number in range(PLUCKS)]
     return [
         Figure(f"ready sound, {buffer} buffer", "ms", 1000 * buffer_s, None, 1000 * LATENCY_S[buffer]),
         *(
@@ -127,14 +125,15 @@ def _buffer_s(stage: Stage) -> float:
     return most_frames / output.rate_hz
 
 
-def _pluck_s(stage: Stage) -> float:
-    """From silence to the first sample."""
+def _pluck_s(stage: Stage, **changes: float) -> float:
+    """From silence to the first sample, of what is on stage or of a pluck with `changes`."""
     controller, stream = stage.controller, stage.card.stream
     assert stream is not None
     controller.player.stop()
     stage.run_for(QUIET_S)
     stream.listen_anew()
     plucked_s = time.perf_counter()
+    controller.session.update(**changes)
     controller.pluck()
     stage.wait_for(lambda: stream.sounded_s is not None, "a sound")
     assert stream.sounded_s is not None
