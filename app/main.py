@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ from app.views.theme import apply_theme
 
 if TYPE_CHECKING:
     from app.controller import Controller
+
+SWITCH_INTERVAL_S = 0.0001  # callback and rendering must get the interpreter in time from the picture
 
 
 class _Start(QObject):
@@ -72,9 +75,9 @@ def load_engine() -> None:
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
 
-def run() -> int:
-    """Opens the app and returns its exit status when it is closed."""
-    sys.setswitchinterval(0.0001)  # callback and rendering must get the interpreter in time from the picture
+def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
+    """Opens the app and returns its exit status when it is closed. `watch` is given the window before it is shown."""
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     path = settings_file()
     settings, notice = load_settings(path)
     if settings.look.size_percent != 100:  # Qt reads it when the application is made
@@ -86,6 +89,7 @@ def run() -> int:
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
     start = _Start(window, settings, path, notice)
+    watch(window)
     window.show()
     status = application.exec()
     start.wait()

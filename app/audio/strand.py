@@ -161,7 +161,8 @@ class Strand:
         voice, self._voice = self._voice, None
         if voice is not None and not voice.silent:
             voice.fade_out(self._frames(fade_s))
-            self._leaving.append(voice)
+            if voice.frames_left > 0:  # none are left where it has just come to the end of its track
+                self._leaving.append(voice)
 
     def _voice_at(self, position_frames: int, fade_in_s: float) -> Voice:
         return Voice(self.track, self.source_heard, position_frames, self._frames(fade_in_s))

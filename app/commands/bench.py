@@ -1,4 +1,4 @@
-"""bench solver, render, train: what the program costs here."""
+"""bench solver, render, train, app, soak: what the program costs here."""
 
 from __future__ import annotations
 
@@ -110,6 +110,63 @@ def train(json: Json = False) -> None:
     print_table(
         ("model", "batch", "frames", "step s"), [(t.model, t.batch, t.frames, t.step_s) for t in found.models]
     )
+
+
+@bench.command()
+def app(
+    json: Json = False,
+    seconds: Annotated[float, typer.Option(min=0.1, help="How long the picture is watched.")] = 5.0,
+    starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 5,
+) -> None:
+    """The window: its start, how soon a pluck sounds, how smoothly the picture moves. It opens for a minute."""
+    from app.bench.app import measure
+
+    with progress("bench app") as report:
+        found = measure(starts, seconds, report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    width, height = found.size
+    print(f"{found.preset}; {width} × {height} on {found.platform}; views: string, {', '.join(found.views)}")
+    rows = [(f.name, f.value, f.worst, f.target, f.unit) for f in found.figures]
+    print_table(("what", "here", "worst", "target", ""), rows)
+
+
+@bench.command()
+def soak(
+    json: Json = False,
+    minutes: Annotated[float, typer.Option(min=0.01, help="How long.")] = 10.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+) -> None:
+    """The window under a restless user: underruns, memory, threads, faults. Status 1 where there were faults."""
+    from app.bench.soak import soak as run_soak
+
+    with progress("bench soak") as report:
+        found = run_soak(60 * minutes, seed, report)
+    if json:
+        print_json(asdict(found))
+    else:
+        _print_machine(found.machine)
+        rows = [
+            ("plucks", found.plucks, None),
+            ("changes", found.changes, None),
+            ("underruns", found.underruns, 0),
+            ("late callbacks of the device", found.late_callbacks, None),
+            ("share of the time waiting for rendering", found.waited_share, 0),
+            ("longest stall of the window, s", found.longest_stall_s, 0.1),
+            ("memory when settled, MiB", found.settled_mib, None),
+            ("memory at the end, MiB", found.end_mib, None),
+            ("highest above settled, MiB", found.drift_mib, 50),
+            ("threads left", len(found.threads_left), 0),
+            ("faults", sum(times for _, times in found.faults), 0),
+        ]
+        print_table(("what", "here", "target"), rows)
+        for kind, told in (("fault", found.faults), ("notice", found.notices)):
+            for text, times in told:
+                print(f"{kind}, {times} times: {text}")
+    if found.faults or found.threads_left:
+        raise typer.Exit(1)
 
 
 def _print_machine(machine: Machine) -> None:

@@ -160,6 +160,7 @@ class Background(QObject):
                 self._said.emit(task.number, "failed", (str(error), ""))
             except Exception as error:  # told to the user; the thread lives on
                 self._said.emit(task.number, "failed", (f"Computing failed: {error}", traceback.format_exc()))
+            del task  # it may hold a take
 
 
 class _OneCore:

@@ -42,6 +42,7 @@ class ErrorTimePanel(Panel):
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
         self._course = None  # begun when it can be seen
+        self._shown = ()  # holds nothing of the last take
         stored = {
             "rmse": None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse),
             "mae": take.info.rel_mae,

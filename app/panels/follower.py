@@ -57,3 +57,4 @@ class Follower:
                     self._work = None
                 elif work is self._work and not moved and not self._closing:
                     self._mailbox.wait(LOOK_AGAIN_S)
+            del work  # it holds a take, which nobody may want any more while this rests

@@ -43,6 +43,7 @@ class SpaceTimePanel(Panel):
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
         self._envelopes = None  # begun when it can be seen
+        self._shown = ()  # holds nothing of the last take
         self.view.set_take(take.seconds, take.info.horizon_s, take.pluck.amplitude_mm)
 
     def show_moment(self, moment: Moment) -> None:

@@ -41,6 +41,7 @@ class SpectrogramPanel(Panel):
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
         self._spectrogram = None  # begun when it can be seen
+        self._drawn_of = ()  # holds nothing of the last take
         self.view.set_take(take.seconds, take.info.horizon_s, take.info.rate_hz)
 
     def show_moment(self, moment: Moment) -> None:

@@ -39,6 +39,7 @@ class SpectrumPanel(Panel):
             self.view.set_heard(self.session.source_heard)
 
     def take_started(self, take: Take) -> None:
+        self._shown = ()  # holds nothing of the last take
         if take.info.rate_hz != self.view.analyser.rate_hz:
             self.view.set_rate(take.info.rate_hz)
         self._partials_hz = take.info.string.undamped_frequencies(take.info.modes).numpy() / (2 * np.pi)

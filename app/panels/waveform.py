@@ -41,6 +41,7 @@ class WaveformPanel(Panel):
             self.view.set_heard(self.session.source_heard)
 
     def take_started(self, take: Take) -> None:
+        self._shown = ()  # holds nothing of the last take
         listen = self.session.choices.listen
         peak_mm = max(1e-3, float(np.abs(take.signal_m("truth", listen)).max()) * MM)
         self.view.set_take(take.seconds, take.info.horizon_s, 1.25 * peak_mm)

@@ -204,6 +204,22 @@ def test_tracks_shorter_than_a_fade(length_frames: int) -> None:
     assert not mixer.status().playing
 
 
+@pytest.mark.parametrize("event", ["stop", "seek", "select", "load"])
+def test_a_change_right_where_the_track_has_ended(event: str) -> None:
+    """The block ends with the track: its voice has faded out, and has nothing left that could fade."""
+    mixer = playing(make_track(0.1))
+    mono(mixer, frames(0.1))
+    {
+        "stop": mixer.stop,
+        "seek": lambda: mixer.seek(0.05),
+        "select": lambda: mixer.select("truth"),
+        "load": lambda: mixer.load(make_track(0.1), ring=True),
+    }[event]()
+    mono(mixer, 256)
+    mono(mixer, frames(0.2))
+    assert not mixer.status().playing
+
+
 def test_unknown_sources_and_wrong_rates_are_refused() -> None:
     mixer = playing(make_track())
     with pytest.raises(ValueError, match=r"no source 'physics', only \('model', 'truth'\)"):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -235,7 +237,9 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
     for left, right in (("spectrogram", "space_time"), ("spectrogram", "error_time")):
         session.update(left_view=left, right_view=right)
         plots = [panels[key].view.plot for key in (left, right)]
-        qtbot.waitUntil(lambda: controller.player.status().device is None)
+        qtbot.waitUntil(
+            lambda: controller._stage.take is not None, timeout=20_000
+        )  # else there is nothing to seek in
         with qtbot.waitSignal(panels[right].seek_asked):
             plots[1].seek_asked.emit(0.3)
         qtbot.waitUntil(
@@ -244,3 +248,24 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
         )
         plots[1].seek_asked.emit(0.1)
         qtbot.waitUntil(lambda: controller.player.status().position_s < 0.2, timeout=5_000)
+
+
+@pytest.mark.parametrize(
+    "kind", [SpaceTimePanel, SpectrogramPanel, ErrorTimePanel, SpectrumPanel, WaveformPanel], ids=lambda k: k.key
+)
+def test_a_view_that_is_not_looked_at_lets_the_last_take_go(
+    kind: type[Panel], make: Make, take: Take, qtbot: QtBot
+) -> None:
+    """Takes have tens of megabytes."""
+    panel = make(kind)
+    last = Take("last", take.info, take.pluck, 1.0)
+    last.append(take.motion_m("model"), take.motion_m("truth"))
+    panel.take_started(last)
+    for _ in range(20):
+        panel.show_moment(Moment(last, 0.1, False, 0.016))
+        qtbot.wait(5)
+    gone = weakref.ref(last)
+    del last
+    panel.take_started(take)
+    gc.collect()
+    qtbot.waitUntil(lambda: gone() is None, timeout=10_000)
