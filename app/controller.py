@@ -454,7 +454,7 @@ class Controller(QObject):
             take.info.rate_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s))
         )
         parts = [
-            f"{100 * w.rel_mae:.1f} % {place}" for w, place in zip(windows, ("as trained", "past it"), strict=False)
+            f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, ("as trained", "past it"), strict=False)
         ]
         self.window.error_label.setText("error of this pluck: " + ", ".join(parts))
 
@@ -487,6 +487,11 @@ class Controller(QObject):
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)
+
+
+def percent(share: float) -> str:
+    """Two digits of small shares, which matter, and no more of large ones."""
+    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
 
 
 def _key(take: Take) -> tuple[object, ...]:

@@ -109,6 +109,8 @@ def _paint_untrained_positions(painter: QPainter, axes: StringAxes, trained: tup
         for row, text in enumerate(words):
             painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
             line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
+            if painter.fontMetrics().horizontalAdvance(text) > line.width():
+                continue  # the hatching says it
             painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
 
 

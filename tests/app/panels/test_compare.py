@@ -65,6 +65,7 @@ def test_a_bad_preset_is_a_row_with_the_reason(
     damaged = preset_folder / "damaged"
     damaged.write_bytes(b"damaged")
     damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
+    controller.session.update(amplitude_mm=controller.session.choices.amplitude_mm + 0.5)  # or have read it
     qtbot.waitUntil(lambda: "second.safetensors" in figures(shown)["second"][-1], timeout=20_000)
     assert is_computed(shown, {"first"})
 
