@@ -200,9 +200,13 @@ class BatchPage(QWidget):
 
 def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
     shape = choices.shape.replace("_", " ")
+    heard = f"{choices.listen:.2f}"
+    if choices.stereo:
+        heard += f" (left) and {choices.listen_right:.2f} (right)"
+    if choices.pickup == "velocity":
+        heard += ", velocity"
     return (
-        f"{preset.info.title}, {shape} pluck at {choices.position:.2f}, {choices.amplitude_mm:g} mm, "
-        f"heard at {choices.listen:.2f}"
+        f"{preset.info.title}, {shape} pluck at {choices.position:.2f}, {choices.amplitude_mm:g} mm, heard at {heard}"
     )
 
 
