@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
 
+from app.notice import Notice
 from app.views import theme
 from app.views.notice_list import NoticeList
 from app.views.parts import tool_button
 
 MOST_KEPT = 50
-
-
-@dataclass(frozen=True)
-class Notice:
-    """What was told, how often, and when last."""
-
-    message: str
-    details: str = ""
-    error: bool = True  # False: information
-    times: int = 1
-    last_told: str = ""  # hours:minutes:seconds
-
-    @property
-    def line(self) -> str:
-        return self.message + (f"  (×{self.times})" if self.times > 1 else "")
 
 
 class NoticeBar(QFrame):

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 if TYPE_CHECKING:
-    from app.views.notice_bar import Notice
+    from app.notice import Notice
 
 
 class NoticeList(QDialog):
