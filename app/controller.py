@@ -42,6 +42,7 @@ from app.panels import (
     WaveformPanel,
 )
 from app.preset_desk import PresetDesk
+from app.preset_words import percent
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
 from app.settings import Settings, save_settings
@@ -487,11 +488,6 @@ class Controller(QObject):
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)
-
-
-def percent(share: float) -> str:
-    """Two digits of small shares, which matter, and no more of large ones."""
-    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
 
 
 def _key(take: Take) -> tuple[object, ...]:

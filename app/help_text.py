@@ -7,7 +7,11 @@ TOUR = (
         "Pluck",
         "Drag on the string and let go. The white handle is where, and how far, it is pulled. You hear the model.",
     ),
-    ("Compare", "Press X: now you hear the truth, the solved physics, at the same playhead. Press X again."),
+    (
+        "Compare",
+        "Press X: now you hear the truth, the solved physics, at the same playhead and level. Press X again. The "
+        "small arrows beside A and B choose what they hold: the difference made louder, or another preset.",
+    ),
     (
         "Look",
         "Amber is the model, blue the truth, in every view. The picture is slowed like under a stroboscope, the "
@@ -19,16 +23,26 @@ TOUR = (
         "another preset with Page down and hear which of them drift there.",
     ),
     (
+        "Look closer",
+        "Choose Space–time or Error over time: a click moves the playhead there. In Eigenvalues and Partials a click "
+        "lets you hear one mode alone once it plays, Esc all of them; in the Error map it plucks there.",
+    ),
+    (
         "Listen elsewhere",
         "Drag the green marker beneath the string. Near a node of a partial, that partial is gone; at the ends there "
-        "is silence.",
+        "is silence. Stereo gives you two such points; Velocity listens as a magnetic pick-up does.",
     ),
     (
         "Leave what it knows",
         "The darker parts of the string are where the model was never plucked. You may pluck there; the window "
         "says so.",
     ),
-    ("Keep it", "Ctrl+E saves a WAV that carries its recipe: preset, pluck and listening point."),
+    (
+        "Choose and judge",
+        "Ctrl+P browses the presets, and a preset file dropped on the window becomes one of yours. Ctrl+T is a blind "
+        "test: can you tell model and truth apart?",
+    ),
+    ("Keep it", "Ctrl+E saves WAVs that carry their recipe. Drop one on the window, and the sound is back."),
 )
 
 GESTURES = (

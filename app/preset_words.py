@@ -54,4 +54,9 @@ def time_word(seconds: float) -> str:
 
 def error_word(info: PresetInfo) -> str:
     """The relative mean absolute error on data it has not seen, in percent."""
-    return "–" if info.rel_mae is None else f"{100 * info.rel_mae:.2g} %"
+    return "–" if info.rel_mae is None else percent(info.rel_mae)
+
+
+def percent(share: float) -> str:
+    """Two digits of a small share, which matter, and no more of a large one."""
+    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"

@@ -8,10 +8,10 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.views import theme
-from app.views.parts import tool_button
+from app.views.parts import lay_out_plot, tool_button
 from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
@@ -64,21 +64,8 @@ class ErrorTimeView(QWidget):
         self._horizon_s = 1.0
         self._range: tuple[float, float] | None = None
         self.quantities.chosen.connect(self._choose)
-        self._lay_out()
+        lay_out_plot(self, (self.quantities, self.longer), self.readout, self.plot)
         self._choose()
-
-    def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setContentsMargins(4, 2, 4, 0)
-        row.setSpacing(8)
-        row.addWidget(self.quantities)
-        row.addWidget(self.longer)
-        row.addWidget(self.readout, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(row)
-        column.addWidget(self.plot, 1)
 
     @property
     def quantity(self) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QSizePolicy, QToolButton
+from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
@@ -45,6 +45,21 @@ def keeps_own_keys(event: QEvent) -> bool:
         event.accept()
         return True
     return False
+
+
+def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, plot: QWidget) -> None:
+    """A row of small controls with what is read off at its end, above a plot that has all other room."""
+    row = QHBoxLayout()
+    row.setContentsMargins(4, 2, 4, 0)
+    row.setSpacing(8)
+    for control in controls:
+        row.addWidget(control)
+    row.addWidget(readout, 1)
+    column = QVBoxLayout(view)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(0)
+    column.addLayout(row)
+    column.addWidget(plot, 1)
 
 
 def vertical_rule() -> QFrame:

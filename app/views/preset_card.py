@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication
 from app.library import PresetEntry
 from app.preset_folders import user_folder
 from app.preset_words import (
+    error_word,
     initial_word,
     model_meaning,
     model_word,
@@ -46,8 +47,8 @@ def preset_summary(entry: PresetEntry) -> str:
         f"trained on {info.horizon_s:g} s",
     ]
     if info.rel_mae is not None:
-        parts.append(f"validation error {100 * info.rel_mae:.1f} %")
-    return "   ·   ".join(parts)
+        parts.append(f"validation error {error_word(info)}")
+    return "  ·  ".join(parts)
 
 
 def _facts(entry: PresetEntry) -> list[tuple[str, str]]:

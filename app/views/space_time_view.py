@@ -6,11 +6,11 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.views import theme
 from app.views.colour_maps import displacement_map, error_map
-from app.views.parts import combo_box
+from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
@@ -72,20 +72,7 @@ class SpaceTimeView(QWidget):
         self.quantities.chosen.connect(self._choose_quantity)
         self.gains.activated.connect(self._choose_gain)
         self.plot.pointed.connect(lambda _, place: self.listening_point_moved.emit(min(max(place, 0.0), 1.0)))
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setContentsMargins(4, 2, 4, 0)
-        row.setSpacing(8)
-        row.addWidget(self.quantities)
-        row.addWidget(self.gains)
-        row.addWidget(self.readout, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(row)
-        column.addWidget(self.plot, 1)
+        lay_out_plot(self, (self.quantities, self.gains), self.readout, self.plot)
         self.setTabOrder(self.gains, self.plot)
 
     @property

@@ -8,10 +8,10 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.views.colour_maps import level_map
-from app.views.parts import combo_box
+from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
@@ -62,20 +62,7 @@ class SpectrogramView(QWidget):
         self.scales.chosen.connect(self._choose_scale)
         self.ranges.activated.connect(self._choose_range)
         self._label_frequencies()
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setContentsMargins(4, 2, 4, 0)
-        row.setSpacing(8)
-        for control in (self.quantities, self.scales, self.ranges):
-            row.addWidget(control)
-        row.addWidget(self.readout, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(row)
-        column.addWidget(self.plot, 1)
+        lay_out_plot(self, (self.quantities, self.scales, self.ranges), self.readout, self.plot)
 
     @property
     def quantity(self) -> str:

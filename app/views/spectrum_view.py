@@ -9,10 +9,10 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.views import theme
-from app.views.parts import combo_box
+from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL
 
@@ -97,19 +97,7 @@ class SpectrumView(QWidget):
         self.set_rate(16_000)
         self.set_heard("model")
         self.plot.viewport().installEventFilter(self)
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setContentsMargins(4, 2, 4, 0)
-        row.setSpacing(8)
-        row.addWidget(self.ranges)
-        row.addWidget(self.readout, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addLayout(row)
-        column.addWidget(self.plot, 1)
+        lay_out_plot(self, (self.ranges,), self.readout, self.plot)
 
     @property
     def analyser(self) -> Analyser:

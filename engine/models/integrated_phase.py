@@ -462,7 +462,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     def _modulate(
         self, matrix: Tensor, adiabatic: Tensor | None, real: Tensor, imag: Tensor, alive: Tensor | slice
     ) -> tuple[Tensor, Tensor]:
-        """z ⊙ exp(M z² + A |z|²) on both parts of z, of the latents `alive`."""
+        """z ⊙ exp(M z²), and what A changes, on both parts of z, of the latents `alive`."""
         squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
         n = self.configuration.state_size
         weight = (matrix * self._modulation_units).view(2, n, 2, n)[:, alive][..., alive]
