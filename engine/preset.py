@@ -21,6 +21,7 @@ from torch import Tensor
 from engine.models import MODELS, StringModel, build_model, count_parameters
 from engine.pluck import Pluck
 from engine.schema import SchemaError, read, write
+from engine.sine_transform import to_modes
 from engine.string import StringParameters
 from engine.whole_file import whole_file
 
@@ -36,11 +37,16 @@ class PresetError(ValueError):
 
 @dataclass(frozen=True)
 class TrainedRange:
-    """What the initial displacements of the training set covered; None: not a parameter of that kind."""
+    """What the initial displacements of the training set covered; None: not a parameter of that kind.
+
+    Attributes:
+        tension_rise: the largest ΔT/T₀, to which draws were softened; None: they were left as drawn.
+    """
 
     position: tuple[float, float] | None
     width: tuple[float, float] | None
     peak_m: tuple[float, float]
+    tension_rise: float | None = None
 
 
 @dataclass(frozen=True)
@@ -192,7 +198,18 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
         *_beyond("position", pluck.position, info.trained_range.position),
         *found,
         *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
+        *_too_tense(info, pluck),
     ]
+
+
+def _too_tense(info: PresetInfo, pluck: Pluck) -> list[str]:
+    limit = info.trained_range.tension_rise
+    if limit is None:
+        return []
+    rise = float(info.string.relative_tension_rise(to_modes(pluck.displacement(info.grid_points), info.modes)))
+    if rise <= limit:
+        return []
+    return [f"the pluck raises the tension by {rise:.0%}, beyond the trained {limit:.0%}: pull less, or wider"]
 
 
 def _beyond(name: str, value: float, trained: tuple[float, float] | None, unit: str = "") -> list[str]:

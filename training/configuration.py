@@ -31,8 +31,12 @@ class DatasetConfiguration:
     grid_points: int = 101
     seed: int = 0
     string: StringParameters = field(default_factory=StringParameters)
+    # ΔT/T₀; a draw that would pull the string harder is made as much softer. A real one would break.
+    largest_tension_rise: float | None = None
 
     def __post_init__(self) -> None:
+        if self.largest_tension_rise is not None and not self.largest_tension_rise > 0:
+            raise ValueError(f"largest_tension_rise must be above 0, not {self.largest_tension_rise}")
         if self.count < 10:
             raise ValueError(f"count must be at least 10 for a split 80/10/10, not {self.count}")
         for name in ("rate_hz", "modes", "steps", "stride"):
@@ -124,15 +128,16 @@ class TrainingConfiguration:
         plain = {
             "model": self.model,
             "model_configuration": write(self.model_configuration),
-            "data": _unlike_default(self.data),
+            "data": unlike_default(self.data),
             "data_version": DATA_VERSION,
-            "recipe": _unlike_default(self.recipe),
+            "recipe": unlike_default(self.recipe),
             "horizon": self.steps,
         }
         return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
+def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
+    """The fields that differ from their default, as plain data: what a digest is taken of."""
     defaults = {f.name: f.default for f in fields(value)}
     return {name: entry for name, entry in write(value).items() if getattr(value, name) != defaults[name]}
 

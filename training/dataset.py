@@ -26,7 +26,7 @@ from engine.excitation import DRAWS
 from engine.reference import ModalState, SplittingSolver
 from engine.schema import write
 from engine.sine_transform import synthesis_matrix, to_modes
-from training.configuration import DATA_VERSION, DatasetConfiguration
+from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
 
 CHUNK = 50  # trajectories a step of the progress
 START_EVERY = 100  # kept frames between those of which the velocity is kept, from which a trajectory can be entered
@@ -71,7 +71,7 @@ def default_cache() -> Path:
 
 def dataset_key(configuration: DatasetConfiguration) -> str:
     """A digest of everything that determines the data."""
-    text = json.dumps([DATA_VERSION, write(configuration)], sort_keys=True)
+    text = json.dumps([DATA_VERSION, unlike_default(configuration)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -84,7 +84,11 @@ def draw_initial(configuration: DatasetConfiguration) -> Tensor:
     """Initial modal amplitudes of all trajectories, float64 (count, modes)."""
     generator = torch.Generator().manual_seed(configuration.seed)
     draw = DRAWS[configuration.initial]
-    return to_modes(draw(configuration.count, configuration.grid_points, generator), configuration.modes)
+    initial = to_modes(draw(configuration.count, configuration.grid_points, generator), configuration.modes)
+    if configuration.largest_tension_rise is not None:
+        rise = configuration.string.relative_tension_rise(initial)
+        initial = initial * (configuration.largest_tension_rise / rise).sqrt().clamp(max=1)[:, None]
+    return initial
 
 
 def load_dataset(

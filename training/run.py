@@ -30,7 +30,7 @@ from engine.preset import Preset, PresetInfo, TrainedRange, load_preset, save_pr
 from engine.schema import read, write
 from engine.whole_file import whole_file
 from training import provenance
-from training.configuration import TrainingConfiguration
+from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.fit import Diverged, FitResult, Progress, fit, initialisation_of
@@ -247,7 +247,7 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         grid_points=data.grid_points,
         horizon_steps=configuration.steps,
         scale_m=dataset.scale_m,
-        trained_range=trained_range(data.initial),
+        trained_range=trained_range(data),
         initialisation=initialisation_of(configuration),
         seed=recipe.seed,
         rel_mse=validation.rel_mse,
@@ -264,13 +264,14 @@ def _finite(error: float) -> float | None:
     return error if math.isfinite(error) else None
 
 
-def trained_range(initial: str) -> TrainedRange:
-    """What the random draws of a kind cover; noise has neither a place nor a width."""
-    if initial == "pluck":
-        return TrainedRange(PLUCK_POSITION_RANGE, PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
-    if initial == "noise":
-        return TrainedRange(None, None, PEAK_RANGE_M)
-    return TrainedRange(CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M)
+def trained_range(data: DatasetConfiguration) -> TrainedRange:
+    """What the random draws of a data set cover; noise has neither a place nor a width."""
+    if data.initial == "pluck":
+        position, width, peak_m = PLUCK_POSITION_RANGE, PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M
+        return TrainedRange(position, width, peak_m, data.largest_tension_rise)
+    if data.initial == "noise":
+        return TrainedRange(None, None, PEAK_RANGE_M, data.largest_tension_rise)
+    return TrainedRange(CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M, data.largest_tension_rise)
 
 
 class TrainingLog:

@@ -180,8 +180,9 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         n, values = c.state_size, input_size(c.input, c.grid_points)
         self.encoder = nn.Linear(values, 2 * n)
         self.encoder_residual = _mlp(values, c.encoder_widths, 2 * n)
-        self.nu_log = nn.Parameter(torch.zeros(n))
-        self.theta_log = nn.Parameter(torch.zeros(n))
+        # float64: rounded to 1e-7, a frequency would be a radian off before a model's other errors show
+        self.nu_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
+        self.theta_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
         self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
         self.energy_units: Tensor | None
         self.rate_units: Tensor | None
@@ -258,11 +259,11 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
 
     def _rates(self) -> _Rates:
         # below, σ is as good as none, and one of zero would be divided by; above, all is over within a sample
-        sigma = self.nu_log.double().exp().clamp(1e-9, 1e3)
+        sigma = self.nu_log.exp().clamp(1e-9, 1e3)
         coupling = self.K.double().T
         if self.energy_units is not None:
             coupling = coupling * self.energy_units[:, None]
-        return _Rates(sigma, self.theta_log.double().exp(), coupling * self._rate_units)
+        return _Rates(sigma, self.theta_log.exp(), coupling * self._rate_units)
 
     def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor) -> Tensor:
         """z at times (times,) after the state's, complex (batch, times, state_size)."""

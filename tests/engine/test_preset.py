@@ -183,3 +183,6 @@ def test_plucks_outside_training_are_told(preset_file: Path) -> None:
     assert "width 0.5" in "; ".join(outside_training(any_shape, Pluck(0.5, 5.0, "raised_cosine", 0.5)))
     free = replace(info, trained_range=replace(info.trained_range, position=None, width=None))
     assert not any("position" in line for line in outside_training(free, Pluck(0.1, 5.0, "gaussian", 0.05)))
+    tense = replace(info, trained_range=replace(info.trained_range, tension_rise=0.01))
+    assert outside_training(tense, Pluck(0.5, 1.0, "gaussian", 0.05)) == []
+    assert "beyond the trained 1%" in "; ".join(outside_training(tense, Pluck(0.5, 5.0, "gaussian", 0.05)))

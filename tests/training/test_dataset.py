@@ -30,6 +30,17 @@ def test_amplitudes_and_velocities_are_the_solvers(small_dataset: Dataset) -> No
     assert not small_dataset.velocities[:, 0].any()
 
 
+def test_a_draw_that_would_break_the_string_is_softened() -> None:
+    free = DatasetConfiguration("pluck", 48_000, 40, count=60)
+    capped = draw_initial(replace(free, largest_tension_rise=0.02))
+    drawn, rise = draw_initial(free), free.string.relative_tension_rise(draw_initial(free))
+    assert bool((rise > 0.02).any()) and bool((rise < 0.02).any())
+    torch.testing.assert_close(free.string.relative_tension_rise(capped), rise.clamp(max=0.02))
+    assert torch.equal(capped[rise <= 0.02], drawn[rise <= 0.02])
+    with pytest.raises(ValueError, match="largest_tension_rise must be above 0"):
+        replace(free, largest_tension_rise=0.0)
+
+
 def test_splits_are_in_order_and_whole() -> None:
     assert [split_rows(1000, name) for name in ("train", "validation", "test")] == [
         slice(0, 800),

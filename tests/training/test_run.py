@@ -9,7 +9,7 @@ import pytest
 from engine.metrics import RelativeError
 from engine.preset import load_preset
 from training.cell import Cell, configuration_of
-from training.configuration import TrainingConfiguration
+from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fit import Progress
@@ -52,9 +52,10 @@ def test_a_run_that_goes_on_from_an_older_checkpoint_repeats_no_epoch(tmp_path: 
 
 @pytest.mark.parametrize("kind", ["gaussian", "noise", "pluck"])
 def test_the_trained_range_is_that_of_the_draws(kind: str) -> None:
-    found = trained_range(kind)
+    found = trained_range(DatasetConfiguration(kind, 4000, 5, largest_tension_rise=0.5))  # type: ignore[arg-type]
     assert found.peak_m == ((5e-4, 1e-2) if kind == "pluck" else (1e-3, 1e-2))
     assert (found.position is None, found.width is None) == (kind == "noise", kind == "noise")
+    assert found.tension_rise == 0.5
 
 
 DATA = {"count": 20, "steps": 450, "modes": 5}
