@@ -30,7 +30,7 @@ from training.results import Row
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-    from training.fit import Progress
+    from training.fitting.fit import Progress
 
 RUN_BYTES = 8 * 2**30  # that a training takes at most: an LRU over 50 strings and 4000 frames
 DEATHS = 3  # of processes that a task survives; Dask's own default
@@ -272,7 +272,7 @@ def _leave_if_broken(device: str) -> None:
 
 def _event(told: Mapping[str, Any]) -> Event | None:
     """What a worker told; None where it is not understood, for example a loss that is not finite."""
-    from training.fit import Progress
+    from training.fitting.fit import Progress
 
     if "text" in told:
         return Noted(told["name"], told["text"])

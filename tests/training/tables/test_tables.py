@@ -8,7 +8,7 @@ import pytest
 
 from training.cell import Cell, configuration_of
 from training.results import Row
-from training.tables import (
+from training.tables.tables import (
     COLUMNS,
     METRICS,
     MODEL_ORDER,

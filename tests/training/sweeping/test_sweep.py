@@ -16,13 +16,13 @@ from filelock import FileLock
 
 from engine.metrics import RelativeError
 from engine.schema import SchemaError, write
-from training import workers as module
-from training.dataset import dataset_folder, load_dataset
-from training.fit import Progress
-from training.plan import Plan, load_plan
+from training.data.dataset import dataset_folder, load_dataset
+from training.fitting.fit import Progress
 from training.results import RESULTS, Row, add_rows, read_results
-from training.sweep import Options, Unwatched, is_finished, results_of, sweep, unfinished
-from training.workers import (
+from training.sweeping import workers as module
+from training.sweeping.plan import Plan, load_plan
+from training.sweeping.sweep import Options, Unwatched, is_finished, results_of, sweep, unfinished
+from training.sweeping.workers import (
     Ended,
     Event,
     Layout,
