@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from training.results import Row
     from training.sweeping.plan import Plan, Run
-    from training.sweeping.workers import Noted, Progressed
+    from training.sweeping.workers.base import Noted, Progressed
 
 Device = Literal["cpu", "cuda", "auto"]
 LINE_EVERY_S = 60.0  # of a run's progress, where standard error is not a terminal

@@ -17,7 +17,8 @@ from engine.metrics import RelativeError
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
 from training.sweeping.plan import load_plan
-from training.sweeping.workers import Ended, Event, Layout, Noted, Progressed, Task
+from training.sweeping.workers import Layout
+from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
 
 PLAN = """
 description = "Two runs."
@@ -172,7 +173,7 @@ def test_a_results_file_that_is_none_is_told(run, words: list[Any], plan: Path) 
 
 
 def test_a_scheduler_that_is_not_there_is_told(run, words: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("training.sweeping.workers.CONNECT_S", 0.2)
+    monkeypatch.setattr("training.sweeping.workers.on_dask.CONNECT_S", 0.2)
     found = run(*words, "--scheduler", "tcp://127.0.0.1:9")
     assert found.status == 1
     assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in found.err.splitlines()[-1]
