@@ -1,1 +1,11 @@
-"""Training: data sets from the reference solver, and models fitted to them, down to a preset file."""
+"""Training: data sets from the reference solver, and models fitted to them, down to a preset file.
+
+`configuration`  what a run is; `cell` and `by_name` have it from a name
+`run`            a whole run: fit, errors, preset, and its row in `results`
+`evaluate`       the errors of a model
+`data`           data sets, their cache, and batches of them
+`fitting`        losses, the training loop, checkpoints
+`sweeping`       many runs: the plan, its order, the workers
+`tables`         the paper's tables with our results beside them
+`figures`        pictures of presets and of runs
+"""

@@ -29,8 +29,8 @@ from engine.sine_transform import analysis_matrix, listening_weights, synthesis_
 from engine.spectra import spectral_distances
 from engine.true_partials import true_phasors
 from training.configuration import DatasetConfiguration
-from training.dataset import Dataset, draw_initial, split_rows
-from training.losses import KoopmanModel
+from training.data.dataset import Dataset, draw_initial, split_rows
+from training.fitting.losses import KoopmanModel
 
 TRAJECTORIES_AT_ONCE = 10
 FRAMES_AT_ONCE = 1000

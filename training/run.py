@@ -31,9 +31,9 @@ from engine.schema import read, write
 from engine.whole_file import whole_file
 from training import provenance
 from training.configuration import DatasetConfiguration, TrainingConfiguration
-from training.dataset import Dataset, load_dataset
+from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
-from training.fit import Diverged, FitResult, Progress, fit, initialisation_of
+from training.fitting.fit import Diverged, FitResult, Progress, fit, initialisation_of
 from training.results import QUARTERS, SHORT_HORIZON, Row
 
 LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
@@ -306,7 +306,7 @@ def _plot(log: Path) -> None:
     """A picture of the run beside its log; none where it ended before its first epoch."""
     if not log.exists():
         return
-    from training.run_plot import plot_run  # Matplotlib only where there is something to draw
+    from training.figures.run_plot import plot_run  # Matplotlib only where there is something to draw
 
     plot_run(log, log.with_suffix(".png"))
 

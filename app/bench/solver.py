@@ -15,7 +15,7 @@ from engine.reference import ModalState, SplittingSolver, solve_dop853
 from engine.sine_transform import to_modes
 from engine.string import StringParameters
 from training.configuration import DatasetConfiguration
-from training.dataset import draw_initial
+from training.data.dataset import draw_initial
 
 PROTOCOL = tuple(
     DatasetConfiguration(initial=initial, rate_hz=rate_hz, modes=modes)

@@ -12,7 +12,8 @@ from engine.models import build_model
 from engine.models.base import Physics
 from engine.string import StringParameters
 from training.configuration import Recipe
-from training.losses import Batch, training_loss
+from training.data.batches import Batch
+from training.fitting.losses import training_loss
 
 BATCH = 50
 FRAMES = 400

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from app.commands.console import Report
     from engine.preset import Preset
     from training.configuration import DatasetConfiguration
-    from training.dataset import Dataset
+    from training.data.dataset import Dataset
 
 Split = Literal["validation", "test", "both"]
 LARGEST_DATASET_BYTES = 16 * 2**30
@@ -223,7 +223,7 @@ def _data_of(preset: Preset) -> DatasetConfiguration:
 
 
 def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: tuple[str, ...]) -> None:
-    from training.dataset import split_rows
+    from training.data.dataset import split_rows
 
     for split in splits:
         rows = split_rows(data.count, split)

@@ -18,9 +18,9 @@ from app.commands.console import Failure, duration, number, print_json, print_ta
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from training.plan import Plan, Run
     from training.results import Row
-    from training.workers import Noted, Progressed
+    from training.sweeping.plan import Plan, Run
+    from training.sweeping.workers.base import Noted, Progressed
 
 Device = Literal["cpu", "cuda", "auto"]
 LINE_EVERY_S = 60.0  # of a run's progress, where standard error is not a terminal
@@ -57,11 +57,11 @@ def sweep(
 
     What is finished is skipped, and what failed is tried again: the same command goes on after any interruption.
     """
-    from training.plan import load_plan
     from training.results import read_results
-    from training.sweep import Options, results_of, unfinished
-    from training.sweep import sweep as run  # this command has the name
-    from training.workers import cluster_workers, fitted, local_workers
+    from training.sweeping.plan import load_plan
+    from training.sweeping.sweep import Options, results_of, unfinished
+    from training.sweeping.sweep import sweep as run  # this command has the name
+    from training.sweeping.workers import cluster_workers, fitted, local_workers
 
     chosen = load_plan(plan)
     file = results or results_of(chosen, runs)

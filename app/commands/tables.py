@@ -43,7 +43,8 @@ def table(
     if rows and format == "csv":
         raise typer.BadParameter("is for markdown; in CSV each line names its runs", param_hint="--rows")
     from training.results import RESULTS, read_results
-    from training.tables import as_csv, as_markdown
+    from training.tables.markdown import as_markdown
+    from training.tables.tidy_csv import as_csv
 
     found = read_results(results or RESULTS)
     if not found:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from app.commands.console import Report
     from training.configuration import DatasetConfiguration
-    from training.dataset import Dataset
-    from training.fit import Progress
+    from training.data.dataset import Dataset
+    from training.fitting.fit import Progress
 
 Configuration = Annotated[
     str, typer.Argument(metavar="CONFIG", help="A configuration's name, or the path of its .toml file.")
@@ -27,7 +27,7 @@ Device = Literal["cpu", "cuda", "auto"]
 def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> None:
     """Make the data set of a training configuration, or find it in the cache, and describe it."""
     from training.by_name import load
-    from training.dataset import dataset_folder, dataset_key, draw_initial
+    from training.data.dataset import dataset_folder, dataset_key, draw_initial
 
     configuration = load(config).data
     made = load_data(configuration, cache)
@@ -111,7 +111,7 @@ def train(
 
 def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Dataset:
     """A data set from the cache, or made, with its progress told."""
-    from training.dataset import load_dataset
+    from training.data.dataset import load_dataset
 
     with progress("data set") as report:
         return load_dataset(configuration, cache, lambda done, total: report(done / total))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from training.configuration import DatasetConfiguration
-from training.dataset import Dataset, load_dataset
+from training.data.dataset import Dataset, load_dataset
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from engine.models.base import Physics, StringModel
 from engine.reference import ModalState, SplittingSolver
 from engine.sine_transform import to_grid, to_modes
 from training.configuration import DatasetConfiguration
-from training.dataset import Dataset, load_dataset
+from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model, evaluate_partials, evaluate_past_horizon
 
 DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, count=20, steps=100)

@@ -10,9 +10,9 @@ from engine.metrics import RelativeError
 from engine.preset import load_preset
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, TrainingConfiguration
-from training.dataset import load_dataset
+from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
-from training.fit import Progress
+from training.fitting.fit import Progress
 from training.run import LOG_FIELDS, TrainingLog, run_row, trained_range
 
 

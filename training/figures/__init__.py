@@ -4,5 +4,6 @@
 `extrapolation`  past the end of training (Fig. 3)
 `error`          error per time step (Fig. 4)
 `eigenvalues`    what was learned, in the unit circle
+`run_plot`       the course of a run, from its log
 `style`          how they look, and their files
 """

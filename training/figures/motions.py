@@ -18,7 +18,7 @@ from engine.sine_transform import listening_weights, to_grid
 from engine.sources import ModelSource, Runaway, SourceState, StringSource, TruthSource
 from training.cell import MODEL_NAMES
 from training.configuration import DatasetConfiguration, TrainingConfiguration
-from training.dataset import draw_initial, split_rows
+from training.data.dataset import draw_initial, split_rows
 
 FRAMES_AT_ONCE = 2048
 TRAJECTORIES_AT_ONCE = 10

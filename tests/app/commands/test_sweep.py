@@ -14,10 +14,11 @@ import pytest
 from app.commands import sweep as command
 from app.commands.sweep import Board
 from engine.metrics import RelativeError
-from training.fit import Progress
-from training.plan import load_plan
+from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
-from training.workers import Ended, Event, Layout, Noted, Progressed, Task
+from training.sweeping.plan import load_plan
+from training.sweeping.workers import Layout
+from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
 
 PLAN = """
 description = "Two runs."
@@ -90,7 +91,7 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Layout]]:
             layouts.append(layout)
             yield Script()
 
-        monkeypatch.setattr("training.workers.local_workers", local_workers)
+        monkeypatch.setattr("training.sweeping.workers.local_workers", local_workers)
         return layouts
 
     return make
@@ -172,7 +173,7 @@ def test_a_results_file_that_is_none_is_told(run, words: list[Any], plan: Path) 
 
 
 def test_a_scheduler_that_is_not_there_is_told(run, words: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("training.workers.CONNECT_S", 0.2)
+    monkeypatch.setattr("training.sweeping.workers.on_dask.CONNECT_S", 0.2)
     found = run(*words, "--scheduler", "tcp://127.0.0.1:9")
     assert found.status == 1
     assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in found.err.splitlines()[-1]

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from engine.preset import load_preset
-from training.checkpoint import Checkpoint
+from training.fitting.checkpoint import Checkpoint
 
 CONFIGURATION = """
 title = "Tiny"
@@ -75,7 +75,7 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
 
 
 def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("training.fit.CHECKPOINT_EVERY_S", -1)
+    monkeypatch.setattr("training.fitting.fit.CHECKPOINT_EVERY_S", -1)
     assert run(*place.train("whole")).status == 0
 
     save = Checkpoint.save

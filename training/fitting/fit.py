@@ -22,13 +22,13 @@ from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
 from engine.schema import SchemaError, read, write
 from engine.sine_transform import synthesis_matrix
-from training.batches import TrainingData, batches
-from training.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.configuration import Recipe, TrainingConfiguration
-from training.dataset import Dataset
+from training.data.batches import TrainingData, batches
+from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.losses import training_loss
-from training.pursuit import LatentFit, pursue
+from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
+from training.fitting.losses import training_loss
+from training.fitting.pursuit import LatentFit, pursue
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Protocol
 
 from engine.schema import write
-from training.plan import Plan, Run
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
 from training.run import default_runs
-from training.workers import Ended, Noted, Progressed, Task, Workers
+from training.sweeping.plan import Plan, Run
+from training.sweeping.workers.base import Ended, Noted, Progressed, Task, Workers
 
 POLL_S = 1.0  # for workers that came or went
 

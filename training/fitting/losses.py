@@ -7,7 +7,6 @@ the last of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import torch
@@ -15,25 +14,9 @@ from torch import Tensor
 
 from engine.models import StringModel
 from training.configuration import Recipe
+from training.data.batches import Batch
 
 SILENT = 1e-12  # a string's mean square in normalised units that a relative loss divides by at least
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Trajectories in normalised units.
-
-    Attributes:
-        initial: the frame that a model sets out from, (batch, grid_points).
-        second: what its encoder is told beside; see `engine.models.inputs`.
-        frames: int64 (frames,), any selection of 1 … N, counted from `initial`.
-        target: the truth at these frames, (batch, frames, grid_points).
-    """
-
-    initial: Tensor
-    second: Tensor | None
-    frames: Tensor
-    target: Tensor
 
 
 @runtime_checkable

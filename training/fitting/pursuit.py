@@ -21,9 +21,9 @@ from torch import Tensor, nn
 from engine.models import StringModel
 from engine.models.koopman import Koopman
 from engine.sine_transform import synthesis_matrix
-from training.batches import flips
 from training.configuration import Recipe
-from training.dataset import Dataset
+from training.data.batches import flips
+from training.data.dataset import Dataset
 
 TRAJECTORIES = 400  # of the training split that choose the eigenvalues
 FREQUENCIES = 80  # of a mode's grid, between the linear one and the highest that the tension reaches

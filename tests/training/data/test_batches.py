@@ -7,10 +7,9 @@ import torch
 
 from engine.reference import ModalState, SplittingSolver
 from engine.sine_transform import analysis_matrix
-from training.batches import TrainingData, batches
 from training.configuration import DatasetConfiguration, Recipe
-from training.dataset import START_EVERY, Dataset, load_dataset
-from training.losses import Batch
+from training.data.batches import Batch, TrainingData, batches
+from training.data.dataset import START_EVERY, Dataset, load_dataset
 
 CPU = torch.device("cpu")
 ROWS = torch.arange(16)

@@ -22,11 +22,11 @@ from engine.reference import ModalState, SplittingSolver
 from engine.schema import write
 from engine.sine_transform import listening_weights, to_grid
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
-from training.dataset import draw_initial
+from training.data.dataset import draw_initial
 from training.figures import evolution, extrapolation, motions, spectrum, style
 from training.figures.eigenvalues import eigenvalues
 from training.figures.error import error, smoothed
-from training.run_plot import plot_run, read_log, run_figure
+from training.figures.run_plot import plot_run, read_log, run_figure
 
 HORIZON = 40
 SIZES: dict[str, dict[str, Any]] = {

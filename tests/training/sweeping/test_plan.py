@@ -7,7 +7,7 @@ import pytest
 
 from engine.models import MODELS
 from engine.schema import SchemaError
-from training.plan import load_plan, plan_names
+from training.sweeping.plan import load_plan, plan_names
 
 PLAN = """
 description = "Two blocks."

@@ -5,14 +5,32 @@ Every random choice is a function of (seed, iteration) alone.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
 from engine.models.inputs import InputKind
 from engine.sine_transform import synthesis_matrix
 from training.configuration import Recipe
-from training.dataset import START_EVERY, Dataset
-from training.losses import Batch
+from training.data.dataset import START_EVERY, Dataset
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Trajectories in normalised units.
+
+    Attributes:
+        initial: the frame that a model sets out from, (batch, grid_points).
+        second: what its encoder is told beside; see `engine.models.inputs`.
+        frames: int64 (frames,), any selection of 1 … N, counted from `initial`.
+        target: the truth at these frames, (batch, frames, grid_points).
+    """
+
+    initial: Tensor
+    second: Tensor | None
+    frames: Tensor
+    target: Tensor
 
 
 class TrainingData:

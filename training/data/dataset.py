@@ -66,7 +66,7 @@ def split_rows(count: int, name: str) -> slice:
 
 def default_cache() -> Path:
     """LEARNED_STRINGS_CACHE, else `cache` beside the project."""
-    return Path(os.environ.get("LEARNED_STRINGS_CACHE", Path(__file__).parents[1] / "cache"))
+    return Path(os.environ.get("LEARNED_STRINGS_CACHE", Path(__file__).parents[2] / "cache"))
 
 
 def dataset_key(configuration: DatasetConfiguration) -> str:

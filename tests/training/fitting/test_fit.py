@@ -11,14 +11,15 @@ import torch
 
 from engine.metrics import RelativeError
 from engine.models import DMD
-from training import fit as module
 from training.cell import Cell, configuration_of
-from training.checkpoint import Checkpoint
 from training.configuration import Recipe, TrainingConfiguration
-from training.dataset import Dataset
+from training.data.batches import Batch
+from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.fit import Diverged, Progress, fit, horizon_at, learning_rate_at
-from training.losses import Batch, training_loss
+from training.fitting import fit as module
+from training.fitting.checkpoint import Checkpoint
+from training.fitting.fit import Diverged, Progress, fit, horizon_at, learning_rate_at
+from training.fitting.losses import training_loss
 
 DATA = {"count": 20, "steps": 450, "modes": 5}
 QUICK = {"epochs": 4, "validate_every": 1, "batch_size": 8, "first_horizon": 20, "steps_per_batch": 16}

@@ -10,8 +10,8 @@ import torch
 from engine.models import Koopman, KoopmanConfiguration, KoopmanVar, KoopmanVarConfiguration
 from engine.sine_transform import synthesis_matrix
 from training.configuration import Recipe
-from training.dataset import Dataset
-from training.pursuit import pursue
+from training.data.dataset import Dataset
+from training.fitting.pursuit import pursue
 
 STEPS = 400
 

@@ -8,20 +8,10 @@ import pytest
 
 from training.cell import Cell, configuration_of
 from training.results import Row
-from training.tables import (
-    COLUMNS,
-    METRICS,
-    MODEL_ORDER,
-    PRINTED,
-    Column,
-    Figure,
-    as_csv,
-    as_markdown,
-    factor,
-    mark,
-    paper_figures,
-    sections,
-)
+from training.tables.markdown import as_markdown
+from training.tables.paper import COLUMNS, Column, Figure
+from training.tables.sections import sections
+from training.tables.tidy_csv import as_csv
 
 G4 = Column("gaussian", 4000)
 
@@ -70,58 +60,6 @@ def line(cells: list[list[str]], model: str, run: str) -> list[str]:
 def records(text: str, **wanted: str) -> list[dict[str, str]]:
     lines = list(csv.DictReader(io.StringIO(text)))
     return [entry for entry in lines if all(entry[name] == value for name, value in wanted.items())]
-
-
-def test_the_papers_figures_are_all_there() -> None:
-    figures = paper_figures()
-    assert len(figures) == 2 * 12 * 4  # strings, rows, data sets
-    assert sum(len(entry.figure(metric) or ()) for entry in figures.values() for metric in METRICS) == 384
-    for string in ("linear", "nonlinear"):
-        for horizon, models in ((4000, MODEL_ORDER[:5]), (400, MODEL_ORDER[:7])):
-            assert {key[2] for key in figures if key[:2] == (string, horizon)} == set(models)
-
-
-@pytest.mark.parametrize(
-    ("string", "horizon", "model", "column", "mse", "mae"),
-    [
-        ("nonlinear", 4000, "dmd", ("noise", 16000), (1.8313, 0.2467), (1.0953, 0.087)),
-        ("nonlinear", 4000, "koopman_var", ("gaussian", 4000), (0.0113, 0.0061), (0.0977, 0.0284)),
-        ("nonlinear", 400, "koopman_var", ("gaussian", 16000), (0.0003, 0.0), (0.0201, 0.0006)),
-        ("nonlinear", 400, "frnn", ("noise", 4000), (0.7289, 0.0653), (0.8553, 0.0495)),
-        ("linear", 4000, "koopman_var", ("noise", 16000), (0.0495, 0.0973), (0.1125, 0.1785)),
-        ("linear", 4000, "dmd", ("gaussian", 4000), (0.0, 0.0), (0.006, 0.0007)),
-        ("linear", 400, "fgru", ("gaussian", 16000), (0.0378, 0.0162), (0.214, 0.0551)),
-        ("linear", 400, "frnn", ("noise", 16000), (0.4730, 0.3205), (0.6347, 0.2836)),
-    ],
-)
-def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any, mse: Any, mae: Any) -> None:
-    entry = paper_figures()[string, horizon, model, Column(*column)]
-    assert (entry.rel_mse, entry.rel_mae) == (mse, mae)
-
-
-@pytest.mark.parametrize(
-    ("ours", "paper", "expected"),
-    [
-        ((0.08, None), (0.1, 0.02), "equal"),  # on the boundary, which floats miss
-        ((0.12, None), (0.1, 0.02), "equal"),
-        ((0.0799, None), (0.1, 0.02), "better"),
-        ((0.1201, None), (0.1, 0.02), "worse"),
-        ((0.05, 0.06), (0.1, 0.02), "equal"),  # ours is the larger deviation
-        ((5e-6, 1e-7), (0.0, 0.0), "equal"),  # the paper's may be anything below its last decimal
-        ((PRINTED, None), (0.0, 0.0), "equal"),
-        ((6e-5, None), (0.0, 0.0), "worse"),
-        ((5e-6, None), (0.0001, 0.0), "better"),
-        ((float("inf"), None), (0.1, 0.02), "worse"),
-    ],
-)
-def test_marks(ours: Any, paper: Any, expected: str) -> None:
-    assert mark(Figure(*ours), Figure(*paper)) == expected
-
-
-def test_factors() -> None:
-    assert factor(Figure(5.65e-6), Figure(0.0113)) == "×0.0005"
-    assert factor(Figure(1.0), Figure(0.004)) == "×250"
-    assert factor(Figure(5e-6), Figure(0.0)) == "> ×0.1"
 
 
 def test_a_cell_is_the_mean_over_its_seeds_beside_the_paper() -> None:

@@ -13,7 +13,7 @@ import torch
 from engine.reference import ModalState, SplittingSolver
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration
-from training.dataset import START_EVERY, Dataset, dataset_folder, draw_initial, load_dataset, split_rows
+from training.data.dataset import START_EVERY, Dataset, dataset_folder, draw_initial, load_dataset, split_rows
 
 TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
 
@@ -62,7 +62,7 @@ def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path: Path) 
 
 def test_another_version_of_the_data_is_other_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = dataset_folder(TINY, tmp_path), configuration_of(Cell("lru", True, "noise", 4000)).digest
-    monkeypatch.setattr("training.dataset.DATA_VERSION", 99)
+    monkeypatch.setattr("training.data.dataset.DATA_VERSION", 99)
     monkeypatch.setattr("training.configuration.DATA_VERSION", 99)
     after = dataset_folder(TINY, tmp_path), configuration_of(Cell("lru", True, "noise", 4000)).digest
     assert before[0] != after[0] and before[1] != after[1]

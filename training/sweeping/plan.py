@@ -1,4 +1,4 @@
-"""What a sweep runs, as committed data: `training/plans/NAME.toml`.
+"""What a sweep runs, as committed data: `plans/NAME.toml`.
 
 Blocks stand in the order of their value. Within one the seeds come first, so that every cell is there once before any
 is there twice; then the non-linear string before the linear one, and the short horizon before the long.

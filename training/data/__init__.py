@@ -1,0 +1,1 @@
+"""Data sets from the reference solver, their cache, and batches of them."""

@@ -1,0 +1,1 @@
+"""Fitting a model to a data set: where it sets out, what is minimised, the loop, its checkpoints."""

@@ -1,0 +1,96 @@
+"""What workers are given, what they tell, and the contract of all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from training.results import Row
+
+if TYPE_CHECKING:
+    from training.fitting.fit import Progress
+
+DEATHS = 3  # of processes that a task survives; Dask's own default
+
+
+class WorkersError(RuntimeError):
+    """No workers can be had, or they are gone; the message says which and the remedy."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A run as plain data, so that a worker of another version says so instead of training something else.
+
+    Attributes:
+        configuration: a TrainingConfiguration, written.
+        runs, cache: folders, None: the worker's own defaults.
+        group: a folder in `runs` for this run's folder, "" for none.
+        device: "cpu", "cuda" or "auto".
+        threads: of the CPU, None: as the worker was started.
+    """
+
+    name: str
+    recipe: str
+    configuration: dict[str, Any]
+    digest: str
+    runs: str | None = None
+    group: str = ""
+    cache: str | None = None
+    device: str = "cpu"
+    threads: int | None = None
+    checkpoint_every_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Progressed:
+    """An epoch of a run is over; told now and then. `host` and `pid` are of the process that trains it."""
+
+    name: str
+    progress: Progress
+    host: str
+    pid: int
+
+
+@dataclass(frozen=True)
+class Noted:
+    """Something that a person may want to know of a run."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A task is over. Without a row, `error` says why; `final`: to try again is no use."""
+
+    name: str
+    row: Row | None
+    error: str = ""
+    final: bool = False
+
+
+Event = Progressed | Noted | Ended
+
+
+class Workers(Protocol):
+    """What carries out tasks."""
+
+    description: str
+
+    def capacity(self) -> int:
+        """How many tasks can be under way at present."""
+
+    def start(self, task: Task) -> None:
+        """Begins a task, or lets it wait for the next worker that is free."""
+
+    def next(self, timeout_s: float) -> Event | None:
+        """What happened next; None where nothing did in time.
+
+        Raises:
+            WorkersError: the workers are gone.
+        """
+
+
+def given_up(times: int) -> str:
+    """Why a task is given up."""
+    return f"its worker died {times} times; too little memory, or a fault in a library"

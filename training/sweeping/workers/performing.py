@@ -1,0 +1,123 @@
+"""What a worker does with a task, in its own process, and how the sweep's process understands what it told."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from engine.schema import SchemaError, read, write
+from training.results import Row
+from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
+
+if TYPE_CHECKING:
+    from training.fitting.fit import Progress
+
+TELL_EVERY_S = 1.0  # of a run's progress
+_one_at_a_time = threading.Lock()  # a worker of several threads still trains one model: they would share its cores
+
+
+def perform(plain: Mapping[str, Any], tell: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
+    """Does a written `Task` in this process: {"row": …}, or {"error": text} where it failed.
+
+    Args:
+        tell: is given plain data that `event_of` reads.
+    """
+    folder = None
+    with _one_at_a_time:
+        try:
+            task = read(Task, plain, "task")
+            folder = _runs(task) / task.name
+            return {"row": write(_train(task, folder, tell))}
+        except Exception as error:
+            if folder is not None:
+                with suppress(OSError):
+                    folder.joinpath("failure.txt").write_text(traceback.format_exc(), encoding="utf-8")
+            _leave_if_broken(str(plain.get("device")))
+            return {"error": " ".join(f"{type(error).__name__}: {error}".split())}
+
+
+def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> Row:
+    import torch
+
+    from training.configuration import TrainingConfiguration
+    from training.run import run_row
+
+    configuration = read(TrainingConfiguration, task.configuration, task.name)
+    if configuration.digest != task.digest:
+        raise RuntimeError("this worker's code is of another version than that which began the sweep; update it")
+    if task.threads is not None:
+        torch.set_num_threads(task.threads)
+    device = task.device
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    cache = Path(task.cache) if task.cache else None
+    told = -TELL_EVERY_S
+
+    def report(progress: Progress) -> None:
+        nonlocal told
+        now = time.monotonic()
+        if now - told >= TELL_EVERY_S:
+            told = now
+            facts = {"progress": write(progress), "host": socket.gethostname(), "pid": os.getpid()}
+            tell({"name": task.name, **facts})
+
+    return run_row(
+        task.name,
+        task.recipe,
+        configuration,
+        folder.parent,
+        cache=cache,
+        device=device,
+        report=report,
+        waits=lambda: tell({"name": task.name, "text": "waits: another process trains it"}),
+        checkpoint_every_s=task.checkpoint_every_s,
+    )
+
+
+def _runs(task: Task) -> Path:
+    from training.run import default_runs
+
+    return (Path(task.runs) if task.runs else default_runs()) / task.group
+
+
+def _leave_if_broken(device: str) -> None:
+    """Ends this process if its CUDA device has faulted: nothing later would work in it, and a new one replaces it."""
+    if device == "cpu":
+        return
+    import torch
+
+    try:
+        if torch.cuda.is_initialized():
+            torch.cuda.empty_cache()
+            torch.zeros(1, device="cuda").add(1).cpu()
+    except RuntimeError:
+        os._exit(1)
+
+
+def event_of(told: Mapping[str, Any]) -> Event | None:
+    """What a worker told; None where it is not understood, for example a loss that is not finite."""
+    from training.fitting.fit import Progress
+
+    if "text" in told:
+        return Noted(told["name"], told["text"])
+    try:
+        return Progressed(told["name"], read(Progress, told["progress"], "progress"), told["host"], told["pid"])
+    except SchemaError:
+        return None
+
+
+def end_of(name: str, outcome: Mapping[str, Any]) -> Ended:
+    """The end of a task whose `perform` gave `outcome`."""
+    if "error" in outcome:
+        return Ended(name, None, outcome["error"])
+    try:
+        return Ended(name, read(Row, outcome["row"], "row"))
+    except SchemaError as error:
+        return Ended(name, None, f"its result makes no sense: {error}")

@@ -1,0 +1,148 @@
+"""The tables as Markdown, to be read: our figures beside the paper's, and which runs made them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+
+from training.cell import MODEL_NAMES
+from training.results import Row
+from training.tables.paper import COLUMNS, HORIZONS, METRICS, PRINTED, Column, factor, mark, paper_errors
+from training.tables.sections import NOT_RUN, Line, RecipeChoice, Section, rows_of, sections
+
+NONE = "—"
+TITLES = {"linear": "Linear string", "nonlinear": "Non-linear (tension-modulated) string"}
+LEGEND = f"""\
+Relative errors on the validation set, sums over all its trajectories divided by sums, as `mean (standard deviation)`:
+over seeds, for DMD over the errors of the single trajectories. Lower is better. **The paper**'s lines are the figures
+of its Table 3 as printed (5 seeds).
+
+- **better**, **worse**: than the paper's figure of the same model, by more than one standard deviation (the larger of
+  the two; at least {PRINTED:g}, to which the paper's figures are printed). **equal**: within it.
+- **{NOT_RUN}**: there is no run of ours. **{NONE}**: the paper has no figure.
+- **diverged (n of m seeds)**: these runs ended without a model; the figure beside it is of the others.
+- **prior knowledge**: training started from what is known of the string (its eigenvalues, or averaged equations),
+  which the paper's models do not have. Lines without these words are black boxes as in the paper.
+- **our best**: the lowest error of our learned models (DMD is fitted, not learned) as a multiple of the paper's best
+  in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below {PRINTED:g}."""
+SHORT_LEGEND = """\
+- **trained on 4000 frames** ‡: runs of the table above, measured over their first 400 frames. The others were trained
+  on 400 frames, as the paper's."""
+
+
+def as_markdown(rows: Sequence[Row], recipe: RecipeChoice = "all", listing: bool = False) -> str:
+    """All tables, with what their words mean; `listing` adds the runs behind them."""
+    found = sections(rows, recipe)
+    parts = [LEGEND + "\n" + SHORT_LEGEND]
+    for section in found:
+        if section.horizon == HORIZONS[0]:
+            parts.append(f"## {TITLES[section.string]}")
+        parts.append(f"### {section.horizon} frames")
+        parts.append(_markdown_table(*_table(section)))
+    used = rows_of(found)
+    if out := len(rows) - len(used):
+        parts.append(
+            f"{out} of {len(rows)} rows of the results file are not shown: of other data, another horizon or recipe, "
+            "a trial, or made by a recipe that has changed since."
+        )
+    if listing:
+        parts += ["## Runs", _markdown_table(*_listing(used))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _table(section: Section) -> tuple[list[str], list[list[str]]]:
+    names = {"rel_mse": "MSE", "rel_mae": "MAE"}
+    head = ["model", "run", *(f"{column} {names[metric]}" for column in COLUMNS for metric in METRICS)]
+    table = []
+    for model in section.models:
+        if any(key[:3] == (*section.place, model) for key in paper_errors()):
+            table.append(_line_of(model, "**the paper**", partial(_paper_cell, section, model)))
+        lines = [line for line in section.lines if line.model == model]
+        if not lines:
+            table.append(_line_of(model, NOT_RUN, lambda column, metric: NOT_RUN))
+        for line in lines:
+            label = line.label
+            if line.trained != section.horizon:
+                label += f", trained on {line.trained} frames ‡"
+            table.append(_line_of(model, label, partial(_cell, section, line)))
+    table.append(["**paper's best**", "", *_each(partial(_paper_best, section))])
+    for structured, words in ((False, "black box"), (True, "prior knowledge")):
+        table.append(["**our best**", words, *_each(partial(_best, section, structured))])
+    return head, table
+
+
+def _line_of(model: str, label: str, cell: Callable[[Column, str], str]) -> list[str]:
+    return [MODEL_NAMES[model], label, *_each(cell)]
+
+
+def _each(cell: Callable[[Column, str], str]) -> list[str]:
+    return [cell(column, metric) for column in COLUMNS for metric in METRICS]
+
+
+def _paper_cell(section: Section, model: str, column: Column, metric: str) -> str:
+    figure = section.paper(model, column, metric)
+    return f"{figure.mean:.4f} ({figure.deviation:.4f})" if figure else NONE
+
+
+def _cell(section: Section, line: Line, column: Column, metric: str) -> str:
+    entry = section.lines[line].get(column)
+    if entry is None:
+        return NOT_RUN
+    parts, figure = [], entry.figure(metric)
+    if figure is not None:
+        paper = section.paper(line.model, column, metric)
+        words = f"{figure.mean:.3g}"
+        if figure.deviation is not None:
+            words += f" ({figure.deviation:.2g})"
+        if paper is not None:
+            words += f" **{mark(figure, paper)}**"
+        parts.append(f"{words}, {_seeds(len(entry.done))}")
+    for rows, words in ((entry.diverged, "diverged"), (entry.failed, "failed")):
+        if rows:
+            parts.append(f"{words} ({len(rows)} of {_seeds(len(entry.rows))})")
+    return "; ".join(parts)
+
+
+def _seeds(count: int) -> str:
+    return f"{count} seed" if count == 1 else f"{count} seeds"
+
+
+def _paper_best(section: Section, column: Column, metric: str) -> str:
+    model, figure = section.paper_best(column, metric)
+    return f"{figure.mean:.4f} {MODEL_NAMES[model]}"
+
+
+def _best(section: Section, structured: bool, column: Column, metric: str) -> str:
+    found = section.best(column, metric, structured)
+    if found is None:
+        return NOT_RUN
+    line, figure = found
+    recipe = "" if line.recipe == "ours" else f" ({line.recipe} recipe)"
+    return f"**{factor(figure, section.paper_best(column, metric)[1])}** {MODEL_NAMES[line.model]}{recipe}"
+
+
+def _listing(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+    head = ["run", "seed", "status", "rel. MSE", "rel. MAE", "digest", "commit", "hardware", "seconds", "repeated by"]
+    return head, [
+        [
+            row.name,
+            str(row.seed),
+            row.status,
+            *(NONE if value is None else f"{value:.8g}" for value in (row.rel_mse, row.rel_mae)),
+            row.digest,
+            row.commit or NONE,
+            row.hardware or NONE,
+            NONE if row.seconds is None else f"{row.seconds:.0f}",
+            f"`learned-strings train {row.name}`",
+        ]
+        for row in rows
+    ]
+
+
+def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Cells padded to their column's width: a table that can be read as text, too."""
+    table = [[cell.replace("|", "\\|") for cell in row] for row in (head, *rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ["| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |" for row in table]
+    lines.insert(1, "|" + "|".join("-" * (w + 2) for w in widths) + "|")
+    return "\n".join(lines)

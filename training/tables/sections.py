@@ -1,0 +1,184 @@
+"""Our figures in the paper's tables: rows of the results file, gathered by string, horizon, model and data set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import astuple, dataclass
+from statistics import fmean, stdev
+from typing import Literal
+
+from engine.schema import SchemaError
+from training.by_name import load
+from training.cell import HORIZON
+from training.configuration import TrainingConfiguration
+from training.results import SHORT_HORIZON, Row
+from training.tables.paper import (
+    COLUMNS,
+    HORIZONS,
+    METRICS,
+    MODEL_ORDER,
+    STRINGS,
+    Column,
+    Errors,
+    Figure,
+    paper_errors,
+)
+
+NOT_RUN = "not run"  # what is said in place of a figure
+
+RecipeChoice = Literal["ours", "paper", "all"]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A row of a table: a model, and what its runs have in common.
+
+    Attributes:
+        initialisation: "" where it is no choice (DMD is fitted).
+        structured: whether it started from prior knowledge of the string; see `Row.structured`.
+        trained: frames that its runs were trained on; more than the table's where their first frames are measured.
+    """
+
+    model: str
+    recipe: str
+    initialisation: str
+    structured: bool
+    trained: int
+
+    @property
+    def label(self) -> str:
+        """What is said of it beside the model's name."""
+        words = f"{self.recipe} recipe" if self.recipe != "ours" else "our recipe"
+        if self.structured:
+            words += f", prior knowledge ({self.initialisation})"
+        return words
+
+
+@dataclass(frozen=True)
+class Entry(Errors):
+    """A cell of ours, with the runs behind its figures."""
+
+    done: tuple[Row, ...] = ()
+    diverged: tuple[Row, ...] = ()
+    failed: tuple[Row, ...] = ()
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        return (*self.done, *self.diverged, *self.failed)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table: one kind of string and one horizon. A line without an entry in a column was not run there."""
+
+    string: str
+    horizon: int
+    lines: dict[Line, dict[Column, Entry]]
+
+    @property
+    def models(self) -> list[str]:
+        """The models with a line of ours or of the paper, in the paper's order."""
+        ours = {line.model for line in self.lines}
+        theirs = {model for string, horizon, model, *_ in paper_errors() if (string, horizon) == self.place}
+        # the integrated phase is the question: it stands there even where nothing was run
+        return [model for model in MODEL_ORDER if model in ours | theirs | {"koopman_integrated"}]
+
+    @property
+    def place(self) -> tuple[str, int]:
+        return self.string, self.horizon
+
+    def paper(self, model: str, column: Column, metric: str) -> Figure | None:
+        """What the paper has there; None where it has nothing."""
+        found = paper_errors().get((self.string, self.horizon, model, column))
+        return found.figure(metric) if found else None
+
+    def paper_best(self, column: Column, metric: str) -> tuple[str, Figure]:
+        """The model of the paper with the lowest mean, and its figure; the first of equals in the paper's order."""
+        found = [(model, self.paper(model, column, metric)) for model in MODEL_ORDER]
+        return min(((model, figure) for model, figure in found if figure), key=lambda pair: pair[1].mean)
+
+    def best(self, column: Column, metric: str, structured: bool) -> tuple[Line, Figure] | None:
+        """Our learned model (DMD is fitted) with the lowest mean, with prior knowledge or without."""
+        lines = [line for line in self.lines if line.model != "dmd" and line.structured == structured]
+        found = [(line, entry.figure(metric)) for line in lines if (entry := self.lines[line].get(column))]
+        return min(((line, figure) for line, figure in found if figure), key=lambda pair: pair[1].mean, default=None)
+
+
+def sections(rows: Iterable[Row], recipe: RecipeChoice = "all") -> list[Section]:
+    """The tables of the rows that belong to them, by string and horizon.
+
+    A row counts as long as its name means the configuration that it was made with: rows of a trial, and of a recipe
+    that has changed since, are another thing.
+    """
+    chosen = [row for row in rows if recipe in ("all", row.recipe) and configuration_of(row) is not None]
+    return [_section(chosen, string, horizon) for string in STRINGS for horizon in HORIZONS]
+
+
+def rows_of(found: Iterable[Section]) -> list[Row]:
+    """Every row behind the figures of these tables, once, by name."""
+    rows = {row for s in found for entries in s.lines.values() for entry in entries.values() for row in entry.rows}
+    return sorted(rows, key=lambda row: (row.name, row.digest))
+
+
+def configuration_of(row: Row) -> TrainingConfiguration | None:
+    """The configuration of a row's run, by its name; None where the name means another one by now, or none."""
+    try:
+        configuration = load(row.name)
+    except SchemaError:
+        return None
+    return configuration if configuration.digest == row.digest else None
+
+
+def _section(rows: Sequence[Row], string: str, horizon: int) -> Section:
+    gathered: dict[Line, dict[Column, dict[int, Row]]] = {}
+    for row in rows:
+        column = Column(row.initial, row.rate_hz)
+        if row.string != string or column not in COLUMNS or not _is_measured(row, horizon):
+            continue
+        gathered.setdefault(_line(row), {}).setdefault(column, {})[row.seed] = row
+    order = sorted(gathered, key=lambda line: (MODEL_ORDER.index(line.model), line.structured, *astuple(line)))
+    lines = {
+        line: {c: _entry(list(seeds.values()), horizon) for c, seeds in gathered[line].items()} for line in order
+    }
+    # a run over the long horizon that ended without a figure says nothing of the short one
+    lines = {
+        line: entries
+        for line, entries in lines.items()
+        if line.trained == horizon or any(entry.rel_mse for entry in entries.values())
+    }
+    return Section(string, horizon, lines)
+
+
+def _is_measured(row: Row, horizon: int) -> bool:
+    if row.horizon == horizon:
+        return True
+    if horizon != SHORT_HORIZON or row.horizon != HORIZON:
+        return False
+    return row.status != "done" or row.rel_mse_400 is not None
+
+
+def _line(row: Row) -> Line:
+    how = "" if row.model == "dmd" else row.initialisation  # fitted: an initialisation is asked of it by nobody
+    return Line(row.model, row.recipe, how, row.structured, row.horizon)
+
+
+def _entry(rows: Sequence[Row], horizon: int) -> Entry:
+    rows = sorted(rows, key=lambda row: row.seed)
+    done, diverged, failed = (
+        tuple(row for row in rows if row.status == status) for status in ("done", "diverged", "failed")
+    )
+    mse, mae = (_figure(done, metric, horizon) for metric in METRICS)
+    return Entry(mse, mae, done, diverged, failed)
+
+
+def _figure(rows: Sequence[Row], metric: str, horizon: int) -> Figure | None:
+    name = metric if all(row.horizon == horizon for row in rows) else f"{metric}_{SHORT_HORIZON}"
+    values: list[float] = [value for row in rows if (value := getattr(row, name)) is not None]
+    if not values:
+        return None
+    if len(values) > 1:
+        return Figure(fmean(values), stdev(values) if all(map(math.isfinite, values)) else None)
+    # as the paper's for DMD, which knows no seeds
+    spread = getattr(rows[0], f"{metric}_spread") if name == metric and rows[0].model == "dmd" else None
+    return Figure(values[0], spread)

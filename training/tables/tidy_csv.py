@@ -1,0 +1,92 @@
+"""The tables as tidy CSV, to be computed with: a line a cell."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
+
+from training.results import Row
+from training.tables.paper import COLUMNS, METRICS, Column, mark
+from training.tables.sections import NOT_RUN, Entry, Line, RecipeChoice, Section, sections
+
+
+@dataclass(frozen=True)
+class Record:
+    """A line of the CSV: a line's or the paper's cell, both metrics. What is not there is None, and empty.
+
+    Attributes:
+        trained: see `Line`.
+        seeds: runs behind the figures; 0 where nothing was run.
+        runs: their names, separated by spaces, with those that diverged or failed.
+    """
+
+    string: str
+    horizon: int
+    model: str
+    recipe: str
+    initialisation: str
+    structured: bool | None
+    trained: int | None
+    initial: str
+    rate_hz: int
+    seeds: int
+    diverged: int
+    failed: int
+    mse_mark: str
+    mae_mark: str
+    runs: str
+    rel_mse: float | None = None
+    rel_mse_std: float | None = None
+    rel_mae: float | None = None
+    rel_mae_std: float | None = None
+    paper_rel_mse: float | None = None
+    paper_rel_mse_std: float | None = None
+    paper_rel_mae: float | None = None
+    paper_rel_mae_std: float | None = None
+
+
+def as_csv(rows: Sequence[Row], recipe: RecipeChoice = "all") -> str:
+    """All tables as tidy data: a line for every cell, run or not; see `Record`."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([field.name for field in fields(Record)])
+    for section in sections(rows, recipe):
+        for model in section.models:
+            lines: list[Line | None] = [line for line in section.lines if line.model == model]
+            for line in lines or [None]:
+                for column in COLUMNS:
+                    record = _record(section, model, line, column)
+                    writer.writerow(["" if value is None else value for value in astuple(record)])
+    return file.getvalue()
+
+
+def _record(section: Section, model: str, line: Line | None, column: Column) -> Record:
+    entry = section.lines[line].get(column) if line else None
+    found = entry or Entry(None, None)
+    figures: dict[str, float | None] = {}
+    marks = []
+    for metric in METRICS:
+        ours, paper = found.figure(metric), section.paper(model, column, metric)
+        for name, figure in ((metric, ours), (f"paper_{metric}", paper)):
+            figures |= {name: figure.mean, f"{name}_std": figure.deviation} if figure else {}
+        marks.append(mark(ours, paper) if ours and paper else "" if found.rows else NOT_RUN)
+    return Record(
+        string=section.string,
+        horizon=section.horizon,
+        model=model,
+        recipe=line.recipe if line else "",
+        initialisation=line.initialisation if line else "",
+        structured=line.structured if line else None,
+        trained=line.trained if line else None,
+        initial=column.initial,
+        rate_hz=column.rate_hz,
+        seeds=len(found.done),
+        diverged=len(found.diverged),
+        failed=len(found.failed),
+        mse_mark=marks[0],
+        mae_mark=marks[1],
+        runs=" ".join(row.name for row in found.rows),
+        **figures,
+    )
