@@ -60,7 +60,7 @@ for command in (
     batch.batch,
     info.info,
     motion.compare,
-    training.data.dataset,
+    training.dataset,
     training.train,
     sweep.sweep,
     evaluation.evaluate,
