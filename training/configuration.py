@@ -66,6 +66,7 @@ class Recipe:
     loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
     latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of a matching pursuit
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
+    latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
     random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
@@ -82,7 +83,7 @@ class Recipe:
         for name in ("epochs", "batch_size", "first_horizon", "validate_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        for name in ("steps_per_batch", "patience", "latent_epochs"):
+        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
         for name in ("warm_up", "grow_until", "average_decay"):

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import torch
+from torch import Tensor
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from engine.metrics import RelativeError
@@ -237,21 +238,27 @@ class _Run:
             group["lr"] = learning_rate * group["share"]
         model.train()
         if self._latents is not None and self.step < self._latent_steps:
-            loss, error = self._latents.loss(model, recipe, self._batches[number], self.step)
+            if self.step >= self._latent_steps - recipe.latent_polish:
+                self._total += self._latents.polish(model, recipe)
+            else:
+                self._descend(*self._latents.loss(model, recipe, self._batches[number], self.step))
         else:
             batch = self._data.draw(recipe, self._batches[number], horizon, self.step)
-            loss, error = training_loss(model, batch, recipe)
-        self._optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), recipe.clip_norm)
-        self._optimiser.step()
-        self._total += error
+            self._descend(*training_loss(model, batch, recipe))
         self.step += 1
         if self._latents is not None and self.step == self._latent_steps:
             self._latents.yield_latents(model)
             self._optimiser = _optimiser(model, recipe)
         if self._average is not None and self.step >= self._latent_steps:
             self._average.update_parameters(model)
+
+    def _descend(self, loss: Tensor, error: Tensor) -> None:
+        """A step of the optimiser against `loss`; `error` is what is told."""
+        self._optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self._model.parameters(), self._recipe.clip_norm)
+        self._optimiser.step()
+        self._total += error
 
     def _schedules(self) -> tuple[int, float]:
         """Horizon and learning rate of the next step."""

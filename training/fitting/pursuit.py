@@ -28,6 +28,7 @@ from training.data.dataset import Dataset
 TRAJECTORIES = 400  # of the training split that choose the eigenvalues
 FREQUENCIES = 80  # of a mode's grid, between the linear one and the highest that the tension reaches
 DECAYS = (0.0, 1.0, 3.0, 8.0)  # nepers over the horizon, beside the mode's own
+POLISH_ITERATIONS = 100
 APART = 1e-3  # share of an exponential that no chosen one explains, at least
 
 
@@ -67,8 +68,39 @@ class LatentFit:
             initial = sign * torch.where(mirrored, initial.flip(1), initial)
             targets = sign * torch.where(mirrored, targets * self.mirror, targets)
         error = (model.encoder(initial) - targets).square().mean()
-        # a mode's mean square over the string is half its amplitude's
-        return error, (error * targets.shape[1] * self.unit**2 / 2).detach()
+        return error, self._of_prediction(error)
+
+    def polish(self, model: StringModel, recipe: Recipe) -> Tensor:
+        """POLISH_ITERATIONS of L-BFGS on all trajectories at once; the mean square of the prediction's error before.
+
+        It knows nothing of the iterations before it, so that a run can be cut between any two calls.
+        """
+        assert isinstance(model, Koopman)
+        initial, targets = self.initial, self.targets
+        if recipe.flip:
+            initial = torch.cat([initial, initial.flip(1)])
+            targets = torch.cat([targets, targets * self.mirror])
+            initial, targets = torch.cat([initial, -initial]), torch.cat([targets, -targets])
+        optimiser = torch.optim.LBFGS(
+            model.encoder.parameters(),
+            max_iter=POLISH_ITERATIONS,
+            history_size=POLISH_ITERATIONS,
+            tolerance_grad=0.0,
+            tolerance_change=0.0,
+            line_search_fn="strong_wolfe",
+        )
+
+        def closure() -> Tensor:
+            optimiser.zero_grad()
+            error = (model.encoder(initial) - targets).square().mean()
+            error.backward()
+            return error
+
+        return self._of_prediction(optimiser.step(closure))
+
+    def _of_prediction(self, error: Tensor) -> Tensor:
+        """From the coordinates' mean square error: a mode's over the string is half its amplitude's."""
+        return (error * self.targets.shape[1] * self.unit**2 / 2).detach()
 
     @torch.no_grad()
     def yield_latents(self, model: StringModel) -> None:

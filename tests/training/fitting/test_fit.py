@@ -80,6 +80,18 @@ def test_latents_that_are_learned_first_are_too(small_dataset: Dataset, runs: Pa
     check_cuts(small("koopman", latent_epochs=2), small_dataset, runs)
 
 
+def test_a_polish_is_too_and_lowers_the_error(
+    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("training.fitting.pursuit.POLISH_ITERATIONS", 10)
+    polished = small("koopman", latent_epochs=4, latent_polish=2)  # one of them in the last epoch's midst
+    check_cuts(polished, small_dataset, runs)
+    plain = fit(replace(polished, recipe=replace(polished.recipe, latent_polish=0)), small_dataset, runs / "plain")
+    found = fit(polished, small_dataset, runs / "whole")
+    losses = [evaluate_model(run.model, small_dataset, "train", 40).total().rel_mse for run in (found, plain)]
+    assert losses[0] < 0.5 * losses[1]
+
+
 def check_cuts(configuration: TrainingConfiguration, small_dataset: Dataset, runs: Path) -> None:
     """The same weights with cuts after the second and the third epoch of four."""
     whole = fit(configuration, small_dataset, runs / "whole", checkpoint_every_s=-1)
