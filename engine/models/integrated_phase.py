@@ -48,6 +48,14 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor, nn
 
+from engine.models._averaging import (
+    adiabatic_change,
+    averaged_amplitude,
+    averaged_coupling,
+    averaged_modulation,
+    stiffening,
+)
+from engine.models._cubics import differences, hermite, integrate_parabolas
 from engine.models._diagonal import (
     dense_layers,
     initialise_orthogonal,
@@ -67,8 +75,6 @@ MOST_PRODUCTS = 1024  # frames of a listening point's segment: rounding grows wi
 MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
 LISTENING_POINTS = 8  # at most: more are better read off with matrix products
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
-FIXED_POINT_STEPS = 2  # from an action to the amplitude that it means: the error is of fourth order in ΔT/T₀
-LEAST_SHARE = -0.4  # of κ/ω; a string's is above 0
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
 
 
@@ -289,7 +295,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             alive = torch.arange(len(rates.sigma), device=alive.device)  # their networks take every latent
         ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
-        log_radius, phase = (_hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
+        log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
         radius = torch.exp(log_radius)
         frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
         frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
@@ -322,7 +328,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         count = min(most, ahead) if ahead > 0 else most
         segments, later = self._segments(state, rates, count, step, length)
         log_radius, phase = (
-            (_differences(length).to(segments.ends) @ segments.ends.flatten(1)).view_as(segments.ends).unbind(1)
+            (differences(length).to(segments.ends) @ segments.ends.flatten(1)).view_as(segments.ends).unbind(1)
         )
         radius = torch.exp(log_radius[..., segments.alive])
         phase = phase[..., segments.alive]
@@ -426,7 +432,9 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             if self.configuration.second_order:
                 f = f * told.sum(-1, keepdim=True)
         if self.configuration.adiabatic:
-            f = f + nn.functional.pad(_stiffening(energies, rates), (len(rates.omega), 0))
+            f = f + nn.functional.pad(
+                stiffening(energies, rates.omega, rates.coupling[:, len(rates.omega) :]), (len(rates.omega), 0)
+            )
         return f
 
     @property
@@ -471,7 +479,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         growth, turn = exponent.chunk(2, dim=-1)
         if adiabatic is not None:
             weight = (adiabatic * self._modulation_units[..., :n])[alive][:, alive]
-            growth = growth + _adiabatic_change(real.square() + imag.square(), weight)
+            growth = growth + adiabatic_change(real.square() + imag.square(), weight)
         gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
         cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
         return real * cosine - imag * sine, real * sine + imag * cosine
@@ -561,106 +569,6 @@ def _imaginary_parts(kind: InputKind, log_eigenvalues: Tensor) -> tuple[Tensor, 
     if kind == "two_frames":
         return -1 / omega.tan(), torch.exp(-sigma) / omega.sin()
     return -sigma / omega, -1 / omega if kind == "displacement_velocity" else None
-
-
-def _stiffening(energies: Tensor, rates: _Rates) -> Tensor:
-    """ω√(1 + 2κ/ω) - ω - Im K E of actions E (..., state_size), where κ = Im K q² of the amplitudes' squares q²."""
-    n = len(rates.omega)
-    coupling = rates.coupling[:, n:] / rates.omega
-    linear = energies @ coupling
-    share = linear
-    for _ in range(FIXED_POINT_STEPS):
-        share = (energies / (1 + 2 * share.clamp(min=LEAST_SHARE)).sqrt()) @ coupling
-    return rates.omega * ((1 + 2 * share.clamp(min=LEAST_SHARE)).sqrt() - 1 - linear)
-
-
-def _adiabatic_change(squares: Tensor, weight: Tensor) -> Tensor:
-    """The nepers by which a mode's amplitude is below its action's root, or above: ± log(1 + 4|A q²|)/4.
-
-    Args:
-        squares: of the amplitudes where A is positive (an encoder's), of the actions' roots where it is negative.
-    """
-    change = nn.functional.linear(squares, weight)
-    falls = (change < 0).to(change.dtype)
-    for _ in range(FIXED_POINT_STEPS):  # q² = |z|² / √(1 + 4|A q²|)
-        change = nn.functional.linear(squares * (1 - falls + falls / (1 + 4 * change.abs()).sqrt()), weight)
-    return change.sign() * torch.log1p(4 * change.abs()) / 4
-
-
-def averaged_coupling(physics: Physics) -> Tensor:
-    """Im K of `initialise`, float64 (modes, modes): rad/sample for squared amplitudes in normalised units."""
-    string, modes = physics.string, physics.modes
-    share = string.tension_coupling(modes) / (4 * string.undamped_frequencies(modes))
-    squares = string.wavenumbers(modes).square() * physics.scale_m**2
-    return share[:, None] * squares * (1 + 0.5 * torch.eye(modes, dtype=torch.float64)) / physics.rate_hz
-
-
-def averaged_amplitude(physics: Physics) -> Tensor:
-    """A_in of `initialise`, float64 (modes, modes): half the share by which each frequency rises, in nepers.
-
-    The action ω q² / 2 stays while ω changes slowly, so that √ω q does.
-    """
-    frequencies = physics.string.undamped_frequencies(physics.modes) / physics.rate_hz
-    return averaged_coupling(physics) / (2 * frequencies[:, None])
-
-
-def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
-    """What the swinging tension adds within a period, to first order: float64 (modes, modes) each.
-
-    -k_n q_n η_m² q_m² swings at ω_n ± 2ω_m, where mode n answers with α z_m² z_n + β z̄_m² z_n,
-    α = k_n η_m²/(16 ω_m (ω_n + ω_m)) and β = -k_n η_m²/(16 ω_m (ω_n - ω_m)); n = m has no β, its part is in K.
-
-    Returns:
-        α + β, nepers for Re z_m², and α - β, radians for Im z_m², of amplitudes in normalised units.
-    """
-    string, modes = physics.string, physics.modes
-    omega = string.undamped_frequencies(modes)
-    squares = string.wavenumbers(modes).square() * physics.scale_m**2
-    share = string.tension_coupling(modes)[:, None] * squares / (16 * omega)
-    difference = omega[:, None] - omega
-    alpha = share / (omega[:, None] + omega)
-    beta = torch.where(difference == 0, 0.0, -share / torch.where(difference == 0, 1.0, difference))
-    return alpha + beta, alpha - beta
-
-
-def integrate_parabolas(samples: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
-    """The integral from 0 of the parabolas through samples at 0, ½, 1 of every segment, and the parabolas themselves.
-
-    Simpson's rule over whole segments, and the cubic of the rest. Both have O(1) cost at a position.
-
-    Args:
-        samples: (batch, 2 segments + 1, values).
-        positions: (times,) in segments.
-
-    Returns:
-        (batch, times, values) each.
-    """
-    left, middle, right = samples[:, :-1:2], samples[:, 1::2], samples[:, 2::2]
-    whole = torch.cumsum((left + 4 * middle + right) / 6, dim=1)
-    segment = positions.floor().long().clamp(0, left.shape[1] - 1)
-    u = (positions - segment)[:, None]
-    left, middle, right = left[:, segment], middle[:, segment], right[:, segment]
-    before = nn.functional.pad(whole, (0, 0, 1, 0))[:, segment]
-    # left + u slope + u² bend
-    slope, bend = 4 * middle - 3 * left - right, 2 * (left + right) - 4 * middle
-    return before + u * (left + u * (slope / 2 + u * bend / 3)), left + u * (slope + u * bend)
-
-
-def _hermite(count: int, like: Tensor) -> Tensor:
-    """Weights (count, 4) of the values and of the slopes at both ends of a unit segment, at 0, 1/count, …"""
-    share = torch.arange(count, device=like.device).double() / count
-    square, cube = share**2, share**3
-    right = 3 * square - 2 * cube
-    return torch.stack([1 - right, right, share - 2 * square + cube, cube - square], dim=1).to(like)
-
-
-def _differences(count: int) -> Tensor:
-    """As `_hermite`, weights (4, 4) of the value at 0 and of the first three differences at spacing 1/count."""
-    slope = torch.tensor([0, 0, 1, 0], dtype=torch.float64) / count
-    bend = torch.tensor([-3, 3, -2, -1], dtype=torch.float64) / count**2
-    cube = torch.tensor([2, -2, 1, 1], dtype=torch.float64) / count**3
-    value = torch.tensor([1, 0, 0, 0], dtype=torch.float64)
-    return torch.stack([value, slope + bend + cube, 2 * bend + 6 * cube, 6 * cube])
 
 
 def _integrated_nodes(time: Fraction, spacing: int) -> int:

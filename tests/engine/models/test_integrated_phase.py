@@ -9,8 +9,9 @@ from torch import Tensor
 
 from engine.excitation import draw_gaussians, draw_noise
 from engine.models import MODELS, IntegratedPhaseConfiguration, KoopmanIntegrated, count_parameters
+from engine.models._averaging import FIXED_POINT_STEPS
+from engine.models._cubics import integrate_parabolas
 from engine.models.base import Physics
-from engine.models.integrated_phase import FIXED_POINT_STEPS, integrate_parabolas
 from engine.reference import ModalState, SplittingSolver, solve_linear
 from engine.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
 from engine.string import StringParameters
