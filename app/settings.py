@@ -19,6 +19,9 @@ from app.session import Choices
 from app.sound_names import Source
 from engine.whole_file import whole_file
 
+# what a first start finds at the top: strings at full bandwidth, plucked anywhere
+FIRST_FAVOURITES = ("studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
+
 
 class BatchChoices(BaseModel):
     """The batch page's last state; lists as they were typed."""
@@ -103,7 +106,7 @@ class Settings(BaseModel):
     sound: SoundChoice = SoundChoice()
     look: Look = Look()
     midi: MidiChoices = MidiChoices()
-    favourites: tuple[str, ...] = ()  # names of presets
+    favourites: tuple[str, ...] = FIRST_FAVOURITES  # names of presets
     window_geometry: str = ""  # Qt's, in base64
 
 

@@ -13,10 +13,10 @@ from pytestqt.qtbot import QtBot
 
 from app.controller import Controller
 from app.export import SoundRequest, export_sound
-from app.settings import load_settings
+from app.settings import FIRST_FAVOURITES, load_settings
 from app.views.preset_browser import PresetBrowser
 from engine.pluck import Pluck
-from engine.preset import load_preset
+from engine.preset import load_preset, preset_files
 
 KEY = Qt.Key
 CONTROL = Qt.KeyboardModifier.ControlModifier
@@ -100,7 +100,7 @@ def test_filters_by_kind(controller: Controller, browser: PresetBrowser) -> None
 
 def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
     qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
-    assert controller.presets.favourites == {"first"}
+    assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}
     assert "★" in controller.window.presets.name.text()
     browser._starred.click()
     assert listed(browser) == ["first"]
@@ -110,7 +110,11 @@ def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: Pres
     browser._starred.click()
     browser.favourite_asked.emit("second")
     controller.window.close()
-    assert load_settings(tmp_path / "settings.json")[0].favourites == ("second",)
+    assert load_settings(tmp_path / "settings.json")[0].favourites == ("second", *sorted(FIRST_FAVOURITES))
+
+
+def test_the_first_favourites_are_shipped() -> None:
+    assert {path.stem for path in preset_files()} >= set(FIRST_FAVOURITES)
 
 
 def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, browser: PresetBrowser) -> None:
