@@ -215,6 +215,11 @@ class Player:
         self._commands.put(lambda: self._mixer.set_levels(levels))
 
     @property
+    def track(self) -> Track | None:
+        """The latest that was loaded; it may not be heard yet."""
+        return self._track
+
+    @property
     def rate_hz(self) -> int:
         """The rate that tracks need now."""
         return self._status.rate_hz

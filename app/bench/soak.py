@@ -25,7 +25,7 @@ from app.bench.machine import Machine
 from app.bench.pretended_device import PretendedCard
 from app.bench.random_changes import Repertoire, random_change
 from app.bench.stage import Stage, opened
-from app.controller import LEFT, RIGHT
+from app.panels.rack import LEFT, RIGHT
 from app.settings import Settings
 
 BLOCK_FRAMES = 512
