@@ -18,6 +18,7 @@ from app.preset_words import percent
 from app.render_mail import RenderMail
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.session import Session
+from app.silence import why_ran_away
 from app.slots import render_request
 from app.strikes import MotionKey, Strikes, motion_key
 from engine.metrics import ErrorSums
@@ -160,11 +161,8 @@ class Performance(QObject):
             return
         for panel in self._panels:
             panel.take_finished(take, errors)
-        if take.model_ends_s is not None:
-            self._window.notices.tell(
-                f"The model's output ran away {take.model_ends_s:.2f} s after the pluck and is silent from there; "
-                "the truth goes on. Choose a pluck inside its training, or another preset."
-            )
+        if reason := why_ran_away(take):
+            self._window.notices.tell(reason)
         windows = errors.windows(
             take.info.rate_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s))
         )
