@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import threading
@@ -60,6 +61,7 @@ class _Start(QObject):
 
             dress_plots()
             self._controller = Controller(self._window, self._settings, self._path)
+            spare_the_collector()
         except Exception as error:
             self.failure = error
             QApplication.quit()
@@ -73,6 +75,14 @@ def load_engine() -> None:
     import torch
 
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
+
+
+def spare_the_collector() -> None:
+    """What is loaded by now stays, and garbage is not looked for in it again.
+
+    A look at all of torch holds the interpreter for a quarter of a second, several times the sound that is kept ready.
+    """
+    gc.freeze()
 
 
 def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:

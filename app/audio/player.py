@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from app.audio.devices import AudioDevice, default_device, find
 from app.audio.levels import Levels
 from app.audio.mixer import METER_FLOOR_DB, Mixer
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, vanished
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, stalled, vanished
 from app.audio.silent import SilentOutput
 from app.audio.strand import DECLICK_S
 from app.audio.stream import BUFFER_S, OutputStream
@@ -61,6 +61,7 @@ class Output(Protocol):
     def frames_queued(self) -> int: ...
     def wait_for_space(self, timeout_s: float) -> bool: ...
     def write(self, block: NDArray[np.float32]) -> None: ...
+    def stalled(self) -> bool: ...
     def lost(self) -> bool: ...
     def close(self) -> None: ...
 
@@ -114,7 +115,8 @@ def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
 class Player:
     """Plays tracks through a device, or silently against a clock as long as there is none.
 
-    Every public method may be called from any thread and returns at once. After `close` commands do nothing.
+    Every public method may be called from any thread and returns at once. After `close`, or a fault that ended the
+    feeder and that `on_problem` has heard of, commands do nothing.
 
     Args:
         on_problem: Called once for each fault of a device, from the feeder thread.
@@ -143,7 +145,9 @@ class Player:
         self._track: Track | None = None  # the caller's latest, to refuse a wrong `select` on the spot
         self._lost: AudioDevice | None = None  # vanished while it was ours: tried again now and then
         self._try_again_s = 0.0
+        self._stalled = False  # and told
         self._commands: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._over = False  # nobody obeys any more
         self._closing = threading.Event()
         self._status = PlayerStatus(rate_hz=rate_hz)
         self._feeder = threading.Thread(target=self._feed, name="audio-feeder", daemon=True)
@@ -169,11 +173,11 @@ class Player:
             rescan: Looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
         wanted = _Wanted(device, buffer_s, rate_hz, buffer_frames)
-        self._commands.put(lambda: self._change_output(wanted, rescan))
+        self._send(lambda: self._change_output(wanted, rescan))
 
     def sound_tone(self, side: Side) -> None:
         """A soft tone for a second on one side, whatever else is playing."""
-        self._commands.put(lambda: self._start_tone(side))
+        self._send(lambda: self._start_tone(side))
 
     def load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
         """Takes another track: from its beginning, at the same position, or beside the last; see `Mixer.load`."""
@@ -181,38 +185,38 @@ class Player:
         if track.rate_hz != rate_hz:
             raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
         self._track = track
-        self._commands.put(lambda: self._load(track, keep_position, ring))
+        self._send(lambda: self._load(track, keep_position, ring))
 
     def play(self) -> None:
-        self._commands.put(lambda: self._mixer.play())
+        self._send(lambda: self._mixer.play())
 
     def stop(self) -> None:
-        self._commands.put(lambda: self._mixer.stop())
+        self._send(lambda: self._mixer.stop())
 
     def seek(self, position_s: float) -> None:
         if not math.isfinite(position_s):
             raise ValueError(f"The playhead cannot go to {position_s} s.")
-        self._commands.put(lambda: self._mixer.seek(position_s))
+        self._send(lambda: self._mixer.seek(position_s))
 
     def select(self, source: str) -> None:
         """Cross-fades to another source of the track, at the same position."""
         track = self._track
         if track is not None and source not in track.sources:
             raise ValueError(f"The track has no source {source!r}, only {track.sources}.")
-        self._commands.put(lambda: self._select(source))
+        self._send(lambda: self._select(source))
 
     def set_loop(self, on: bool) -> None:
-        self._commands.put(lambda: self._mixer.set_loop(on))
+        self._send(lambda: self._mixer.set_loop(on))
 
     def set_volume_db(self, volume_db: float) -> None:
         """0 dB plays the samples as they are, minus infinity mutes."""
         if math.isnan(volume_db) or volume_db == math.inf:
             raise ValueError(f"The volume cannot be {volume_db} dB.")
-        self._commands.put(lambda: self._mixer.set_volume_db(volume_db))
+        self._send(lambda: self._mixer.set_volume_db(volume_db))
 
     def set_levels(self, levels: Levels) -> None:
         """How loud each source is played; see `Levels`."""
-        self._commands.put(lambda: self._mixer.set_levels(levels))
+        self._send(lambda: self._mixer.set_levels(levels))
 
     @property
     def track(self) -> Track | None:
@@ -233,6 +237,10 @@ class Player:
         if threading.current_thread() is not self._feeder:
             self._feeder.join(_JOIN_TIMEOUT_S)
 
+    def _send(self, command: Callable[[], None]) -> None:
+        if not self._over:
+            self._commands.put(command)
+
     def __enter__(self) -> Player:
         return self
 
@@ -250,8 +258,11 @@ class Player:
                 self._obey_commands()  # after the wait, so that the block to come knows the latest of them
                 if self._output.wait_for_space(0):  # again: a command may have used it, or changed the output
                     self._write_block()
+                    self._end_stall()
                 elif self._output.lost():
                     self._go_silent()
+                elif self._output.stalled():
+                    self._begin_stall()
                 self._look_for_the_lost()
                 self._publish()
         except Exception:
@@ -265,7 +276,11 @@ class Player:
             )
             self._status = replace(self._status, playing=False, problem=self._problem)
         finally:
+            self._over = True
             self._output.close()
+            with contextlib.suppress(Empty):
+                while True:  # they may hold tracks
+                    self._commands.get_nowait()
 
     def _obey_commands(self) -> None:
         while True:
@@ -344,6 +359,17 @@ class Player:
             if self._output.wait_for_space(_WAIT_S):
                 self._write_block()
 
+    def _begin_stall(self) -> None:
+        """The device takes nothing, but has not gone: it is told once, and kept."""
+        if not self._stalled:
+            self._stalled = True
+            device = self._output.device
+            self._report(stalled("" if device is None else device.name))
+
+    def _end_stall(self) -> None:
+        if self._stalled:
+            self._stalled, self._problem = False, None
+
     def _go_silent(self) -> None:
         """The device has vanished: the pictures move on without sound."""
         device = self._output.device
@@ -365,7 +391,7 @@ class Player:
         self._lost, self._problem = None, None
 
     def _adopt_output(self, output: Output) -> None:
-        old, self._output = self._output, output
+        old, self._output, self._stalled = self._output, output, False
         if output.rate_hz != self._mixer.rate_hz:
             self._mixer = self._mixer.emptied(output.rate_hz)
         self._timeline = Timeline(self._mixer.position_frames)

@@ -157,7 +157,8 @@ def soak(
             ("longest stall of the window, s", found.longest_stall_s, 0.1),
             ("memory when settled, MiB", found.settled_mib, None),
             ("memory at the end, MiB", found.end_mib, None),
-            ("highest above settled, MiB", found.drift_mib, 50),
+            ("highest above settled, MiB", found.drift_mib, 20),
+            ("memory at its most, MiB", found.peak_mib, None),
             ("threads left", len(found.threads_left), 0),
             ("faults", sum(times for _, times in found.faults), 0),
         ]
