@@ -80,7 +80,7 @@ def load_engine() -> None:
 def spare_the_collector() -> None:
     """What is loaded by now stays, and garbage is not looked for in it again.
 
-    A look at all of torch holds the interpreter for a quarter of a second, several times the sound that is kept ready.
+    A look at all of torch holds the interpreter for a quarter of a second, many times what a callback can wait.
     """
     gc.freeze()
 

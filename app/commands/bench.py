@@ -116,7 +116,7 @@ def train(json: Json = False) -> None:
 def app(
     json: Json = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long the picture is watched.")] = 5.0,
-    starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 5,
+    starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 3,
 ) -> None:
     """The window: its start, how soon a pluck sounds, how smoothly the picture moves. It opens for a minute."""
     from app.bench.app import measure

@@ -10,7 +10,7 @@ from app.settings import Settings
 
 
 def test_bench_app_tells_every_figure_with_its_target(bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    starts = [Start(1.0, 2.0 + n, 9.0) for n in range(3)]
+    starts = [Start(1.0, 2.0 + n) for n in range(3)]
     monkeypatch.setattr("app.bench.app.measure_starts", lambda count, report: starts[:count])
     for name, value in (
         ("PLUCKS", 2),
@@ -18,6 +18,7 @@ def test_bench_app_tells_every_figure_with_its_target(bench, monkeypatch: pytest
         ("SETTLING_S", 0.1),
         ("SIZE", (900, 600)),
         ("BUFFERS", ("low",)),
+        ("PICTURE_S", 0.5),
     ):
         monkeypatch.setattr(f"app.bench.app.{name}", value)
     monkeypatch.setattr("app.bench.app.Settings", lambda: Settings(choices=Choices(seconds=0.5)))
