@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 import threading
@@ -17,6 +16,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.main_window import MainWindow
+from app.memory import return_large_blocks, spare_the_collector
 from app.settings import Settings, load_settings, settings_file
 from app.views.theme import apply_theme
 
@@ -77,17 +77,10 @@ def load_engine() -> None:
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
 
-def spare_the_collector() -> None:
-    """What is loaded by now stays, and garbage is not looked for in it again.
-
-    A look at all of torch holds the interpreter for a quarter of a second, many times what a callback can wait.
-    """
-    gc.freeze()
-
-
 def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
     """Opens the app and returns its exit status when it is closed. `watch` is given the window before it is shown."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return_large_blocks()
     path = settings_file()
     settings, notice = load_settings(path)
     if settings.look.size_percent != 100:  # Qt reads it when the application is made

@@ -16,17 +16,17 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.audio.devices import AudioDevice, default_device, find
+from app.audio.devices import AudioDevice
 from app.audio.levels import Levels
-from app.audio.mixer import METER_FLOOR_DB, Mixer
+from app.audio.mixer import Mixer
+from app.audio.output import Output, Wanted, look_up, same_device
+from app.audio.player_status import DEFAULT_RATE_HZ, PlayerStatus
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, stalled, vanished
 from app.audio.silent import SilentOutput
 from app.audio.strand import DECLICK_S
@@ -36,80 +36,9 @@ from app.audio.tone import Side, Tone
 from app.audio.track import Track
 
 TRY_AGAIN_S = 2.0  # between two looks for a device that vanished
-DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
 
 _WAIT_S = 0.05  # the longest time that the feeder looks at neither its commands nor the device's pulse
 _JOIN_TIMEOUT_S = 5.0
-
-
-class Output(Protocol):
-    """Where blocks go: an `OutputStream` or a `SilentOutput`."""
-
-    @property
-    def device(self) -> AudioDevice | None: ...
-    @property
-    def rate_hz(self) -> int: ...
-    @property
-    def block_frames(self) -> int: ...
-    @property
-    def latency_s(self) -> float: ...
-    @property
-    def underruns(self) -> int: ...
-    @property
-    def frames_written(self) -> int: ...
-    @property
-    def frames_queued(self) -> int: ...
-    def wait_for_space(self, timeout_s: float) -> bool: ...
-    def write(self, block: NDArray[np.float32]) -> None: ...
-    def stalled(self) -> bool: ...
-    def lost(self) -> bool: ...
-    def close(self) -> None: ...
-
-
-@dataclass(frozen=True)
-class PlayerStatus:
-    """A snapshot of the player, some 10 ms old at most."""
-
-    position_s: float = 0.0  # of what is heard now: written to the device, less its latency
-    playing: bool = False  # as rendered: the last of it is heard a queue and `latency_s` later
-    waiting: bool = False  # playing, but rendering has not arrived at the playhead
-    ringing: int = 0  # earlier plucks that still sound
-    source: str | None = None
-    peak_db: float = METER_FLOOR_DB  # dBFS, after volume and limiter
-    gain_reduction_db: float = 0.0
-    limiting: bool = False  # the safety limiter changes what is heard
-    non_finite: bool = False  # samples of the loaded track were replaced by silence
-    underruns: int = 0  # of the present device
-    device: AudioDevice | None = None  # None: silent
-    rate_hz: int = DEFAULT_RATE_HZ  # of the tracks; opening a device may change it and unload the track
-    latency_s: float = 0.0
-    changes_done: int = 0  # how many calls of `open` have been obeyed, or refused
-    problem: str | None = None  # why there is no sound, or why the last device could not be opened
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    """An output as it was asked for; see `Player.open`."""
-
-    device: AudioDevice | None = None
-    buffer_s: float = BUFFER_S
-    rate_hz: int = 0
-    buffer_frames: int = 0
-
-    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
-        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
-
-    def buffer_s_at(self, rate_hz: int) -> float:
-        return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
-
-
-def _same(one: AudioDevice, other: AudioDevice) -> bool:
-    return (one.name, one.host_api) == (other.name, other.host_api)
-
-
-def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
-    """The device as it is now, or, for None, the system's default."""
-    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
 
 
 class Player:
@@ -138,7 +67,7 @@ class Player:
         self._output: Output = SilentOutput(rate_hz)
         self._buffer_s = BUFFER_S
         self._timeline = Timeline(0)
-        self._wanted = _Wanted()
+        self._wanted = Wanted()
         self._changes_done = 0
         self._tone: Tone | None = None
         self._problem: str | None = None
@@ -172,7 +101,7 @@ class Player:
             buffer_frames: The buffer in frames at that rate; 0 for `buffer_s`.
             rescan: Looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
-        wanted = _Wanted(device, buffer_s, rate_hz, buffer_frames)
+        wanted = Wanted(device, buffer_s, rate_hz, buffer_frames)
         self._send(lambda: self._change_output(wanted, rescan))
 
     def sound_tone(self, side: Side) -> None:
@@ -314,7 +243,7 @@ class Player:
         alone = device is not None and device.channels == 1
         self._tone = Tone(self._output.rate_hz, "both" if alone else side)
 
-    def _change_output(self, wanted: _Wanted, rescan: bool) -> None:
+    def _change_output(self, wanted: Wanted, rescan: bool) -> None:
         present, present_buffer_s = self._output.device, self._buffer_s
         was_playing = self._mixer.status().playing
         self._lost = self._tone = None
@@ -328,7 +257,7 @@ class Player:
             device = wanted.at_its_rate(self._look_up(wanted.device, present is None or released))
             buffer_s = wanted.buffer_s_at(device.default_rate_hz)
             if released or device != present or buffer_s != present_buffer_s:
-                if present is not None and not released and _same(device, present):
+                if present is not None and not released and same_device(device, present):
                     self._adopt_output(SilentOutput(self._output.rate_hz))  # it might refuse to be opened twice
                     released = True
                 self._adopt_output(self._open_output(device, buffer_s))

@@ -18,8 +18,9 @@ from PySide6.QtWidgets import QApplication
 from app.bench.display import choose_display
 from app.bench.pretended_device import PretendedCard
 from app.controller import Controller
-from app.main import SWITCH_INTERVAL_S, load_engine, spare_the_collector
+from app.main import SWITCH_INTERVAL_S, load_engine
 from app.main_window import MainWindow
+from app.memory import return_large_blocks, spare_the_collector
 from app.settings import Settings
 from app.views.plots import dress_plots
 from app.views.theme import apply_theme
@@ -64,6 +65,7 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
     assert isinstance(application, QApplication)
     interval_s, threads = sys.getswitchinterval(), torch.get_num_threads()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return_large_blocks()
     load_engine()
     apply_theme(application, settings.look.face)
     dress_plots()
