@@ -43,6 +43,7 @@ from app.views.string_view import StringView
 from engine.preset import SHIPPED
 
 FRAME_MS = 16
+GIVE_WAY_TICKS = 3  # at most so many pictures are left out for the first block of a struck pluck
 ProblemListener = Callable[[AudioProblem], None]
 
 
@@ -72,6 +73,7 @@ class Controller(QObject):
         self.audio = AudioControl(window, self.player, settings.device, settings.sound)
         self.appearance = Appearance(window, settings.look)
         self._last_tick_s = time.monotonic()
+        self._ticks_given = 0
         self._abx: AbxDialog | None = None  # while it is open, the player is its own
         self._help: HelpDialog | None = None
         self.library = Library([])
@@ -290,6 +292,9 @@ class Controller(QObject):
         self.audio.show(status, take)
         position_s = min(status.position_s, take.seconds) if take is not None else 0.0
         moment = Moment(take, position_s, status.playing, elapsed_s)
+        self._ticks_given = self._ticks_given + 1 if self.performance.strikes.awaited else 0
+        if 0 < self._ticks_given <= GIVE_WAY_TICKS:
+            return  # whoever renders it needs the interpreter more
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)

@@ -22,8 +22,8 @@ def spare_the_collector() -> None:
 def return_large_blocks() -> None:
     """Blocks of a MiB and more go back to the system when they are freed.
 
-    glibc learns from the first large ones that are freed to keep them; takes of many sizes that come and go then leave
-    holes, a hundred MiB and more of them.
+    glibc learns from the first large ones that are freed to keep them; takes of many sizes that come and go then
+    leave holes, a hundred MiB and more of them.
     """
     if sys.platform == "linux":
         with contextlib.suppress(OSError, AttributeError):  # another C library

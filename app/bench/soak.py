@@ -50,9 +50,9 @@ class Soak:
         waited_share: of the time in which rendering lagged behind what was to be heard.
         longest_stall_s: for which the window did nothing.
         settled_mib, end_mib, drift_mib: resident memory after the first minute (or half of a shorter time) and at
-            the end, and how far it rose above the former meanwhile: medians of `MEDIAN_S`, for takes of many sizes
-            come and go, the largest of them more than a hundred MiB.
-        peak_mib: the most that it ever was.
+            the end, and how far it rose above the former meanwhile: without the take on stage, which may have more
+            than a hundred MiB or nearly none, and as medians of `MEDIAN_S`, for the last one goes a little later.
+        peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
         faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
             and of Qt; each once, with its number.
@@ -183,7 +183,8 @@ class _Watch(QObject):
         self._weighed_s = now_s
         self.latest_mib = _resident_mib()
         self.peak_mib = max(self.peak_mib, self.latest_mib)
-        self._weights_mib.append((now_s, self.latest_mib))
+        take = self._stage.controller.performance.take
+        self._weights_mib.append((now_s, self.latest_mib - (0 if take is None else take.ready_bytes / MIB)))
         while self._weights_mib[0][0] < now_s - min(MEDIAN_S, self._settled_after_s / 2):
             self._weights_mib.popleft()
         self.typical_mib = statistics.median(mib for _, mib in self._weights_mib)

@@ -29,6 +29,10 @@ class Motion:
     def complete(self) -> bool:
         return self.ready_frames == self.frames
 
+    @property
+    def ready_bytes(self) -> int:
+        return self.ready_frames * self._m.shape[1] * self._m.itemsize
+
     def append(self, frames_m: NDArray[np.float32]) -> None:
         start, stop = self.ready_frames, self.ready_frames + len(frames_m)
         self._m[start:stop] = frames_m
@@ -75,6 +79,11 @@ class Take:
     @property
     def seconds(self) -> float:
         return (self.frames - 1) / self.info.rate_hz
+
+    @property
+    def ready_bytes(self) -> int:
+        """Memory that its frames take so far, those of `others` among them."""
+        return sum(motion.ready_bytes for motion in (*self._motions.values(), *self.others.values()))
 
     def motion(self, source: str) -> Motion:
         """The growing motion of a source, of "model", "truth" or one of `others`."""

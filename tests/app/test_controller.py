@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from pytestqt.qtbot import QtBot
 
-from app.controller import Controller
+from app.controller import GIVE_WAY_TICKS, Controller
 from app.main_window import MainWindow
 from app.session import Choices
 from app.settings import Settings, load_settings
@@ -320,6 +320,21 @@ def test_a_pluck_that_is_overtaken_sounds_all_the_same(qtbot: QtBot, controller:
         controller.pluck()
     qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=20_000)
     assert not controller.performance.strikes.awaited
+
+
+def test_the_picture_gives_way_to_a_struck_pluck_but_not_for_long(
+    qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait_for_take(qtbot, controller)
+    controller._timer.stop()
+    shown: list[object] = []
+    monkeypatch.setattr(controller.panels[0], "show_moment", shown.append)
+    controller.performance.strikes.expect(("never", controller.session.choices.pluck, 1))
+    for _ in range(GIVE_WAY_TICKS):
+        controller._tick()
+    assert shown == []
+    controller._tick()
+    assert len(shown) == 1
 
 
 def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, controller: Controller) -> None:
