@@ -356,12 +356,15 @@ class StringView(QWidget):
         """The ground, and the envelopes of a motion, painted anew only when one of them changes."""
         ground = self._ground(axes)
         if self._frame is None or self._shows_pluck or not self._frame.envelopes:
-            self._backdrop = None
             return ground
         envelopes = self._frame.envelopes
         if self._backdrop is None or self._backdrop[0] is not ground or self._backdrop[1] is not envelopes:
-            picture = QPixmap(ground)
-            painter = QPainter(picture)
+            picture = None if self._backdrop is None else self._backdrop[2]
+            if picture is None or picture.size() != ground.size():
+                picture = QPixmap(ground.size())
+            picture.setDevicePixelRatio(ground.devicePixelRatio())
+            painter = QPainter(picture)  # over the last one: to make another takes longer than to paint it
+            painter.drawPixmap(0, 0, ground)
             paint_envelopes(painter, axes, envelopes, self._heard)
             painter.end()
             self._backdrop = (ground, envelopes, picture)
