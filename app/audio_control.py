@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
-from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, PlayerStatus, output_devices
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, PlayerStatus, ProblemKind, output_devices
 from app.main_window import MainWindow
 from app.settings import Buffer, DeviceChoice, SoundChoice
 from app.views.audio_dialog import AudioDialog, AudioState
@@ -52,9 +52,12 @@ class AudioControl(QObject):
 
     def tell(self, problem: AudioProblem) -> None:
         """A fault, with what it means for now."""
-        device = self._player.status().device
-        meanwhile = f"“{device.name}” plays on." if device else "The app goes on without sound."
-        self._notice = f"{problem} {meanwhile}"
+        if self._notice:
+            self._window.notices.withdraw(self._notice)  # one word on the sound at a time
+        self._notice = str(problem)
+        if problem.kind is not ProblemKind.STALLED:
+            device = self._player.status().device
+            self._notice += f" “{device.name}” plays on." if device else " The app goes on without sound."
         self._window.notices.tell(self._notice, problem.detail)
 
     def show(self, status: PlayerStatus, take: Take | None) -> None:

@@ -16,6 +16,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.main_window import MainWindow
+from app.memory import return_large_blocks, spare_the_collector
 from app.settings import Settings, load_settings, settings_file
 from app.views.theme import apply_theme
 
@@ -60,6 +61,7 @@ class _Start(QObject):
 
             dress_plots()
             self._controller = Controller(self._window, self._settings, self._path)
+            spare_the_collector()
         except Exception as error:
             self.failure = error
             QApplication.quit()
@@ -78,6 +80,7 @@ def load_engine() -> None:
 def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
     """Opens the app and returns its exit status when it is closed. `watch` is given the window before it is shown."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return_large_blocks()
     path = settings_file()
     settings, notice = load_settings(path)
     if settings.look.size_percent != 100:  # Qt reads it when the application is made

@@ -15,7 +15,7 @@ from app.views.string_ink import Band, StringFrame
 
 BLUR_S = 1 / 60  # an eye's or a picture's exposure
 ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
-ENVELOPE_BLOCK_S = 0.02
+ENVELOPE_BLOCK_S = 0.05
 MM = np.float32(1000)
 
 
@@ -52,20 +52,26 @@ class Envelope:
         self._lowest_mm = {name: np.zeros((blocks, points), np.float32) for name in SOURCES}
         self._highest_mm = {name: np.zeros((blocks, points), np.float32) for name in SOURCES}
         self._known = np.zeros(blocks, bool)
+        self._shown: tuple[tuple[int, int], dict[str, Band]] = ((0, 0), {})
 
     def before(self, position_s: float) -> dict[str, Band]:
-        """Lowest and highest displacement (points,) in mm by source, in whole blocks up to the playhead."""
+        """Lowest and highest displacement (points,) in mm by source, in whole blocks up to the playhead.
+
+        The same object as the last time, where nothing has changed since.
+        """
         rate_hz = self._take.info.rate_hz
         last = min(int(position_s * rate_hz), self._take.ready_frames) // self._block
         first = max(0, last - round(ENVELOPE_S / ENVELOPE_BLOCK_S))
-        if last == first:
-            return {}
-        for block in np.flatnonzero(~self._known[first:last]) + first:
-            self._look_at(int(block))
-        return {
-            name: (self._lowest_mm[name][first:last].min(axis=0), self._highest_mm[name][first:last].max(axis=0))
-            for name in SOURCES
-        }
+        if (first, last) != self._shown[0]:
+            for block in np.flatnonzero(~self._known[first:last]) + first:
+                self._look_at(int(block))
+            bands = {
+                name: (self._lowest_mm[name][first:last].min(axis=0), self._highest_mm[name][first:last].max(axis=0))
+                for name in SOURCES
+                if first < last
+            }
+            self._shown = (first, last), bands
+        return self._shown[1]
 
     def _look_at(self, block: int) -> None:
         frames = slice(block * self._block, (block + 1) * self._block)

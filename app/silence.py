@@ -10,9 +10,11 @@ from app.library import Library
 from app.rendering import Listening, Take
 from app.session import VOLUME_RANGE_DB, Choices
 from app.slots import other_preset
+from engine.preset import outside_training
 from engine.sine_transform import to_modes
 
 FAINT_DB = -70.0  # below full scale nobody hears a thing
+AT_ONCE_S = 0.01  # a model that runs away before this was never a string
 
 
 def listening(choices: Choices) -> Listening:
@@ -34,6 +36,23 @@ def why_silent(choices: Choices, library: Library) -> str:
         if entry.unplayable:
             return f"silent: {entry.unplayable}"
     return _why_points_silent(choices) or _why_solo_silent(choices, library)
+
+
+def why_ran_away(take: Take) -> str:
+    """From when on a take's model is silent because its output was no string's, and what helps; or nothing."""
+    if take.model_ends_s is None:
+        return ""
+    title, outside = take.info.title, "; ".join(outside_training(take.info, take.pluck))
+    if take.model_ends_s < AT_ONCE_S:
+        what = f"The model of {title} cannot play this pluck and is silent: its output grows without bound at once."
+    else:
+        what = (
+            f"The output of {title}'s model ran away {take.model_ends_s:.2f} s after the pluck, and the model is "
+            "silent from there."
+        )
+    if outside:
+        return f"{what} It was not trained for such plucks ({outside}). Choose one inside it; the truth plays."
+    return f"{what} Choose another pluck or another preset; the truth plays."
 
 
 def why_difference_silent(choices: Choices, take: Take) -> str:

@@ -3,7 +3,8 @@
 from app.audio.devices import AudioDevice, default_device, find, output_devices
 from app.audio.levels import Levels
 from app.audio.mixer import Mixer, MixerStatus
-from app.audio.player import DEFAULT_RATE_HZ, Player, PlayerStatus
+from app.audio.player import Player
+from app.audio.player_status import DEFAULT_RATE_HZ, PlayerStatus
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.track import Track
 

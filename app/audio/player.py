@@ -16,18 +16,18 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.audio.devices import AudioDevice, default_device, find
+from app.audio.devices import AudioDevice
 from app.audio.levels import Levels
-from app.audio.mixer import METER_FLOOR_DB, Mixer
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, vanished
+from app.audio.mixer import Mixer
+from app.audio.output import Output, Wanted, look_up, same_device
+from app.audio.player_status import DEFAULT_RATE_HZ, PlayerStatus
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, stalled, vanished
 from app.audio.silent import SilentOutput
 from app.audio.strand import DECLICK_S
 from app.audio.stream import BUFFER_S, OutputStream
@@ -36,85 +36,16 @@ from app.audio.tone import Side, Tone
 from app.audio.track import Track
 
 TRY_AGAIN_S = 2.0  # between two looks for a device that vanished
-DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
 
 _WAIT_S = 0.05  # the longest time that the feeder looks at neither its commands nor the device's pulse
 _JOIN_TIMEOUT_S = 5.0
 
 
-class Output(Protocol):
-    """Where blocks go: an `OutputStream` or a `SilentOutput`."""
-
-    @property
-    def device(self) -> AudioDevice | None: ...
-    @property
-    def rate_hz(self) -> int: ...
-    @property
-    def block_frames(self) -> int: ...
-    @property
-    def latency_s(self) -> float: ...
-    @property
-    def underruns(self) -> int: ...
-    @property
-    def frames_written(self) -> int: ...
-    @property
-    def frames_queued(self) -> int: ...
-    def wait_for_space(self, timeout_s: float) -> bool: ...
-    def write(self, block: NDArray[np.float32]) -> None: ...
-    def lost(self) -> bool: ...
-    def close(self) -> None: ...
-
-
-@dataclass(frozen=True)
-class PlayerStatus:
-    """A snapshot of the player, some 10 ms old at most."""
-
-    position_s: float = 0.0  # of what is heard now: written to the device, less its latency
-    playing: bool = False  # as rendered: the last of it is heard a queue and `latency_s` later
-    waiting: bool = False  # playing, but rendering has not arrived at the playhead
-    ringing: int = 0  # earlier plucks that still sound
-    source: str | None = None
-    peak_db: float = METER_FLOOR_DB  # dBFS, after volume and limiter
-    gain_reduction_db: float = 0.0
-    limiting: bool = False  # the safety limiter changes what is heard
-    non_finite: bool = False  # samples of the loaded track were replaced by silence
-    underruns: int = 0  # of the present device
-    device: AudioDevice | None = None  # None: silent
-    rate_hz: int = DEFAULT_RATE_HZ  # of the tracks; opening a device may change it and unload the track
-    latency_s: float = 0.0
-    changes_done: int = 0  # how many calls of `open` have been obeyed, or refused
-    problem: str | None = None  # why there is no sound, or why the last device could not be opened
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    """An output as it was asked for; see `Player.open`."""
-
-    device: AudioDevice | None = None
-    buffer_s: float = BUFFER_S
-    rate_hz: int = 0
-    buffer_frames: int = 0
-
-    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
-        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
-
-    def buffer_s_at(self, rate_hz: int) -> float:
-        return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
-
-
-def _same(one: AudioDevice, other: AudioDevice) -> bool:
-    return (one.name, one.host_api) == (other.name, other.host_api)
-
-
-def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
-    """The device as it is now, or, for None, the system's default."""
-    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
-
-
 class Player:
     """Plays tracks through a device, or silently against a clock as long as there is none.
 
-    Every public method may be called from any thread and returns at once. After `close` commands do nothing.
+    Every public method may be called from any thread and returns at once. After `close`, or a fault that ended the
+    feeder and that `on_problem` has heard of, commands do nothing.
 
     Args:
         on_problem: Called once for each fault of a device, from the feeder thread.
@@ -136,14 +67,16 @@ class Player:
         self._output: Output = SilentOutput(rate_hz)
         self._buffer_s = BUFFER_S
         self._timeline = Timeline(0)
-        self._wanted = _Wanted()
+        self._wanted = Wanted()
         self._changes_done = 0
         self._tone: Tone | None = None
         self._problem: str | None = None
         self._track: Track | None = None  # the caller's latest, to refuse a wrong `select` on the spot
         self._lost: AudioDevice | None = None  # vanished while it was ours: tried again now and then
         self._try_again_s = 0.0
+        self._stalled = False  # and told
         self._commands: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._over = False  # nobody obeys any more
         self._closing = threading.Event()
         self._status = PlayerStatus(rate_hz=rate_hz)
         self._feeder = threading.Thread(target=self._feed, name="audio-feeder", daemon=True)
@@ -168,12 +101,12 @@ class Player:
             buffer_frames: The buffer in frames at that rate; 0 for `buffer_s`.
             rescan: Looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
-        wanted = _Wanted(device, buffer_s, rate_hz, buffer_frames)
-        self._commands.put(lambda: self._change_output(wanted, rescan))
+        wanted = Wanted(device, buffer_s, rate_hz, buffer_frames)
+        self._send(lambda: self._change_output(wanted, rescan))
 
     def sound_tone(self, side: Side) -> None:
         """A soft tone for a second on one side, whatever else is playing."""
-        self._commands.put(lambda: self._start_tone(side))
+        self._send(lambda: self._start_tone(side))
 
     def load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
         """Takes another track: from its beginning, at the same position, or beside the last; see `Mixer.load`."""
@@ -181,38 +114,43 @@ class Player:
         if track.rate_hz != rate_hz:
             raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
         self._track = track
-        self._commands.put(lambda: self._load(track, keep_position, ring))
+        self._send(lambda: self._load(track, keep_position, ring))
 
     def play(self) -> None:
-        self._commands.put(lambda: self._mixer.play())
+        self._send(lambda: self._mixer.play())
 
     def stop(self) -> None:
-        self._commands.put(lambda: self._mixer.stop())
+        self._send(lambda: self._mixer.stop())
 
     def seek(self, position_s: float) -> None:
         if not math.isfinite(position_s):
             raise ValueError(f"The playhead cannot go to {position_s} s.")
-        self._commands.put(lambda: self._mixer.seek(position_s))
+        self._send(lambda: self._mixer.seek(position_s))
 
     def select(self, source: str) -> None:
         """Cross-fades to another source of the track, at the same position."""
         track = self._track
         if track is not None and source not in track.sources:
             raise ValueError(f"The track has no source {source!r}, only {track.sources}.")
-        self._commands.put(lambda: self._select(source))
+        self._send(lambda: self._select(source))
 
     def set_loop(self, on: bool) -> None:
-        self._commands.put(lambda: self._mixer.set_loop(on))
+        self._send(lambda: self._mixer.set_loop(on))
 
     def set_volume_db(self, volume_db: float) -> None:
         """0 dB plays the samples as they are, minus infinity mutes."""
         if math.isnan(volume_db) or volume_db == math.inf:
             raise ValueError(f"The volume cannot be {volume_db} dB.")
-        self._commands.put(lambda: self._mixer.set_volume_db(volume_db))
+        self._send(lambda: self._mixer.set_volume_db(volume_db))
 
     def set_levels(self, levels: Levels) -> None:
         """How loud each source is played; see `Levels`."""
-        self._commands.put(lambda: self._mixer.set_levels(levels))
+        self._send(lambda: self._mixer.set_levels(levels))
+
+    @property
+    def track(self) -> Track | None:
+        """The latest that was loaded; it may not be heard yet."""
+        return self._track
 
     @property
     def rate_hz(self) -> int:
@@ -227,6 +165,10 @@ class Player:
         self._closing.set()
         if threading.current_thread() is not self._feeder:
             self._feeder.join(_JOIN_TIMEOUT_S)
+
+    def _send(self, command: Callable[[], None]) -> None:
+        if not self._over:
+            self._commands.put(command)
 
     def __enter__(self) -> Player:
         return self
@@ -245,8 +187,11 @@ class Player:
                 self._obey_commands()  # after the wait, so that the block to come knows the latest of them
                 if self._output.wait_for_space(0):  # again: a command may have used it, or changed the output
                     self._write_block()
+                    self._end_stall()
                 elif self._output.lost():
                     self._go_silent()
+                elif self._output.stalled():
+                    self._begin_stall()
                 self._look_for_the_lost()
                 self._publish()
         except Exception:
@@ -260,7 +205,11 @@ class Player:
             )
             self._status = replace(self._status, playing=False, problem=self._problem)
         finally:
+            self._over = True
             self._output.close()
+            with contextlib.suppress(Empty):
+                while True:  # they may hold tracks
+                    self._commands.get_nowait()
 
     def _obey_commands(self) -> None:
         while True:
@@ -294,7 +243,7 @@ class Player:
         alone = device is not None and device.channels == 1
         self._tone = Tone(self._output.rate_hz, "both" if alone else side)
 
-    def _change_output(self, wanted: _Wanted, rescan: bool) -> None:
+    def _change_output(self, wanted: Wanted, rescan: bool) -> None:
         present, present_buffer_s = self._output.device, self._buffer_s
         was_playing = self._mixer.status().playing
         self._lost = self._tone = None
@@ -308,7 +257,7 @@ class Player:
             device = wanted.at_its_rate(self._look_up(wanted.device, present is None or released))
             buffer_s = wanted.buffer_s_at(device.default_rate_hz)
             if released or device != present or buffer_s != present_buffer_s:
-                if present is not None and not released and _same(device, present):
+                if present is not None and not released and same_device(device, present):
                     self._adopt_output(SilentOutput(self._output.rate_hz))  # it might refuse to be opened twice
                     released = True
                 self._adopt_output(self._open_output(device, buffer_s))
@@ -339,6 +288,17 @@ class Player:
             if self._output.wait_for_space(_WAIT_S):
                 self._write_block()
 
+    def _begin_stall(self) -> None:
+        """The device takes nothing, but has not gone: it is told once, and kept."""
+        if not self._stalled:
+            self._stalled = True
+            device = self._output.device
+            self._report(stalled("" if device is None else device.name))
+
+    def _end_stall(self) -> None:
+        if self._stalled:
+            self._stalled, self._problem = False, None
+
     def _go_silent(self) -> None:
         """The device has vanished: the pictures move on without sound."""
         device = self._output.device
@@ -360,7 +320,7 @@ class Player:
         self._lost, self._problem = None, None
 
     def _adopt_output(self, output: Output) -> None:
-        old, self._output = self._output, output
+        old, self._output, self._stalled = self._output, output, False
         if output.rate_hz != self._mixer.rate_hz:
             self._mixer = self._mixer.emptied(output.rate_hz)
         self._timeline = Timeline(self._mixer.position_frames)

@@ -11,6 +11,7 @@ class ProblemKind(StrEnum):
     NO_DEVICE = "no_device"
     BUSY = "busy"
     RATE_REFUSED = "rate_refused"
+    STALLED = "stalled"
     VANISHED = "vanished"
     OTHER = "other"
 
@@ -82,6 +83,14 @@ def no_device(detail: str = "") -> AudioUnavailable:
             "Connect loudspeakers or headphones and choose them in the audio settings.",
             detail,
         )
+    )
+
+
+def stalled(device_name: str) -> AudioProblem:
+    return AudioProblem(
+        ProblemKind.STALLED,
+        f"The sound output “{device_name}” takes no sound at the moment.",
+        "The app keeps trying; if it goes on, choose another one in the audio settings.",
     )
 
 

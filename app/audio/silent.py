@@ -42,6 +42,9 @@ class SilentOutput:
             self._next_block_s = now_s
         self._next_block_s += len(block) / self.rate_hz
 
+    def stalled(self) -> bool:
+        return False
+
     def lost(self) -> bool:
         return False
 

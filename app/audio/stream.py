@@ -22,7 +22,8 @@ from app.audio.problems import refused
 BLOCK_FRAMES = 256
 SHORTEST_BLOCK = 64
 BUFFER_S = 0.025  # of ready sound: outlasts a busy moment of Python, and delays a command by as much
-LOST_AFTER_S = 1.5
+STALLED_AFTER_S = 1.5  # without a callback
+LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
 SETTLING_S = 0.1
 START_GRACE_S = 3.0  # some sound servers let a new stream stand still for a second or two
 
@@ -94,8 +95,12 @@ class OutputStream:
         self._next = None
         self.frames_queued += self.block_frames
 
+    def stalled(self) -> bool:
+        """Whether the device takes nothing at the moment. To be asked again and again, by one thread."""
+        return self._alive.silence_s(self.callback_count) > STALLED_AFTER_S
+
     def lost(self) -> bool:
-        """Whether the device has gone: it calls back no more. To be asked again and again, by one thread."""
+        """Whether the device has gone: it calls back no more. To be asked as `stalled` is."""
         try:
             active = self._raw.active
         except Exception:  # PortAudio itself has already given up the stream

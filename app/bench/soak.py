@@ -6,12 +6,13 @@ at its pace. What is random follows from the seed; how far the rendering of each
 
 from __future__ import annotations
 
+import statistics
 import sys
 import threading
 import time
 import traceback
 import warnings
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from app.bench.machine import Machine
 from app.bench.pretended_device import PretendedCard
 from app.bench.random_changes import Repertoire, random_change
 from app.bench.stage import Stage, opened
-from app.controller import LEFT, RIGHT
+from app.panels.rack import LEFT, RIGHT
 from app.settings import Settings
 
 BLOCK_FRAMES = 512
@@ -33,6 +34,7 @@ SIZE = (1280, 800)
 EVERY_S = 0.5
 LOOK_EVERY_S = 0.02
 WEIGH_EVERY_S = 1.0
+MEDIAN_S = 30.0
 SETTLED_AFTER_S = 60.0  # by then every kind of thing was loaded once, and caches are full
 MOST_CHANGES = 3  # before a pluck
 MIB = 2**20
@@ -48,7 +50,9 @@ class Soak:
         waited_share: of the time in which rendering lagged behind what was to be heard.
         longest_stall_s: for which the window did nothing.
         settled_mib, end_mib, drift_mib: resident memory after the first minute (or half of a shorter time) and at
-            the end, and how far it rose above the former meanwhile.
+            the end, and how far it rose above the former meanwhile: without the take on stage, which may have more
+            than a hundred MiB or nearly none, and as medians of `MEDIAN_S`, for the last one goes a little later.
+        peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
         faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
             and of Qt; each once, with its number.
@@ -68,6 +72,7 @@ class Soak:
     settled_mib: float
     end_mib: float
     drift_mib: float
+    peak_mib: float
     threads_left: tuple[str, ...]
     faults: tuple[tuple[str, int], ...]
     notices: tuple[tuple[str, int], ...]
@@ -100,8 +105,9 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         watch.waiting / max(1, watch.looks),
         watch.longest_stall_s,
         watch.settled_mib,
-        watch.latest_mib,
+        watch.typical_mib,
         watch.highest_mib - watch.settled_mib,
+        watch.peak_mib,
         tuple(sorted(left)),
         tuple(faults.items()),
         tuple((notice.message, notice.times) for notice in notices),
@@ -150,7 +156,8 @@ class _Watch(QObject):
         super().__init__(stage.window)
         self.looks = self.waiting = 0
         self.longest_stall_s = 0.0
-        self.settled_mib = self.highest_mib = self.latest_mib = _resident_mib()
+        self.settled_mib = self.highest_mib = self.typical_mib = self.latest_mib = self.peak_mib = _resident_mib()
+        self._weights_mib: deque[tuple[float, float]] = deque()  # when and how much, of the last `MEDIAN_S`
         self._stage, self._seconds, self._report = stage, seconds, report
         self._settled_after_s = min(SETTLED_AFTER_S, seconds / 2)
         self._begun_s = self._looked_s = self._weighed_s = time.monotonic()
@@ -175,9 +182,15 @@ class _Watch(QObject):
     def _weigh(self, now_s: float) -> None:
         self._weighed_s = now_s
         self.latest_mib = _resident_mib()
+        self.peak_mib = max(self.peak_mib, self.latest_mib)
+        take = self._stage.controller.performance.take
+        self._weights_mib.append((now_s, self.latest_mib - (0 if take is None else take.ready_bytes / MIB)))
+        while self._weights_mib[0][0] < now_s - min(MEDIAN_S, self._settled_after_s / 2):
+            self._weights_mib.popleft()
+        self.typical_mib = statistics.median(mib for _, mib in self._weights_mib)
         if now_s - self._begun_s <= self._settled_after_s:
-            self.settled_mib = self.highest_mib = self.latest_mib
-        self.highest_mib = max(self.highest_mib, self.latest_mib)
+            self.settled_mib = self.highest_mib = self.typical_mib
+        self.highest_mib = max(self.highest_mib, self.typical_mib)
 
 
 @contextmanager

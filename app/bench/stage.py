@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import tempfile
 import time
@@ -19,6 +20,7 @@ from app.bench.pretended_device import PretendedCard
 from app.controller import Controller
 from app.main import SWITCH_INTERVAL_S, load_engine
 from app.main_window import MainWindow
+from app.memory import return_large_blocks, spare_the_collector
 from app.settings import Settings
 from app.views.plots import dress_plots
 from app.views.theme import apply_theme
@@ -63,6 +65,7 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
     assert isinstance(application, QApplication)
     interval_s, threads = sys.getswitchinterval(), torch.get_num_threads()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    return_large_blocks()
     load_engine()
     apply_theme(application, settings.look.face)
     dress_plots()
@@ -72,6 +75,7 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
         try:
             window.show()
             controller = Controller(window, settings, Path(folder) / "settings.json", card.player)
+            spare_the_collector()
             stage = Stage(window, controller, card, application.platformName())
             stage.wait_for(lambda: card.stream is not None, "the pretended device")
             stage.wait_until_rendered()
@@ -80,5 +84,6 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
             window.close()
             window.deleteLater()
             QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+            gc.unfreeze()
             sys.setswitchinterval(interval_s)
             torch.set_num_threads(threads)

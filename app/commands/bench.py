@@ -116,7 +116,7 @@ def train(json: Json = False) -> None:
 def app(
     json: Json = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long the picture is watched.")] = 5.0,
-    starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 5,
+    starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 3,
 ) -> None:
     """The window: its start, how soon a pluck sounds, how smoothly the picture moves. It opens for a minute."""
     from app.bench.app import measure
@@ -157,7 +157,8 @@ def soak(
             ("longest stall of the window, s", found.longest_stall_s, 0.1),
             ("memory when settled, MiB", found.settled_mib, None),
             ("memory at the end, MiB", found.end_mib, None),
-            ("highest above settled, MiB", found.drift_mib, 50),
+            ("highest above settled, MiB", found.drift_mib, 20),
+            ("memory at its most, MiB", found.peak_mib, None),
             ("threads left", len(found.threads_left), 0),
             ("faults", sum(times for _, times in found.faults), 0),
         ]

@@ -1,4 +1,4 @@
-"""The spectrum at the playhead, twenty times a second."""
+"""The spectrum at the playhead, fifteen times a second."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.session import Session
 from app.views.spectrum_view import SpectrumView
 from engine.sources import FULL_SCALE_M
 
-EVERY = 3  # moments
+EVERY = 4  # moments
 
 
 class SpectrumPanel(Panel):

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+from app.audio.strand import START_RESERVE_S
+from app.rendering.converter import GUARD_FRAMES
 from app.rendering.line import Line
+from app.rendering.loaded import Loaded
 from app.rendering.request import OTHER, RenderListener, RenderRequest
 from app.rendering.sound import Read, Sound
 from app.rendering.take import SOURCES, Motion, Take
-from engine.preset import Preset, PresetError
-from engine.sources import ModelSource, TruthSource
+from app.rendering.velocity import REACH_FRAMES
+from engine.preset import PresetError
 
-FIRST_STEPS = 256  # small, so that a pluck sounds at once
+FIRST_STEPS = 256  # small, so that a pluck sounds at once; more where that is not enough for it to begin
 BLOCK_FRAMES = 512  # what a processor's cache holds: four times as much takes six times as long
 TAIL_BLOCK_FRAMES = 1024  # without the motion more fit
 
@@ -25,7 +29,7 @@ class Job:
         struck: it is to sound to its end, even when it is no longer on stage.
     """
 
-    def __init__(self, request: RenderRequest, load: Callable[[Path], Preset], listener: RenderListener) -> None:
+    def __init__(self, request: RenderRequest, load: Callable[[Path], Loaded], listener: RenderListener) -> None:
         self.request = request
         self.struck = request.struck
         self._started_s: float | None = None
@@ -88,7 +92,8 @@ class Job:
         self._find_others(take)
         if not take.complete:
             model, truth = self._lines["model"], self._lines["truth"]
-            frames = min(BLOCK_FRAMES if truth.done else FIRST_STEPS + 1, take.frames - truth.done)
+            wanted = BLOCK_FRAMES if truth.done else _first_frames(truth.rate_hz)
+            frames = min(wanted, take.frames - truth.done)
             take.append(model.advance(frames), truth.advance(frames))
             take.model_ends_s = model.ends_s
         if self._advance_others(take):
@@ -99,10 +104,11 @@ class Job:
 
     def _begin(self) -> Take:
         pluck, seconds = self.request.pluck, self.request.seconds
-        preset = self._load(self.request.preset)
-        self._lines["model"] = Line(ModelSource(preset), preset.info, pluck, seconds)
-        self._lines["truth"] = Line(TruthSource(preset.info), preset.info, pluck, seconds)
-        return Take(preset.name, preset.info, pluck, seconds)
+        loaded = self._load(self.request.preset)
+        info = loaded.preset.info
+        self._lines["model"] = Line(loaded.model, info, pluck, seconds)
+        self._lines["truth"] = Line(loaded.truth, info, pluck, seconds)
+        return Take(loaded.preset.name, info, pluck, seconds)
 
     def _find_others(self, take: Take) -> None:
         """Begins the models of other presets that are asked for now and have not been yet."""
@@ -111,8 +117,8 @@ class Job:
             if name in self._lines:
                 continue
             try:
-                preset = self._load(path)
-                line = Line(ModelSource(preset), preset.info, take.pluck, take.seconds)
+                loaded = self._load(path)
+                line = Line(loaded.model, loaded.preset.info, take.pluck, take.seconds)
             except (PresetError, ValueError) as error:
                 line = Line(None, take.info, take.pluck, take.seconds)
                 self._listener.other_failed(path.stem, str(error))
@@ -172,3 +178,8 @@ class Job:
             signal = line.advance(line.until(end_s), sound.listening.weights(line.grid_points))
             reads[name] = Read(signal, line.done == line.frames)
         sound.feed(reads)
+
+
+def _first_frames(rate_hz: int) -> int:
+    """With the initial displacement; what filters keep back for a while comes on top of what must be ready."""
+    return 1 + max(FIRST_STEPS, math.ceil(START_RESERVE_S * rate_hz) + GUARD_FRAMES + REACH_FRAMES)

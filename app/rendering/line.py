@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -33,7 +34,7 @@ class Line:
         self.done = 0
         self.ends_s: float | None = None
         self._source = source
-        initial = project(pluck.displacement(info.grid_points), info.modes)[None]
+        initial = _initial_m(pluck, info.grid_points, info.modes)
         self._initial = initial if source is not None else torch.zeros_like(initial)
         self._state = None if source is None else source.start(initial)
 
@@ -61,3 +62,9 @@ class Line:
             except Runaway:  # at rest from here on: it must never reach a loudspeaker
                 self.ends_s = max(self.done - 1, 0) / self.rate_hz
         return torch.zeros(steps, points)
+
+
+@lru_cache(maxsize=8)  # every source of a take begins with the same
+def _initial_m(pluck: Pluck, grid_points: int, modes: int) -> Tensor:
+    """The string as it is let go, (1, grid_points)."""
+    return project(pluck.displacement(grid_points), modes)[None]

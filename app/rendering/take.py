@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -27,6 +29,10 @@ class Motion:
     def complete(self) -> bool:
         return self.ready_frames == self.frames
 
+    @property
+    def ready_bytes(self) -> int:
+        return self.ready_frames * self._m.shape[1] * self._m.itemsize
+
     def append(self, frames_m: NDArray[np.float32]) -> None:
         start, stop = self.ready_frames, self.ready_frames + len(frames_m)
         self._m[start:stop] = frames_m
@@ -49,6 +55,7 @@ class Take:
         model_ends_s: when the model's output ran away, the time of its last believable frame; it is at rest then.
         others: motions of other presets' models for the same pluck, by source, each at its own rate and on its
             own grid.
+        fundamental_hz: of the string at rest.
     """
 
     def __init__(self, preset_name: str, info: PresetInfo, pluck: Pluck, seconds: float) -> None:
@@ -59,6 +66,7 @@ class Take:
         self._motions = {name: Motion(info.rate_hz, info.grid_points, seconds) for name in SOURCES}
         self.frames = self._motions["truth"].frames
         self.others: dict[str, Motion] = {}
+        self.fundamental_hz = float(info.string.undamped_frequencies(1)) / (2 * np.pi)
 
     @property
     def ready_frames(self) -> int:
@@ -73,8 +81,9 @@ class Take:
         return (self.frames - 1) / self.info.rate_hz
 
     @property
-    def fundamental_hz(self) -> float:
-        return float(self.info.string.undamped_frequencies(1)) / (2 * np.pi)
+    def ready_bytes(self) -> int:
+        """Memory that its frames take so far, those of `others` among them."""
+        return sum(motion.ready_bytes for motion in (*self._motions.values(), *self.others.values()))
 
     def motion(self, source: str) -> Motion:
         """The growing motion of a source, of "model", "truth" or one of `others`."""
@@ -102,8 +111,7 @@ class Take:
 
     def signal_m(self, source: str, listen: float, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
         """Displacement at the listening point for frames start … stop so far, in m."""
-        weights = listening_weights(torch.tensor([listen]), self.info.grid_points)[:, 0].float().numpy()
-        return self.motion_m(source)[start:stop] @ weights
+        return self.motion_m(source)[start:stop] @ _weights(listen, self.info.grid_points)
 
     def error_sums(self) -> ErrorSums:
         """Model against truth in every frame so far after the initial one, over all of the string."""
@@ -111,3 +119,9 @@ class Take:
         model, truth = (torch.from_numpy(self.motion_m(name)[None, 1:]) for name in SOURCES)
         sums.add(model, truth)
         return sums
+
+
+@lru_cache(maxsize=8)  # asked for many times a second
+def _weights(listen: float, grid_points: int) -> NDArray[np.float32]:
+    """(grid_points,): displacement @ weights is that at the listening point."""
+    return listening_weights(torch.tensor([listen]), grid_points)[:, 0].float().numpy()

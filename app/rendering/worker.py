@@ -14,8 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.rendering.job import Job
+from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
-from engine.preset import Preset, PresetError, load_preset
+from engine.preset import PresetError, load_preset
 
 KEPT_PRESETS = 4  # loaded ones, the latest used
 
@@ -30,7 +31,7 @@ class RenderWorker:
         self._closing = False
         self._stage: Job | None = None  # the latest; keeps its motion when it is done
         self._tails: list[Job] = []  # struck earlier, and not rendered to their ends
-        self._presets: dict[Path, Preset] = {}
+        self._presets: dict[Path, Loaded] = {}
         self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
         self._thread.start()
 
@@ -111,9 +112,9 @@ class RenderWorker:
             else:
                 self._tails.remove(job)
 
-    def _loaded(self, path: Path) -> Preset:
-        preset = self._presets.pop(path, None) or load_preset(path)
-        self._presets[path] = preset
+    def _loaded(self, path: Path) -> Loaded:
+        loaded = self._presets.pop(path, None) or Loaded(load_preset(path))
+        self._presets[path] = loaded
         while len(self._presets) > KEPT_PRESETS:
             self._presets.pop(next(iter(self._presets)))
-        return preset
+        return loaded

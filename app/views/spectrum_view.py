@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
 from PySide6.QtWidgets import QWidget
+from scipy.fft import rfft
 
 from app.views import theme
 from app.views.parts import combo_box, lay_out_plot
@@ -20,6 +22,8 @@ FLOOR_DB, CEILING_DB = -130.0, 0.0
 LOWEST_HZ = 50.0
 WINDOW_S = 0.18
 COLUMNS = 480
+PADDING = 4  # times the window
+AREA_STEP = 3  # columns
 RANGES_DB = (60, 90, 130)
 
 
@@ -34,26 +38,40 @@ class Analyser:
         """The power of two nearest to `WINDOW_S`."""
         return 2 ** round(math.log2(WINDOW_S * self.rate_hz))
 
-    @property
+    @cached_property
     def column_hz(self) -> NDArray[np.float64]:
         return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
+
+    @cached_property
+    def _window(self) -> NDArray[np.float32]:
+        window = np.hanning(self.window_frames)
+        return (window * 2 / window.sum()).astype(np.float32)
+
+    @cached_property
+    def _bins(self) -> NDArray[np.float64]:
+        """The columns' places in the padded spectrum."""
+        return self.column_hz * PADDING * self.window_frames / self.rate_hz
+
+    @cached_property
+    def _first_bins(self) -> NDArray[np.intp]:
+        """Where columns are wider than bins: each one's first."""
+        return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
+
+    @cached_property
+    def _wide(self) -> NDArray[np.bool_]:
+        last = PADDING * self.window_frames // 2 + 1
+        return np.diff(self._first_bins, append=last) > 1
 
     def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float64]:
         """Levels (COLUMNS,) of the first `window_frames` of a signal in units of full scale."""
         frames = self.window_frames
-        padded = 4 * frames
-        block = np.zeros(frames)
+        block = np.zeros(frames, np.float32)
         block[: min(frames, len(signal))] = signal[:frames]
-        window = np.hanning(frames)
-        magnitude = np.abs(np.fft.rfft((block - block.mean()) * window, padded)) * 2 / window.sum()
-        bins = self.column_hz * padded / self.rate_hz
-        columns = np.interp(bins, np.arange(len(magnitude)), magnitude)
-        # where columns are wider than bins, the loudest of each, so that no partial falls between two columns
-        middles = np.sqrt(bins[1:] * bins[:-1])
-        first = np.concatenate([bins[:1], middles]).astype(int)
-        columns = np.maximum(
-            columns, np.where(np.diff(first, append=len(magnitude)) > 1, np.maximum.reduceat(magnitude, first), 0)
-        )
+        magnitude = np.abs(rfft((block - block.mean()) * self._window, PADDING * frames))
+        columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
+        # the loudest bin of a wide column, so that no partial falls between two
+        loudest = np.maximum.reduceat(magnitude, self._first_bins)
+        columns = np.maximum(columns, np.where(self._wide, loudest, 0))
         return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
 
 
@@ -88,7 +106,10 @@ class SpectrumView(QWidget):
         self._curves = {
             name: item.plot(pen=pg.mkPen(theme.SOURCE_COLOURS[name], width=1)) for name in ("truth", "model")
         }
-        self._fill(self._curves["truth"])
+        # an area of a third of the points, not smoothed: as a fill of the curve it takes longer than all else here
+        brush = pg.mkBrush(theme.translucent(theme.TRUTH, 28))
+        self._area = pg.PlotCurveItem(pen=None, brush=brush, fillLevel=FLOOR_DB, antialias=False)
+        item.addItem(self._area)
         self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
@@ -124,6 +145,10 @@ class SpectrumView(QWidget):
         for name, signal in signals.items():
             self._levels_db[name] = self._analyser.level_db(signal)
             self._curves[name].setData(self._analyser.column_hz, self._levels_db[name])
+        if "truth" in signals:
+            tops_db = self._levels_db["truth"].reshape(-1, AREA_STEP).max(axis=1)
+            middles = np.log10(self._analyser.column_hz[AREA_STEP // 2 :: AREA_STEP])
+            self._area.setData(middles, tops_db, skipFiniteCheck=True)
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
         """What is drawn at a frequency, by source."""
@@ -157,11 +182,6 @@ class SpectrumView(QWidget):
             yRange=(CEILING_DB - self.range_db, CEILING_DB),
             padding=0,
         )
-
-    @staticmethod
-    def _fill(curve: pg.PlotDataItem) -> None:
-        curve.setFillLevel(FLOOR_DB)
-        curve.setBrush(pg.mkBrush(theme.translucent(theme.TRUTH, 28)))
 
 
 _LABELLED_HZ = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)

@@ -58,9 +58,6 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard:
     order = sorted(frame.shapes, key=lambda name: name == heard)
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in order:
-        if name in frame.envelopes:
-            _paint_band(painter, axes, frame.envelopes[name], name, 0.07)
-    for name in order:
         band = frame.lowest[name], frame.highest[name]
         _paint_band(painter, axes, band, name, 0.24 if name == heard else 0.18)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
@@ -72,6 +69,13 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard:
         for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower
             painter.drawPolyline(curve.translated(0, shift))
     painter.setClipping(False)
+
+
+def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], heard: str) -> None:
+    """What lies behind the motion, and changes less often."""
+    painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
+    for name in sorted(envelopes, key=lambda name: name == heard):
+        _paint_band(painter, axes, envelopes[name], name, 0.07)
 
 
 def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:

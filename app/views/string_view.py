@@ -30,6 +30,7 @@ from app.views.string_ink import (
     StringFrame,
     paint_caption,
     paint_ends,
+    paint_envelopes,
     paint_handle,
     paint_listening_point,
     paint_motion,
@@ -94,6 +95,7 @@ class StringView(QWidget):
         self._turned = 0.0  # notches of the wheel towards the next shape
         self._ground_pixmap: QPixmap | None = None
         self._ground_key: tuple[object, ...] = ()
+        self._backdrop: tuple[object, object, QPixmap] | None = None  # ground, envelopes, and both in one picture
         self._toggles = (
             self._toggle("Motion", "Show the string in motion; off saves work (M)", self.motion_toggled),
             self._toggle(
@@ -331,7 +333,7 @@ class StringView(QWidget):
         self._fit_span()
         axes = self._axes()
         painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._ground(axes))
+        painter.drawPixmap(0, 0, self._behind(axes))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is None or self._drag == "pluck":
             paint_pluck(painter, axes, self._pluck)
@@ -349,6 +351,24 @@ class StringView(QWidget):
             painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
+
+    def _behind(self, axes: StringAxes) -> QPixmap:
+        """The ground, and the envelopes of a motion, painted anew only when one of them changes."""
+        ground = self._ground(axes)
+        if self._frame is None or self._shows_pluck or not self._frame.envelopes:
+            return ground
+        envelopes = self._frame.envelopes
+        if self._backdrop is None or self._backdrop[0] is not ground or self._backdrop[1] is not envelopes:
+            picture = None if self._backdrop is None else self._backdrop[2]
+            if picture is None or picture.size() != ground.size():
+                picture = QPixmap(ground.size())
+            picture.setDevicePixelRatio(ground.devicePixelRatio())
+            painter = QPainter(picture)  # over the last one: to make another takes longer than to paint it
+            painter.drawPixmap(0, 0, ground)
+            paint_envelopes(painter, axes, envelopes, self._heard)
+            painter.end()
+            self._backdrop = (ground, envelopes, picture)
+        return self._backdrop[2]
 
     def _ground(self, axes: StringAxes) -> QPixmap:
         """The picture behind the string, painted anew only when something in it changes."""

@@ -12,6 +12,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.kept_plot import KeptPlot
 
 SEEK_STEP_S = 0.1
 SEEK_STEP_SHARE = 0.05  # of what is in view, where that is less
@@ -21,8 +22,8 @@ LABELLED_HEIGHT = 170  # in pixels: where there is less, the picture needs the r
 _PAN_BUTTONS = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
 
 
-class TimePlot(pg.PlotWidget):
-    """See the module. What is drawn in it is its owner's."""
+class TimePlot(KeptPlot):
+    """See the module. What is drawn in it is its owner's; the line that moves is the playhead."""
 
     seek_asked = Signal(float)
     pointed = Signal(float, float)  # a press with Shift: time in s, place on the upright axis
@@ -44,7 +45,6 @@ class TimePlot(pg.PlotWidget):
         item.setMouseEnabled(True, False)
         self._shaded = shaded
         self._seconds = 1.0
-        self._position_s = 0.0
         self._pan_from: float | None = None  # in pixels
         self._untrained = pg.LinearRegionItem(
             (1, 1), movable=False, brush=pg.mkBrush(theme.translucent(theme.WARNING, 18)), pen=pg.mkPen(None)
@@ -60,8 +60,7 @@ class TimePlot(pg.PlotWidget):
                 "fill": theme.translucent(theme.PANEL, 170),
             },
         )
-        self._playhead = pg.InfiniteLine(0, pen=pg.mkPen(theme.TEXT, width=1))
-        for thing, depth in ((self._untrained, -10), (self._horizon, 20), (self._playhead, 21)):
+        for thing, depth in ((self._untrained, -10), (self._horizon, 20)):
             thing.setZValue(depth)
             item.addItem(thing, ignoreBounds=True)
         item.setXRange(0, self._seconds, padding=0)
@@ -83,9 +82,8 @@ class TimePlot(pg.PlotWidget):
         self._untrained.setVisible(inside and self._shaded)
 
     def show_playhead(self, position_s: float) -> None:
-        if position_s != self._position_s:
-            self._position_s = position_s
-            self._playhead.setValue(position_s)
+        if position_s != self.line_at:
+            self.move_line(position_s)
 
     @property
     def times_s(self) -> tuple[float, float]:
@@ -113,7 +111,7 @@ class TimePlot(pg.PlotWidget):
         """Shows `factor` times as much; about the playhead by default, or the middle if that is not in view."""
         low, high = self.times_s
         if about_s is None:
-            about_s = self._position_s if low <= self._position_s <= high else (low + high) / 2
+            about_s = self.line_at if low <= self.line_at <= high else (low + high) / 2
         self.show_times(about_s - (about_s - low) * factor, about_s + (high - about_s) * factor)
 
     def pan(self, by_s: float) -> None:
@@ -166,9 +164,9 @@ class TimePlot(pg.PlotWidget):
         step_s = min(SEEK_STEP_S, SEEK_STEP_SHARE * (high - low))
         match event.key():
             case Qt.Key.Key_Left:
-                self._seek(self._position_s - step_s)
+                self._seek(self.line_at - step_s)
             case Qt.Key.Key_Right:
-                self._seek(self._position_s + step_s)
+                self._seek(self.line_at + step_s)
             case Qt.Key.Key_Home:
                 self._seek(0.0)
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:

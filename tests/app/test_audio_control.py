@@ -10,6 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from app import audio_control
 from app.audio import AudioDevice, AudioProblem, PlayerStatus, ProblemKind
+from app.audio.problems import stalled
 from app.audio_control import AudioControl
 from app.main_window import MainWindow
 from app.settings import DeviceChoice, SoundChoice
@@ -83,6 +84,15 @@ def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, player: F
     control._dialog.retry_asked.emit()
     assert player.opened[-1] == player.opened[-2]
     control.show(PlayerStatus(device=SPEAKERS, changes_done=3), None)
+    assert notices.text == ""
+
+
+def test_a_stall_is_told_without_a_word_on_what_plays(control: AudioControl, player: FakePlayer) -> None:
+    control.tell(stalled("Speakers"))
+    notices = control._window.notices
+    assert "keeps trying" in notices.text
+    assert "plays on" not in notices.text
+    control.show(PlayerStatus(device=SPEAKERS), None)
     assert notices.text == ""
 
 

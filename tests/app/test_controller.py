@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from pytestqt.qtbot import QtBot
 
-from app.controller import Controller
+from app.controller import GIVE_WAY_TICKS, Controller
 from app.main_window import MainWindow
 from app.session import Choices
 from app.settings import Settings, load_settings
@@ -303,9 +303,9 @@ def test_plucks_ring_beside_each_other_and_a_knob_replaces(qtbot: QtBot, control
     controller.session.update(position=0.5)
     controller.pluck()  # another one
     qtbot.waitUntil(lambda: sounding(controller) == 2, timeout=20_000)
-    track = controller._loaded
+    track = controller.player.track
     controller.session.update(position=0.6)  # a knob that is turned
-    qtbot.waitUntil(lambda: controller._loaded is not track, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.player.track is not track, timeout=20_000)
     qtbot.waitUntil(lambda: controller.player.status().position_s > 0, timeout=5_000)
     assert sounding(controller) <= 2
     controller.play_or_stop()
@@ -319,7 +319,22 @@ def test_a_pluck_that_is_overtaken_sounds_all_the_same(qtbot: QtBot, controller:
         controller.session.update(position=position)
         controller.pluck()
     qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=20_000)
-    assert controller._stage.awaited == []
+    assert not controller.performance.strikes.awaited
+
+
+def test_the_picture_gives_way_to_a_struck_pluck_but_not_for_long(
+    qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait_for_take(qtbot, controller)
+    controller._timer.stop()
+    shown: list[object] = []
+    monkeypatch.setattr(controller.panels[0], "show_moment", shown.append)
+    controller.performance.strikes.expect(("never", controller.session.choices.pluck, 1))
+    for _ in range(GIVE_WAY_TICKS):
+        controller._tick()
+    assert shown == []
+    controller._tick()
+    assert len(shown) == 1
 
 
 def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, controller: Controller) -> None:
@@ -327,13 +342,13 @@ def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, control
     wait_for_take(qtbot, controller)
     controller.pluck()
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
-    loaded, take, string = controller._loaded, controller._stage.take, view(controller, "string")
+    loaded, take, string = controller.player.track, controller.performance.take, view(controller, "string")
     at = QPoint(string.width() // 2, string.height() // 4)
     qtbot.mousePress(string, LEFT, pos=at)
-    qtbot.waitUntil(lambda: controller._stage.take is not take, timeout=20_000)
-    assert controller._loaded is loaded
+    qtbot.waitUntil(lambda: controller.performance.take is not take, timeout=20_000)
+    assert controller.player.track is loaded
     qtbot.mouseRelease(string, LEFT, pos=at)
-    assert controller._loaded is controller._stage.track
+    assert controller.player.track is controller.performance.track
     qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=5_000)
 
 
@@ -341,7 +356,7 @@ def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -
     slots, session = controller.window.transport.slots, controller.session
     wait_for_take(qtbot, controller)
     slots.change_asked.emit("b", "preset:second")
-    qtbot.waitUntil(lambda: "preset:second" in controller._loaded.sources, timeout=20_000)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: "preset:second" in controller.player.track.sources, timeout=20_000)  # type: ignore[union-attr]
     qtbot.mouseClick(slots._buttons["b"], LEFT)
     assert session.source_heard == "preset:second"
     qtbot.waitUntil(lambda: controller.player.status().source == "preset:second", timeout=5_000)
@@ -381,8 +396,9 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     assert session.choices.pickup == "velocity"
     assert transport.knobs["listen_right"].isVisible()
     wait_for_take(qtbot, controller)
-    qtbot.waitUntil(lambda: controller._loaded is not None and controller._loaded.channels == 2, timeout=20_000)
+    player = controller.player
+    qtbot.waitUntil(lambda: player.track is not None and player.track.channels == 2, timeout=20_000)
     session.update(stereo=False, pickup="displacement")
     assert not transport._stereo.isChecked()
     assert not transport._velocity.isChecked()
-    qtbot.waitUntil(lambda: controller._loaded.channels == 1, timeout=20_000)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: player.track.channels == 1, timeout=20_000)  # type: ignore[union-attr]

@@ -11,7 +11,7 @@ import pytest
 from app.library import Library, list_presets
 from app.rendering import Take
 from app.session import Choices
-from app.silence import why_difference_silent, why_silent
+from app.silence import why_difference_silent, why_ran_away, why_silent
 from engine.pluck import Pluck
 from engine.preset import read_info
 
@@ -63,3 +63,15 @@ def test_a_difference_of_nothing_or_too_little_is_named(small_preset: Path) -> N
         found = why_difference_silent(Choices(difference_gain_db=gain_db), take)
         assert words in found
         assert bool(found) == bool(words)
+
+
+def test_a_model_that_runs_away_is_told_with_the_reason(small_preset: Path) -> None:
+    take = Take("small", read_info(small_preset), Pluck(amplitude_mm=20.0), 0.5)
+    assert why_ran_away(take) == ""
+    take.model_ends_s = 0.0
+    at_once = why_ran_away(take)
+    assert take.info.title in at_once
+    assert "cannot play this pluck" in at_once
+    assert "amplitude 20 mm is outside" in at_once
+    take.model_ends_s = 0.25
+    assert "0.25 s after the pluck" in why_ran_away(take)

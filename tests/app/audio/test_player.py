@@ -312,6 +312,7 @@ def test_a_device_that_vanishes_is_reported_once_and_the_clock_goes_on(
     bench: Bench, how: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stream_module, "START_GRACE_S", 0.0)
+    monkeypatch.setattr(stream_module, "LOST_AFTER_S", 0.5)  # before it is told as a stall
     bench.add("Headphones")
     raw = bench.open(None)
     bench.player.load(make_track(seconds=10.0))
@@ -326,6 +327,24 @@ def test_a_device_that_vanishes_is_reported_once_and_the_clock_goes_on(
     wait_until(lambda: bench.player.status().position_s > position_s + 0.1)
     assert len(bench.problems) == 1
     assert raw.calls == ["start", "abort", "close"]
+
+
+def test_a_device_that_stalls_is_told_once_and_kept(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream_module, "START_GRACE_S", 0.0)
+    monkeypatch.setattr(stream_module, "STALLED_AFTER_S", 0.2)
+    bench.add("Headphones")
+    raw = bench.open(None)
+    bench.player.load(make_track(seconds=10.0))
+    bench.player.play()
+    bench.hear(raw, 20)
+    wait_until(lambda: bench.player.status().problem is not None)
+    assert [problem.kind for problem in bench.problems] == [ProblemKind.STALLED]
+    assert "keeps trying" in str(bench.problems[0])
+    assert bench.player.status().device is not None
+    assert bench.hear(raw, 20).any()
+    wait_until(lambda: bench.player.status().problem is None)
+    assert len(bench.problems) == 1
+    assert raw.calls == ["start"]
 
 
 def test_a_device_that_comes_back_is_taken_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -349,6 +368,10 @@ def test_a_fault_in_the_feeder_is_reported(bench: Bench, monkeypatch: pytest.Mon
     (problem,) = bench.problems
     assert problem.kind is ProblemKind.OTHER
     assert "a bug" in problem.detail
+    wait_until(lambda: not bench.player._feeder.is_alive())
+    for _ in range(3):  # nobody would ever obey them
+        bench.player.play()
+    assert bench.player._commands.empty()
     bench.player.close()
 
 

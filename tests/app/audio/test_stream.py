@@ -135,7 +135,7 @@ def test_a_device_that_cannot_start_is_closed(headphones: AudioDevice, open_fake
     assert raws[0].calls == ["start", "abort", "close"]
 
 
-def test_a_callback_that_stands_still_is_a_lost_device(
+def test_a_callback_that_stands_still_is_a_stall_and_at_last_a_lost_device(
     headphones: AudioDevice, open_fake: Any, raw_streams: list, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now_s = 0.0
@@ -143,24 +143,27 @@ def test_a_callback_that_stands_still_is_a_lost_device(
     stream = OutputStream(headphones, open_device=open_fake)
     (raw,) = raw_streams
 
-    def lost_after(seconds: float, ticking: bool) -> bool:
+    def state_after(seconds: float, ticking: bool) -> str:
         nonlocal now_s
-        lost = False
+        stalled = lost = False
         for _ in range(round(seconds / 0.05)):
             now_s += 0.05
             if ticking:
                 raw.tick()
-            lost = stream.lost()
-        return lost
+            lost, stalled = stream.lost(), stream.stalled()
+        return "lost" if lost else "stalled" if stalled else "alive"
 
-    assert not lost_after(stream_module.START_GRACE_S - 0.1, ticking=False), "slow to start"
-    assert not lost_after(5.0, ticking=True)
-    assert not lost_after(0.7, ticking=False)
-    assert not lost_after(0.1, ticking=True)
+    assert state_after(stream_module.START_GRACE_S - 0.1, ticking=False) == "alive", "slow to start"
+    assert state_after(5.0, ticking=True) == "alive"
+    assert state_after(0.7, ticking=False) == "alive"
+    assert state_after(0.1, ticking=True) == "alive"
     now_s += 3600.0  # the computer slept
     assert not stream.lost()
-    assert lost_after(1.7, ticking=False)
-    assert not lost_after(0.1, ticking=True)
+    assert not stream.stalled()
+    assert state_after(1.7, ticking=False) == "stalled"
+    assert state_after(0.1, ticking=True) == "alive"
+    assert state_after(stream_module.LOST_AFTER_S + 0.2, ticking=False) == "lost"
+    assert state_after(0.1, ticking=True) == "alive"
     raw.active = False
     assert stream.lost()
 

@@ -83,7 +83,7 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
     assert view._image.image.shape[0] == 101
     assert view._image.image.max() == pytest.approx(1.01 * 4, rel=1e-3)
     assert view._bar.levels() == (-4, 4)
-    assert view.plot._playhead.value() == 0.5
+    assert view.plot.line_at == 0.5
     qtbot.mouseClick(view.quantities._group.button(2), LEFT)
     watch(qtbot, panel, take, lambda: view._image.image.max() < 0.05)
     assert view._image.image.max() == pytest.approx(0.04, rel=1e-3)
@@ -238,12 +238,12 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
         session.update(left_view=left, right_view=right)
         plots = [panels[key].view.plot for key in (left, right)]
         qtbot.waitUntil(
-            lambda: controller._stage.take is not None, timeout=20_000
+            lambda: controller.performance.take is not None, timeout=20_000
         )  # else there is nothing to seek in
         with qtbot.waitSignal(panels[right].seek_asked):
             plots[1].seek_asked.emit(0.3)
         qtbot.waitUntil(
-            lambda plots=plots: all(plot._playhead.value() == pytest.approx(0.3, abs=1e-3) for plot in plots),
+            lambda plots=plots: all(plot.line_at == pytest.approx(0.3, abs=1e-3) for plot in plots),
             timeout=20_000,
         )
         plots[1].seek_asked.emit(0.1)

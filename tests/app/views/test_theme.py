@@ -59,7 +59,7 @@ def test_plots_take_on_another_face_and_come_back(
     view = WaveformView()
     qtbot.addWidget(view)
     view.set_heard("truth")
-    curve, line = view._curves["model"], view._playhead
+    curve, line = view._curves["model"], view._horizon
     faint = curve.opts["pen"].color().alpha()
     stranger = pg.PlotDataItem(pen=pg.mkPen("#123456"))
     view.addItem(stranger)
@@ -67,7 +67,7 @@ def test_plots_take_on_another_face_and_come_back(
         theme.use(new)
         recolour(old, new)
         assert curve.opts["pen"].color() == theme.translucent(new.model, faint)
-        assert line.pen.color() == QColor(new.text)
+        assert line.pen.color() == QColor(new.warning)
         assert view._horizon.label.color == QColor(new.warning)
         assert view._untrained.brush.color() == theme.translucent(new.warning, 18)
         assert view.backgroundBrush().color() == QColor(new.panel)

@@ -1,0 +1,77 @@
+"""A plot with a line that moves over it: its picture is kept, so that a moved line costs a strip of it."""
+
+from __future__ import annotations
+
+import pyqtgraph as pg
+from PySide6.QtCore import QPoint, QPointF, QRect, QRectF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPixmap, QRegion
+from PySide6.QtWidgets import QWidget
+
+from app.views import theme
+
+STRIP = 2  # pixels to either side of the line that are painted with it
+
+
+class KeptPlot(pg.PlotWidget):
+    """`move_line` puts an upright line at a place on the horizontal axis. All else is a plot as any other.
+
+    What the scene asks for is painted as ever. Where only the line has moved, a kept picture of the plot is put
+    beneath its old and new places; it is made when it is first wanted after the plot has changed.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        self._picture: QPixmap | None = None
+        self._moved = QRegion()  # where the line has come and gone since the last painting
+        self._line_at = 0.0
+        self._strip = QRect()  # where it was drawn last
+        super().__init__(parent)
+
+    @property
+    def line_at(self) -> float:
+        return self._line_at
+
+    def move_line(self, at: float) -> None:
+        self._line_at = at
+        strip = self._line_strip()
+        if strip == self._strip:
+            return
+        for changed in (strip, self._strip):
+            self._moved |= QRegion(changed)
+            self.viewport().update(changed)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        moved, self._moved = self._moved, QRegion()
+        if not event.region().subtracted(moved).isEmpty():
+            self._picture = None
+            super().paintEvent(event)
+            painter = QPainter(self.viewport())
+        else:
+            if self._picture is None:
+                self._picture = self._painted()
+            painter = QPainter(self.viewport())
+            painter.setClipRegion(event.region())
+            painter.drawPixmap(QPoint(), self._picture)
+        self._strip = strip = self._line_strip()
+        if not strip.isEmpty():
+            painter.fillRect(strip.adjusted(STRIP, 0, -STRIP, 0), QColor(theme.TEXT))
+        painter.end()
+
+    def _painted(self) -> QPixmap:
+        """The plot without the line."""
+        viewport = self.viewport()
+        picture = QPixmap(viewport.size() * self.devicePixelRatioF())
+        picture.setDevicePixelRatio(self.devicePixelRatioF())
+        painter = QPainter(picture)
+        self.render(painter, QRectF(viewport.rect()), viewport.rect())
+        painter.end()
+        return picture
+
+    def _line_strip(self) -> QRect:
+        """In pixels of the viewport; empty where the line is out of view."""
+        box = self.getPlotItem().vb
+        low, high = box.viewRange()[0]
+        if not low <= self._line_at <= high:
+            return QRect()
+        x = round(self.mapFromScene(box.mapViewToScene(QPointF(self._line_at, 0))).x())
+        area = self.mapFromScene(box.sceneBoundingRect()).boundingRect()
+        return QRect(x - STRIP, area.top(), 2 * STRIP + 1, area.height())
