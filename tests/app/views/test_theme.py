@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.shown import ShownSource
 from app.views import theme
 from app.views.plots import recolour
 from app.views.string_view import StringView
@@ -58,15 +59,20 @@ def test_plots_take_on_another_face_and_come_back(
     monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
     view = WaveformView()
     qtbot.addWidget(view)
-    view.set_heard("truth")
-    curve, line = view._curves["model"], view._playhead
-    faint = curve.opts["pen"].color().alpha()
+    sources = ("model", "truth", "difference", "preset:other")
+    view.set_sources(tuple(ShownSource(source, "A", source, source == "truth") for source in sources))
+    line = view._playhead
+    faint = view._curves["model"].opts["pen"].color().alpha()
     stranger = pg.PlotDataItem(pen=pg.mkPen("#123456"))
     view.addItem(stranger)
     for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
         theme.use(new)
         recolour(old, new)
-        assert curve.opts["pen"].color() == theme.translucent(new.model, faint)
+        for curve, colour in zip(
+            view._curves.values(), (new.model, new.truth, new.difference, new.other), strict=True
+        ):
+            alpha = 255 if colour == new.truth else faint
+            assert curve.opts["pen"].color() == theme.translucent(colour, alpha)
         assert line.pen.color() == QColor(new.text)
         assert view._horizon.label.color == QColor(new.warning)
         assert view._untrained.brush.color() == theme.translucent(new.warning, 18)
