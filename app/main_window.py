@@ -57,6 +57,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+Q", "quit_asked", "quit"),
 )
 WIDE, HIGH = 960, 560  # below, the window is sparing
+FACTS_HEIGHT = 20
 
 PLAYED_KEYS = (  # see `app/keyboard.py`
     ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
@@ -107,6 +108,7 @@ class MainWindow(QMainWindow):
             "Model against truth for this pluck: relative mean absolute error, all of the string"
         )
         self._solo = tool_button("", "Hear all modes", "One mode is heard alone; click, or Esc, to hear all of them")
+        self._solo.setObjectName("solo")
         self._solo.setVisible(False)
         self._solo.clicked.connect(self.all_modes_asked)
         self.rate_label = QLabel()
@@ -140,6 +142,8 @@ class MainWindow(QMainWindow):
             head.addWidget(widget)
         facts = QHBoxLayout()
         facts.setSpacing(24)
+        for part in (self.presets.card, self._solo):  # one height, so that a mode alone moves nothing
+            part.setFixedHeight(FACTS_HEIGHT)
         facts.addWidget(self.presets.card, 1)
         facts.addWidget(self._solo)
         facts.addWidget(self.error_label)
@@ -203,7 +207,7 @@ class MainWindow(QMainWindow):
 
     def show_solo(self, mode: int) -> None:
         """Which mode is heard alone; 0: all are heard."""
-        self._solo.setText(f"mode {mode} alone  ✕")
+        self._solo.setText(f"Mode {mode} alone  ✕")
         self._solo.setVisible(mode > 0)
 
     def geometry_text(self) -> str:

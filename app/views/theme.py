@@ -177,6 +177,9 @@ QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, Q
     {{ border: 1px solid {TEXT}; }}
 QPushButton:disabled, QToolButton:disabled, QComboBox:disabled {{ color: {DISABLED}; }}
 {slots}
+QPushButton:checked:disabled {{ background: {LINE}; color: {DISABLED}; border-color: {LINE}; }}
+QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; padding: 6px 9px; }}
+QToolButton#solo {{ padding: 1px 9px; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
 QToolButton#narrow {{ padding: 6px 5px; }}

@@ -104,7 +104,7 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
-        self.knobs["listen_right"].setVisible(choices.stereo)
+        self.knobs["listen_right"].setEnabled(choices.stereo)  # hidden, it would move all that is beside it
         with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
             self._stereo.setChecked(choices.stereo)
             self._velocity.setChecked(choices.pickup == "velocity")

@@ -391,9 +391,14 @@ def test_a_slot_whose_preset_is_gone_falls_back(qtbot: QtBot, preset_folder: Pat
 
 def test_solo_is_shown_and_left_with_escape(qtbot: QtBot, controller: Controller) -> None:
     window, session = controller.window, controller.session
+    parts = (window.presets.card, view(controller, "string"), window.left, window.error_label)
+    wait_for_take(qtbot, controller)
+    before = [(part.y(), part.height()) for part in parts]
     session.update(solo=3)
     assert window._solo.isVisible()
-    assert "mode 3" in window._solo.text()
+    assert "Mode 3" in window._solo.text()
+    qtbot.wait(20)
+    assert [(part.y(), part.height()) for part in parts] == before  # nothing has moved
     qtbot.keyClick(window, Qt.Key.Key_Escape)
     assert session.choices.solo == 0
     assert not window._solo.isVisible()
@@ -401,12 +406,15 @@ def test_solo_is_shown_and_left_with_escape(qtbot: QtBot, controller: Controller
 
 def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) -> None:
     transport, session = controller.window.transport, controller.session
-    assert not transport.knobs["listen_right"].isVisible()
+    assert not transport.knobs["listen_right"].isEnabled()
+    places = [knob.pos() for knob in transport.knobs.values()]
     transport._stereo.click()
     transport._velocity.click()
     assert session.choices.stereo
     assert session.choices.pickup == "velocity"
-    assert transport.knobs["listen_right"].isVisible()
+    assert transport.knobs["listen_right"].isEnabled()
+    qtbot.wait(20)
+    assert [knob.pos() for knob in transport.knobs.values()] == places
     wait_for_take(qtbot, controller)
     qtbot.waitUntil(lambda: controller._loaded is not None and controller._loaded.channels == 2, timeout=20_000)
     session.update(stereo=False, pickup="displacement")

@@ -63,6 +63,7 @@ def test_it_waits_until_its_parts_are_there(qtbot: QtBot) -> None:
     with qtbot.waitSignal(window.first_painted):
         window.show()
     assert not window.transport.isEnabled()
+    assert window.presets.name.text() == "Reading presets …"  # nobody has looked yet whether there are any
     window.show_string(QWidget())
     assert window.transport.isEnabled()
 
