@@ -57,6 +57,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+Q", "quit_asked", "quit"),
 )
 WIDE, HIGH = 960, 560  # below, the window is sparing
+ROOMY = 1240  # below, the controls stand closer
 FACTS_HEIGHT = 20
 
 PLAYED_KEYS = (  # see `app/keyboard.py`
@@ -178,7 +179,7 @@ class MainWindow(QMainWindow):
         self._loading.hide()
         self._string = view
         self._stage.insertWidget(0, view)
-        self._stage.setSizes([380, 0, 250])
+        self._stage.setSizes([310, 0, 300])
         self._set_alive(True)
         view.setFocus()
 
@@ -222,8 +223,10 @@ class MainWindow(QMainWindow):
         """A small window spends its room on what is to be seen and turned."""
         super().resizeEvent(event)
         self._brand.setVisible(self.width() >= WIDE)
-        low = self.height() < HIGH
-        self._column.setContentsMargins(*((8, 6, 8, 6) if low else (14, 12, 14, 12)))
+        narrow, low = self.width() < ROOMY, self.height() < HIGH
+        self.transport.set_compact(narrow)
+        aside, above = 8 if narrow else 14, 6 if low else 12
+        self._column.setContentsMargins(aside, above, aside, above)
         self._column.setSpacing(6 if low else 10)
 
     def paintEvent(self, event: QPaintEvent) -> None:

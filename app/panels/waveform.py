@@ -104,7 +104,7 @@ class WaveformPanel(Panel):
         if peak > self._full or self._full == 0.0:
             self._full = max(AIR * peak, FLAT)
         factor, unit = readable_unit(self._full, choices.pickup)
-        view.set_scale(factor * self._full, f"{choices.pickup} ({unit})")
+        view.set_scale(factor * self._full, choices.pickup, unit)
         for source in shown_sources(choices, self.library):
             if source.source in self._drawn:
                 drawn = self._drawn[source.source]

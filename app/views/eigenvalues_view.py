@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.poles import PoleFigure, Poles
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.parts import ENTER_KEYS, combo_box, keeps_own_keys, words_label
 
 NEAR_PIXELS = 16
@@ -182,6 +183,8 @@ class _Plane(pg.PlotWidget):
         self._ring = pg.ScatterPlotItem(symbol="o", size=21, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for layer in (self._learned, self._string, self._ring):
             item.addItem(layer)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self._places = np.empty((0, 2))
         self._learned_count = 0
         self._at = -1
@@ -218,14 +221,13 @@ class _Plane(pg.PlotWidget):
         item.setAspectLocked(not musical)
         if musical:
             item.setLabel("bottom", "frequency (Hz)")
-            item.setLabel("left", "decay: T60 (s)")
-            item.getAxis("left").setTicks([[(math.log10(s), f"{s:g}") for s in _LABELLED_S]])
+            self._label.set("decay: T60 (s)", "T60 (s)", "s")
             item.setLimits(xMin=-0.02 * rate_hz, xMax=0.52 * rate_hz)
         else:
             item.setLabel("bottom", "Re λ")
-            item.setLabel("left", "Im λ")
-            item.getAxis("left").setTicks(None)
+            self._label.set("Im λ")
             item.setLimits(xMin=None, xMax=None)
+        self._ticks.set([(math.log10(s), f"{s:g}") for s in _LABELLED_S] if musical else None)
         self._musical, self._rate_hz = musical, rate_hz
         self.show_all()
 

@@ -1,4 +1,4 @@
-"""A line of text that is cut where there is too little room for it; then the tooltip has it whole."""
+"""A line of text that is cut with an ellipsis where there is too little room for it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ class ElidedLabel(QLabel):
         return QSize(0, super().minimumSizeHint().height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        if self.text().startswith("<"):  # rich text has no ellipsis
+            super().paintEvent(event)
+            return
         painter = QPainter(self)
         option = QStyleOption()
         option.initFrom(self)

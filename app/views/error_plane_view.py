@@ -10,11 +10,12 @@ import math
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, PlanePicture, nearest_cell, refine
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks, fit_foot
 from app.views.parts import ENTER_KEYS, keeps_own_keys, words_label
 from app.views.progress_strip import ProgressStrip
 
@@ -113,8 +114,7 @@ class _Map(pg.PlotWidget):
         item.setMouseEnabled(False, False)
         item.setLabel("bottom", "position of the pluck")
         item.getAxis("bottom").enableAutoSIPrefix(False)
-        item.setLabel("left", "amplitude (mm)")
-        item.getAxis("left").setTicks([[(math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM]])
+        self._label = UprightLabel(item, ("amplitude (mm)", "mm"))
         self._area = QRectF(
             POSITIONS[0] - _STEP_X / 2,
             math.log10(AMPLITUDES_MM[0]) - _STEP_Y / 2,
@@ -122,6 +122,8 @@ class _Map(pg.PlotWidget):
             math.log10(AMPLITUDES_MM[-1] / AMPLITUDES_MM[0]) + _STEP_Y,
         )
         item.setRange(self._area, padding=0)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
         self._image = pg.ImageItem()
         self._image.setColorMap(COLOURS)
         self._image.setLevels([math.log10(end) for end in SCALE])
@@ -129,7 +131,8 @@ class _Map(pg.PlotWidget):
         self._bar = pg.ColorBarItem(
             values=tuple(math.log10(end) for end in SCALE), colorMap=COLOURS, interactive=False, width=14
         )
-        self._bar.axis.setTicks([[(math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS]])
+        self._bar_ticks = UprightTicks(self._bar.axis, self._bar.vb)
+        self._bar_ticks.set((math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS)
         self._bar.setImageItem(self._image, insert_in=item)
         dashed = pg.mkPen(theme.TEXT, width=1, style=Qt.PenStyle.DashLine)
         self._outline = item.plot(pen=dashed)
@@ -172,6 +175,11 @@ class _Map(pg.PlotWidget):
             low - 1e-9 <= value <= high + 1e-9
             for value, (low, high) in zip((position, amplitude_mm), self._trained, strict=True)
         )
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # it is, while this is being made
+            fit_foot(self)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         at = self._at(event.position())

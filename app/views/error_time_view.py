@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.parts import lay_out_plot, tool_button
 from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
@@ -49,6 +50,8 @@ class ErrorTimeView(QWidget):
         )
         item = self.plot.getPlotItem()
         item.getAxis("left").enableAutoSIPrefix(False)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         item.showGrid(x=True, y=True, alpha=0.18)
         self._curves = {
             "rmse": item.plot(pen=pg.mkPen(RMSE, width=1)),
@@ -107,7 +110,7 @@ class ErrorTimeView(QWidget):
             curve.setVisible((name == "level_db") == level)
         for line in self._stored.values():
             line.setVisible(not level)
-        self.plot.getPlotItem().setLabel("left", "level error (dB)" if level else "relative error")
+        self._label.set(*(("level error (dB)", "dB") if level else ("relative error", "error")))
         self._range = None
         self._fit([])
         self._tell_legend()
@@ -130,7 +133,8 @@ class ErrorTimeView(QWidget):
         if wanted != self._range:
             self._range = wanted
             item.setYRange(*wanted, padding=0)
-            item.getAxis("left").setTicks(None if self.quantity == "level" else _decades(*wanted))
+            level = self.quantity == "level"
+            self._ticks.set(None if level else _decades(*wanted), _between_decades(*wanted))
 
     def _always_in_view(self) -> list[NDArray[np.float64]]:
         if self.quantity == "level":
@@ -153,7 +157,9 @@ def percent(error: float) -> str:
     return f"{100 * error:.3g} %"
 
 
-def _decades(low: float, high: float) -> list[list[tuple[float, str]]]:
-    decades = range(math.ceil(low), math.floor(high) + 1)
-    between = [d + math.log10(n) for d in range(math.floor(low), math.ceil(high)) for n in range(2, 10)]
-    return [[(d, f"{100 * 10.0**d:g} %") for d in decades], [(place, "") for place in between]]
+def _decades(low: float, high: float) -> list[tuple[float, str]]:
+    return [(d, f"{100 * 10.0**d:g} %") for d in range(math.ceil(low), math.floor(high) + 1)]
+
+
+def _between_decades(low: float, high: float) -> list[float]:
+    return [d + math.log10(n) for d in range(math.floor(low), math.ceil(high)) for n in range(2, 10)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt
@@ -23,12 +24,11 @@ def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, m
     """One behind the other from `x` on; titles are cut where all of them do not fit. Returns where they end."""
     painter.setFont(theme.small_font(12, bold=True))
     metrics = painter.fontMetrics()
-    for source, room in zip(sources, _rooms(sources, metrics, right - x), strict=True):
-        text = _text(source, metrics, room - STROKE - _GAP)
+    for source, text in zip(sources, _texts(sources, metrics, right - x), strict=True):
         hue = theme.SOURCE_COLOURS[theme.source_kind(source.source)]
         painter.setPen(QPen(theme.translucent(hue, 255 if source.heard else FAINT_ALPHA), 3))
         painter.drawLine(QPointF(x, middle), QPointF(x + STROKE, middle))
-        place = QRectF(x + STROKE + _GAP, middle - HEIGHT / 2, room, HEIGHT)
+        place = QRectF(x + STROKE + _GAP, middle - HEIGHT / 2, metrics.horizontalAdvance(text) + 1, HEIGHT)
         painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
         x += STROKE + _GAP + metrics.horizontalAdvance(text) + _BETWEEN
     return x
@@ -50,7 +50,7 @@ class Legend(QWidget):
     @property
     def text(self) -> str:
         """What it says, whole."""
-        return "   ".join([*([self._part] if self._part else []), *map(_text, self._sources)])
+        return "   ".join([*([self._part] if self._part else []), *map(_whole, self._sources)])
 
     def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
         """`part` of the sound stands before them."""
@@ -62,8 +62,9 @@ class Legend(QWidget):
     def _place(self) -> None:
         area = self._plot.mapFromScene(self._plot.getPlotItem().vb.sceneBoundingRect()).boundingRect()
         room = int(SHARE * area.width())
-        rooms = _rooms(self._sources, QFontMetrics(theme.small_font(12, bold=True)), room - self._part_width)
-        width = self._part_width + sum(rooms) + _BETWEEN * (len(rooms) - 1) + 2 * _GAP
+        metrics = QFontMetrics(theme.small_font(12, bold=True))
+        texts = _texts(self._sources, metrics, room - self._part_width - 2 * _GAP)
+        width = self._part_width + _width(texts, metrics) + 2 * _GAP + 1
         self.setGeometry(area.right() - 4 - width, area.top() + 4, width, HEIGHT)
 
     @property
@@ -83,21 +84,27 @@ class Legend(QWidget):
         paint_sources(painter, self._sources, _GAP + self._part_width, HEIGHT / 2, self.width() - _GAP)
 
 
-def _text(source: ShownSource, metrics: QFontMetrics | None = None, room: int = 0) -> str:
-    """Slot, title and remark; with `metrics`, the title cut to fit into `room`."""
-    before, title = f"{source.slots}  ", source.title
-    if metrics is not None:
-        room -= metrics.horizontalAdvance(before) + metrics.horizontalAdvance(source.remark)
-        title = metrics.elidedText(title, Qt.TextElideMode.ElideRight, max(0, room))
-    return f"{before}{title}{source.remark}"
+def _whole(source: ShownSource) -> str:
+    return f"{source.slots}  {source.title}{source.remark}"
 
 
-def _rooms(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[int]:
-    """How wide each may be, sample and text: what they need, and less for the longest where that is too much."""
-    needed = [STROKE + _GAP + metrics.horizontalAdvance(_text(source)) + 1 for source in sources]
-    left = room - _BETWEEN * (len(sources) - 1)
-    rooms = list(needed)
-    for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):
-        rooms[place] = int(min(needed[place], max(0, left / (len(needed) - done))))
-        left -= rooms[place]
-    return rooms
+def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
+    """What is said of each: all, or where that is too much without what the colour says too, or with titles cut."""
+    for told in (sources, [replace(source, heard=False) for source in sources]):
+        if _width(texts := [_whole(source) for source in told], metrics) <= room:
+            return texts
+    titles = room - _width([_whole(replace(source, title="")) for source in told], metrics)
+    needed = [metrics.horizontalAdvance(source.title) for source in told]
+    for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
+        needed[place] = int(min(needed[place], max(0.0, titles / (len(needed) - done))))
+        titles -= needed[place]
+    elide = Qt.TextElideMode.ElideRight
+    return [
+        _whole(replace(source, title=metrics.elidedText(source.title, elide, room)))
+        for source, room in zip(told, needed, strict=True)
+    ]
+
+
+def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
+    """Of all, with their samples of colour."""
+    return sum(STROKE + _GAP + metrics.horizontalAdvance(text) for text in texts) + _BETWEEN * (len(texts) - 1)

@@ -46,6 +46,7 @@ class MidiDialog(QDialog):
         self._problem.setTextInteractionFlags(
             Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
+        self._turned = turned
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
         form.addRow("Input", self._inputs)
@@ -63,6 +64,7 @@ class MidiDialog(QDialog):
         close.setAutoDefault(False)
         close.clicked.connect(self.reject)
         column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
+        self.set_learnable("")
 
     def _build_rows(self, turned: Mapping[str, str]) -> QGridLayout:
         grid = QGridLayout()
@@ -73,7 +75,6 @@ class MidiDialog(QDialog):
             learn, forget = QPushButton("Learn"), QPushButton("Forget")
             learn.setCheckable(True)
             learn.setAccessibleName(f"Learn a controller for {label}")
-            learn.setToolTip(f"Then move the controller that shall turn {label}")
             forget.setAccessibleName(f"Forget the controller of {label}")
             forget.setToolTip(f"No controller turns {label} any more")
             for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
@@ -94,6 +95,12 @@ class MidiDialog(QDialog):
             self._inputs.setCurrentIndex(max(0, self._inputs.findData(open_name)))
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
+
+    def set_learnable(self, why_not: str) -> None:
+        """Whether controllers can be taught; where not, why, with the remedy."""
+        for field, (_, learn, _) in self._rows.items():
+            learn.setEnabled(not why_not)
+            learn.setToolTip(why_not or f"Then move the controller that shall turn {self._turned[field]}")
 
     def show_problem(self, text: str) -> None:
         self._problem.setText(text)

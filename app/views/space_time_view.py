@@ -9,6 +9,7 @@ from PySide6.QtCore import QRectF, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.colour_maps import displacement_map, error_map
 from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
@@ -55,9 +56,10 @@ class SpaceTimeView(QWidget):
         self._full_scale_mm = 1.0
         self._listen = 0.0
         item = self.plot.getPlotItem()
-        item.setLabel("left", "place")
-        item.getAxis("left").setTicks([[(place, f"{place:g}") for place in PLACES]])
         item.setYRange(0, 1, padding=0)
+        self._label = UprightLabel(item, ("place",))
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._ticks.set((place, f"{place:g}") for place in PLACES)
         self._image = pg.ImageItem(axisOrder="row-major")
         item.addItem(self._image, ignoreBounds=True)
         self._listening = pg.InfiniteLine(0, angle=0, pen=pg.mkPen(theme.translucent(theme.TEXT, 90), width=1))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtWidgets import QWidget
 
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.colour_maps import level_map
 from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
@@ -51,7 +52,10 @@ class SpectrogramView(QWidget):
         self._pixels = np.zeros((0, 0), np.uint8)
         self._hop_s = 1.0
         item = self.plot.getPlotItem()
-        item.getAxis("left").enableAutoSIPrefix(False)
+        axis = item.getAxis("left")
+        axis.enableAutoSIPrefix(False)
+        self._label = UprightLabel(item, ("frequency (Hz)", "Hz"))
+        self._ticks = UprightTicks(axis, item.vb)
         self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
         self._image.setLookupTable(level_map().getLookupTable(nPts=256))
         item.addItem(self._image, ignoreBounds=True)
@@ -134,10 +138,6 @@ class SpectrogramView(QWidget):
 
     def _label_frequencies(self) -> None:
         item = self.plot.getPlotItem()
-        axis = item.getAxis("left")
-        item.setLabel("left", "frequency (Hz)")
-        if self.logarithmic:
-            axis.setTicks([[(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in LABELLED_HZ]])
-        else:
-            axis.setTicks(None)
         item.setYRange(*self._heights(), padding=0)
+        ticks = [(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in LABELLED_HZ]
+        self._ticks.set(ticks if self.logarithmic else None)

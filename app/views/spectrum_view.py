@@ -9,10 +9,12 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
+from app.views.axis_label import UprightLabel, fit_foot
 from app.views.curves import set_curves
 from app.views.legend import Legend
 from app.views.parts import combo_box, lay_out_plot
@@ -78,7 +80,8 @@ class SpectrumView(QWidget):
         self.readout = Readout()
         item = self.plot.getPlotItem()
         item.setLogMode(x=True)
-        item.setLabel("bottom", "frequency", units="Hz", siPrefix=False)
+        item.setLabel("bottom", "frequency (Hz)")
+        self._label = UprightLabel(item)
         item.showGrid(x=True, y=True, alpha=0.18)
         item.setMenuEnabled(False)
         item.hideButtons()
@@ -113,7 +116,7 @@ class SpectrumView(QWidget):
 
     def set_full_scale(self, words: str) -> None:
         """What 0 dB is the level of."""
-        self.plot.getPlotItem().setLabel("left", f"dB re {words}")
+        self._label.set(f"dB re {words}", "dB")
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
         """As `WaveformView.set_sources`; slot B's curve is filled."""
@@ -152,6 +155,10 @@ class SpectrumView(QWidget):
         self._partial.setVisible(partial_hz is not None)
         if partial_hz is not None:
             self._partial.setValue(math.log10(partial_hz))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        fit_foot(self.plot)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseMove:

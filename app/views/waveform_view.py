@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from PySide6.QtWidgets import QWidget
 
 from app.shown import DEFAULT_SOURCES, ShownSource
+from app.views.axis_label import UprightLabel
 from app.views.curves import set_curves
 from app.views.legend import Legend
 from app.views.time_plot import TimePlot
@@ -40,10 +41,11 @@ class WaveformView(TimePlot):
         item.showGrid(x=True, y=True, alpha=0.18)
         item.getAxis("left").enableAutoSIPrefix(False)
         self._horizon.label.setPosition(0.1)  # the legend has the upper edge
+        self._label = UprightLabel(item)
         self._curves: dict[str, pg.PlotDataItem] = {}
         self.legend = Legend(self)
         self.set_sources(DEFAULT_SOURCES)
-        self.set_scale(5.0, "displacement (mm)")
+        self.set_scale(5.0, "displacement", "mm")
 
     def set_take(self, seconds: float, horizon_s: float) -> None:
         """A time axis for a take of `seconds` of a model that was trained for `horizon_s`."""
@@ -51,11 +53,10 @@ class WaveformView(TimePlot):
         for source in self._curves:
             self.clear_signal(source)
 
-    def set_scale(self, full: float, label: str) -> None:
-        """The upright axis from −full to full, in the unit that `label` tells."""
-        item = self.getPlotItem()
-        item.setYRange(-full, full, padding=0.02)
-        item.setLabel("left", label)
+    def set_scale(self, full: float, quantity: str, unit: str) -> None:
+        """The upright axis from −full to full in `unit`, which alone is told where there is little room."""
+        self.getPlotItem().setYRange(-full, full, padding=0.02)
+        self._label.set(f"{quantity} ({unit})", unit)
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
         """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""

@@ -126,6 +126,30 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     assert not learn.isChecked()
 
 
+def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
+    """And the dialog says how to get them; with them, it can."""
+    window, missing = QWidget(), True
+    qtbot.addWidget(window)
+
+    def load() -> FakeBackend:
+        if missing:
+            raise MidiUnavailable("Get them with: pip install mido python-rtmidi")
+        return FakeBackend()
+
+    midi = MidiControl(MidiChoices(), lambda: Reach((0.3, 0.7), (1, 10)), lambda: [], None, load)
+    midi.show_dialog(window)
+    dialog = midi._dialog
+    assert dialog is not None
+    for _, learn, _ in dialog._rows.values():
+        assert not learn.isEnabled()
+        assert "pip install mido" in learn.toolTip()
+    assert "pip install mido" in dialog._problem.text()
+    missing = False
+    midi.show_dialog(window)
+    assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())
+    assert "move the controller" in dialog._rows["width"][1].toolTip()
+
+
 def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
     backend.names = []
     with qtbot.waitSignal(midi.told) as told:

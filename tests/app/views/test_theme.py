@@ -8,7 +8,7 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
 
 from app.shown import ShownSource
@@ -38,6 +38,26 @@ def test_no_two_roles_share_a_colour(face: theme.Face) -> None:
     """Else a plot could not know which role to take on."""
     colours = [value for value in vars(face).values() if isinstance(value, str)]
     assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
+
+
+def test_a_checked_box_has_a_tick_that_is_seen(qtbot: QtBot, qapp: QApplication, dark_again: None) -> None:
+    style, palette = qapp.styleSheet(), qapp.palette()
+    for choice, face in (("dark", theme.DARK), ("light", theme.LIGHT)):
+        theme.apply_theme(qapp, choice)  # type: ignore[arg-type]
+        box = QCheckBox("tick")
+        qtbot.addWidget(box)
+        box.setChecked(True)
+        picture = box.grab().toImage()
+        ratio = picture.devicePixelRatio()
+        seen = {picture.pixelColor(x, y).rgb() for x in range(int(22 * ratio)) for y in range(picture.height())}
+        assert QColor(face.text).rgb() in seen  # the box is filled
+        assert QColor(face.background).rgb() in seen  # and the tick stands out from it
+        assert f'stroke="{face.background}"' in (theme.SIGNS / f"tick_{choice}.svg").read_text()
+        box.setChecked(False)
+        assert box.grab().toImage() != picture
+    qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
+    qapp.setStyleSheet(style)
+    qapp.setPalette(palette)
 
 
 def test_contrast_is_that_of_the_standard() -> None:
