@@ -35,21 +35,21 @@ def times(value: float) -> str:
 
 
 COLUMNS = (
-    Column("preset", "Double-click or Enter loads it"),
+    Column("Preset", "Double-click or Enter loads it"),
     Column("MAE", "Relative mean absolute error over the trained horizon, all of the string", percent),
     Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
     Column(
-        "null dB",
+        "Null, dB",
         "What is left of the sound at the listening point where model and truth are subtracted, all of the pluck",
         decibels,
     ),
-    Column("speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
-    Column("parameters", "Trainable numbers", lambda n: f"{n:,}"),
+    Column("Speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
+    Column("Parameters", "Trainable numbers", lambda n: f"{n:,}"),
     Column("MSE", "Relative mean squared error over the trained horizon", scientific),
     Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
-    Column("rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
-    Column("model", "The model's family"),
-    Column("note", "Why there are no figures"),
+    Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
+    Column("Model", "The model's family"),
+    Column("Note", "Why there are no figures"),
 )
 
 

@@ -12,12 +12,12 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.poles import PoleFigure, Poles
 from app.views import theme
-from app.views.axis_label import UprightLabel, UprightTicks
+from app.views.axis_label import UprightLabel, UprightTicks, fit_foot
 from app.views.parts import ENTER_KEYS, combo_box, keeps_own_keys, words_label
 
 NEAR_PIXELS = 16
@@ -25,7 +25,7 @@ CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned o
 TIP_MS = 3000  # it hides what is pointed at
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
-AXES = {"musical": "frequency and decay", "complex": "complex plane"}
+AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
 
 Array = NDArray[np.float64]
 
@@ -73,8 +73,8 @@ class EigenvaluesView(QWidget):
         if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
             self._layer.clear()
             for layer in range(figure.layers):
-                self._layer.addItem("first layer" if layer == 0 else f"layer {layer + 1}", layer)
-            self._layer.addItem("all layers", None)
+                self._layer.addItem("First layer" if layer == 0 else f"Layer {layer + 1}", layer)
+            self._layer.addItem("All layers", None)
         self._figure = figure
         self._layer.setVisible(figure is not None and figure.layers > 1)
         self._draw()
@@ -113,7 +113,7 @@ class EigenvaluesView(QWidget):
         if point >= 0:
             self._words.setText(self._describe(figure, point))
         elif self._solo:
-            self._words.setText(f"mode {self._solo} alone is heard; Esc: all of them")
+            self._words.setText(f"Mode {self._solo} alone is heard; Esc: all of them")
         else:
             self._words.setText(figure.note)
 
@@ -122,7 +122,7 @@ class EigenvaluesView(QWidget):
         learned = point < count
         poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)
         mode = int(poles.mode[place])
-        text = f"{'learned, nearest to' if learned else 'the string’s'} mode {mode}:  {poles.mode_hz[place]:.1f} Hz"
+        text = f"{'Learned, nearest to' if learned else 'The string’s'} mode {mode}:  {poles.mode_hz[place]:.1f} Hz"
         if poles.folded_hz[place] < poles.mode_hz[place] - 0.1:
             text += f" (heard at {poles.folded_hz[place]:.0f} Hz)"
         if learned:
@@ -190,6 +190,11 @@ class _Plane(pg.PlotWidget):
         self._at = -1
         self._pressed: QPointF | None = None
 
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # it is, while this is being made
+            fit_foot(self)
+
     def clear_points(self) -> None:
         self._places, self._at = np.empty((0, 2)), -1
         for layer in (self._learned, self._string, self._ring):
@@ -228,6 +233,7 @@ class _Plane(pg.PlotWidget):
             self._label.set("Im λ")
             item.setLimits(xMin=None, xMax=None)
         self._ticks.set([(math.log10(s), f"{s:g}") for s in _LABELLED_S] if musical else None)
+        fit_foot(self)
         self._musical, self._rate_hz = musical, rate_hz
         self.show_all()
 

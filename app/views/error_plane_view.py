@@ -88,7 +88,7 @@ class ErrorPlaneView(QWidget):
         about = "" if self._picture.spacing == 1 else "about "
         text = "runs away" if math.isinf(error) else f"error {about}{100 * error:.3g} %"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the trained range"
-        self._words.setText(f"pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
+        self._words.setText(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
 
 class _Map(pg.PlotWidget):

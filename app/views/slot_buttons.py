@@ -83,8 +83,7 @@ class SlotButtons(QWidget):
             source = getattr(self._choices, slot)
             title, short = self._title(source)
             gain = self._gain_text(slot)
-            parts = [slot.upper(), self._fitted(short, f"{slot.upper()}    {gain}"), gain]
-            button.setText("  ".join(part for part in parts if part))
+            button.setText(self._fitted(slot.upper(), short, gain))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
             told = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
@@ -106,11 +105,17 @@ class SlotButtons(QWidget):
         name = source.removeprefix("preset:")
         return name, "DIFF." if source == "difference" else name.upper()
 
-    def _fitted(self, text: str, beside: str) -> str:
-        """`text`, cut where it does not fit on a button with `beside`."""
+    def _fitted(self, letter: str, text: str, gain: str) -> str:
+        """What a button has room for: where it is little, the gain without its unit, then the text cut."""
         metrics = QFontMetrics(theme.small_font(12, bold=True))
-        room = self._width - PADDING - metrics.horizontalAdvance(beside)
-        return metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
+        room = self._width - PADDING
+        for beside in (gain, gain.removesuffix(" dB")):
+            words = "  ".join(part for part in (letter, text, beside) if part)
+            if metrics.horizontalAdvance(words) <= room:
+                return words
+        room -= metrics.horizontalAdvance(f"{letter}    {beside}")
+        cut = metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
+        return "  ".join(part for part in (letter, cut, beside) if part)
 
     def _gain_text(self, slot: str) -> str:
         gain_db = self._gains_db.get(slot)

@@ -165,7 +165,7 @@ QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; 
 QPushButton#preset {{ text-align: left; font-weight: 600; padding: 6px 12px; }}
 QLabel {{ background: transparent; }}
 QLabel#faint {{ color: {FAINT}; }}
-QLabel#knob {{ color: {FAINT}; font-size: 10px; padding-top: 1px; }}
+QLabel#knob {{ color: {FAINT}; font-size: 10px; padding-top: 4px; }}
 QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
 QLabel#badge {{
     color: {FAINT}; background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 8px; }}

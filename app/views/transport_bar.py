@@ -140,6 +140,7 @@ class TransportBar(QFrame):
         self._play.clicked.connect(self.play_asked)
         self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
         self._loop.setCheckable(True)
+        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         column = QVBoxLayout()
         column.addWidget(self._play)

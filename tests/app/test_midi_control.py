@@ -111,11 +111,11 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     dialog.port_chosen.emit("Pads:Pads 24:0")
     assert midi.choices.port == "Pads:Pads 24:0"
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
-    assert "move" in taught.text()
+    assert "Move" in taught.text()
     with qtbot.waitSignal(midi.performed, timeout=5_000):
         backend.send("control_change", control=74, value=127)
     assert midi.choices.controllers == {"width": 74}
-    assert taught.text() == "controller 74"
+    assert taught.text() == "Controller 74"
     with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
         backend.send("control_change", control=74, value=0)
     assert performed.args == [{"width": pytest.approx(0.02)}, False]
@@ -160,4 +160,4 @@ def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl,
     qtbot.addWidget(window)
     midi.show_dialog(window)
     assert midi._dialog is not None
-    assert midi._dialog._inputs.currentText() == "no MIDI input found"
+    assert midi._dialog._inputs.currentText() == "No MIDI input found"
