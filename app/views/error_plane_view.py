@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, PlanePicture, nearest_cell, refine
 from app.views import theme
 from app.views.axis_label import UprightLabel, UprightTicks, fit_foot
+from app.views.colour_maps import share_map
 from app.views.parts import ENTER_KEYS, keeps_own_keys, words_label
 from app.views.progress_strip import ProgressStrip
 
@@ -26,10 +27,6 @@ _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _STEP_X = POSITIONS[1] - POSITIONS[0]
 _STEP_Y = math.log10(AMPLITUDES_MM[1] / AMPLITUDES_MM[0])
-# dark where model and truth are alike, brighter the more they differ: also without colour
-COLOURS = pg.ColorMap(
-    [0, 0.3, 0.55, 0.78, 1], ["#10202e", "#1d5a78", "#8a6f52", "#f0a63c", "#fff1d6"], mapping="clip"
-)
 
 Range = tuple[float, float]
 
@@ -125,15 +122,15 @@ class _Map(pg.PlotWidget):
         self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self._ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
         self._image = pg.ImageItem()
-        self._image.setColorMap(COLOURS)
         self._image.setLevels([math.log10(end) for end in SCALE])
         item.addItem(self._image)
         self._bar = pg.ColorBarItem(
-            values=tuple(math.log10(end) for end in SCALE), colorMap=COLOURS, interactive=False, width=14
+            values=tuple(math.log10(end) for end in SCALE), colorMap=share_map(), interactive=False, width=14
         )
         self._bar_ticks = UprightTicks(self._bar.axis, self._bar.vb)
         self._bar_ticks.set((math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS)
         self._bar.setImageItem(self._image, insert_in=item)
+        theme.changes.face_changed.connect(self._take_face)
         dashed = pg.mkPen(theme.TEXT, width=1, style=Qt.PenStyle.DashLine)
         self._outline = item.plot(pen=dashed)
         self._pluck = pg.ScatterPlotItem(symbol="o", size=13, pen=pg.mkPen(theme.TEXT, width=2), brush=None)
@@ -143,6 +140,9 @@ class _Map(pg.PlotWidget):
         self._trained: tuple[Range, Range] | None = None
         self._present = (0.35, 4.0)
         self.cursor: tuple[float, float] | None = None
+
+    def _take_face(self) -> None:
+        self._bar.setColorMap(share_map())
 
     def show_picture(self, picture: PlanePicture | None) -> None:
         if picture is None:

@@ -71,6 +71,7 @@ class SpaceTimeView(QWidget):
         self._bar.setImageItem(self._image, insert_in=item)
         self._maps = {"displacement": displacement_map(), "error": error_map()}
         self._map_shown = "displacement"
+        theme.changes.face_changed.connect(self._take_face)
         self.quantities.chosen.connect(self._choose_quantity)
         self.gains.activated.connect(self._choose_gain)
         self.plot.pointed.connect(lambda _, place: self.listening_point_moved.emit(min(max(place, 0.0), 1.0)))
@@ -120,6 +121,10 @@ class SpaceTimeView(QWidget):
     @property
     def _kind(self) -> str:
         return "error" if self.quantity == "error" else "displacement"
+
+    def _take_face(self) -> None:
+        self._maps = {"displacement": displacement_map(), "error": error_map()}
+        self._bar.setColorMap(self._maps[self._map_shown])
 
     def _choose_quantity(self) -> None:
         self.gains.setCurrentIndex(self.gains.findData(self._gain[self._kind]))

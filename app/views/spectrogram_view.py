@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtWidgets import QWidget
 
+from app.views import theme
 from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.colour_maps import level_map
 from app.views.parts import combo_box, lay_out_plot
@@ -63,6 +64,7 @@ class SpectrogramView(QWidget):
             values=(-self.range_db, 0), width=10, label="dB", colorMap=level_map(), interactive=False
         )
         self._bar.setImageItem([], insert_in=item)
+        theme.changes.face_changed.connect(self._take_face)
         self.scales.chosen.connect(self._choose_scale)
         self.ranges.activated.connect(self._choose_range)
         self._label_frequencies()
@@ -121,6 +123,10 @@ class SpectrogramView(QWidget):
             low, high = self._heights()
             half = self._hop_s / 2
             self._image.setRect(QRectF(-half, low, self._drawn * self._hop_s, high - low))
+
+    def _take_face(self) -> None:
+        self._image.setLookupTable(level_map().getLookupTable(nPts=256))
+        self._bar.setColorMap(level_map())
 
     def _choose_scale(self) -> None:
         self._label_frequencies()

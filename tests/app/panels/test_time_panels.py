@@ -211,6 +211,16 @@ def test_the_spectrum_tells_level_and_nearest_partial(qtbot: QtBot, make: Make, 
     assert not panel.view._partial.isVisible()
 
 
+def test_at_the_end_the_spectrum_stays(qtbot: QtBot, make: Make, take: Take) -> None:
+    panel = make(SpectrumPanel)
+    for position_s in (1.0, 0.9):  # both within the last window
+        panel.show_moment(Moment(take, position_s, False, 0.016))
+        qtbot.waitUntil(
+            lambda at=position_s: panel.show_moment(Moment(take, at, False, 0.016)) or panel._shown[2:3] == (at,)
+        )
+        assert panel.view._levels_db["truth"].max() > -60
+
+
 def test_the_spectrums_range_is_one_for_both_sources(make: Make, take: Take) -> None:
     view = make(SpectrumPanel).view
     view.ranges.setCurrentIndex(0)

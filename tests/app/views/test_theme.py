@@ -13,7 +13,10 @@ from pytestqt.qtbot import QtBot
 
 from app.shown import ShownSource
 from app.views import theme
+from app.views.error_plane_view import ErrorPlaneView
 from app.views.plots import recolour
+from app.views.space_time_view import SpaceTimeView
+from app.views.spectrogram_view import SpectrogramView
 from app.views.string_view import StringView
 from app.views.waveform_view import WaveformView
 
@@ -99,6 +102,22 @@ def test_plots_take_on_another_face_and_come_back(
         assert view.backgroundBrush().color() == QColor(new.panel)
         assert view.getPlotItem().getAxis("left").textPen().color() == QColor(new.faint)
         assert stranger.opts["pen"].color() == QColor("#123456")
+
+
+def test_pictures_lie_on_the_ground_of_the_face(qtbot: QtBot, dark_again: None) -> None:
+    """What is nothing is as light, or as dark, as the panel; what is much is not."""
+    spectrogram, space_time, plane = SpectrogramView(), SpaceTimeView(), ErrorPlaneView()
+    for widget in (spectrogram, space_time, plane):
+        qtbot.addWidget(widget)
+    for face in (theme.LIGHT, theme.DARK):
+        theme.use(face)
+        for view, ground_at in ((spectrogram, 0.0), (space_time, 0.5), (plane.map, 0.0)):
+            colours = view._bar.colorMap()
+            ground, much = (colours.map(place, mode="qcolor") for place in (ground_at, 1.0))
+            assert theme.contrast(ground.name(), face.panel) < 1.25
+            assert theme.contrast(much.name(), face.panel) > 3
+        table = spectrogram._image.lut
+        assert theme.contrast(QColor(*map(int, table[0][:3])).name(), face.panel) < 1.25
 
 
 def test_a_painted_view_reads_the_face_when_it_paints(qtbot: QtBot, dark_again: None) -> None:
