@@ -49,9 +49,15 @@ class HeardMotion:
 
     def read(self, first: int, stop: int) -> NDArray[np.float32]:
         """What is ready of frames first … stop, (frames, grid_points) in m."""
+        frames, *taken_away = self.parts(first, stop)
+        if taken_away:
+            frames = frames - taken_away[0]
+        return frames if self.gain == 1 else np.float32(self.gain) * frames
+
+    def parts(self, first: int, stop: int) -> list[NDArray[np.float32]]:
+        """What `read` is made of before the gain: one motion, or a second that is taken away from it."""
         stop = min(stop, self.ready)
-        model, *truth = (motion.read(first, stop) for motion in self._motions)
-        return np.float32(self.gain) * (model - truth[0] if truth else model)
+        return [motion.read(first, stop) for motion in self._motions]
 
     def shape(self, time_s: float) -> NDArray[np.float32]:
         """The string (grid_points,) at a time between two frames, in m; at rest where there is none yet."""
@@ -89,9 +95,9 @@ class HeardSignal:
         if stop <= first:
             return np.zeros(0, np.float32)
         start = max(0, first - self._reach)
-        motion = self.motion.read(start, stop + self._reach)
-        weights = self.listening.weights(motion.shape[1])[:, :1].float().numpy()
-        signal: NDArray[np.floating] = motion @ weights
+        weights = self.listening.weights(self.motion.grid_points)[:, :1].float().numpy()
+        picked_up, *taken_away = (frames @ weights for frames in self.motion.parts(start, stop + self._reach))
+        signal: NDArray[np.floating] = self.motion.gain * (picked_up - taken_away[0] if taken_away else picked_up)
         if self._reach and len(signal) > 1:
             signal = Differentiator(self.motion.rate_hz).feed(signal, last=True)
         return signal[first - start : stop - start, 0].astype(np.float32)

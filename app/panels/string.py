@@ -6,6 +6,7 @@ from app.analysis.heard import HeardMotion
 from app.library import Library
 from app.motion import Envelope, Strobe, frame_at
 from app.panels.base import Moment, Panel
+from app.preset_words import shape_word
 from app.rendering import DIFFERENCE, Take
 from app.session import Choices, Session
 from app.shown import LEGEND_FIELDS, shown_sources
@@ -139,7 +140,7 @@ class StringPanel(Panel):
 
 
 def _label(choices: Choices) -> str:
-    words = choices.shape.replace("_", " ")
+    words = shape_word(choices.shape)
     return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
 
 

@@ -16,7 +16,7 @@ from app.shown import LEGEND_FIELDS, ear, part_words, readable_unit, shown_sourc
 from app.views.waveform_view import WaveformView
 
 EVERY = 3  # moments
-MOST_FRAMES = 65_536  # at a time: what is new after the listening point has moved comes in a few steps
+MOST_FRAMES = 32_768  # at a time: what is new after the listening point has moved comes in a few steps
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
 

@@ -14,6 +14,7 @@ from app.library import PresetEntry
 from app.views.figures_table import Column, FiguresTable, TableRow
 from app.views.parts import tool_button, words_label
 from app.views.progress_strip import ProgressStrip
+from app.views.segments import SMALL
 
 
 def percent(value: float) -> str:
@@ -84,13 +85,17 @@ class CompareView(QWidget):
         self.table.row_entered.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_deleted.connect(lambda name: self.preset_toggled.emit(name, False))
         self.progress = ProgressStrip("Progress of the comparison")
+        for control in (presets, self._stop, copy):
+            control.setStyleSheet(SMALL)
         head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
         head.addWidget(presets)
         head.addWidget(self._words, 1)
         head.addWidget(self._stop)
         head.addWidget(copy)
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self.progress)

@@ -19,6 +19,7 @@ from app.analysis.poles import PoleFigure, Poles
 from app.views import theme
 from app.views.axis_label import UprightLabel, UprightTicks, fit_foot
 from app.views.parts import ENTER_KEYS, combo_box, keeps_own_keys, words_label
+from app.views.segments import SMALL
 
 NEAR_PIXELS = 16
 CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
@@ -54,12 +55,16 @@ class EigenvaluesView(QWidget):
         self.plane.pointed.connect(self._tell)
         self.plane.taken.connect(self._take)
         self.plane.escaped.connect(self.solo_ended)
+        for control in (self._axes, self._layer):
+            control.setStyleSheet(SMALL)
         head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
         head.addWidget(self._axes)
         head.addWidget(self._layer)
         head.addWidget(self._words, 1)
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self.plane, 1)

@@ -41,6 +41,7 @@ class ErrorPlaneView(QWidget):
         self.setAccessibleName("Error map")
         self.setMinimumHeight(84)
         self._words = words_label()
+        self._words.setContentsMargins(4, 0, 4, 0)
         self.progress = ProgressStrip("Progress of the error map")
         self.map = _Map()
         self.map.pointed.connect(self._tell)
@@ -48,7 +49,7 @@ class ErrorPlaneView(QWidget):
         self._picture: PlanePicture | None = None
         self._resting = ""
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 4, 0, 0)
         column.setSpacing(4)
         column.addWidget(self._words)
         column.addWidget(self.progress)

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from app.batch import BatchPlan
 from app.export import Source, default_file_name
 from app.library import PresetEntry
+from app.preset_words import shape_word
 from app.session import Choices
 from app.settings import BatchChoices, ExportChoices
 from app.slots import other_preset
@@ -221,7 +222,7 @@ class BatchPage(QWidget):
 
 
 def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
-    shape = choices.shape.replace("_", " ")
+    shape = shape_word(choices.shape)
     heard = f"{choices.listen:.2f}"
     if choices.stereo:
         heard += f" (left) and {choices.listen_right:.2f} (right)"

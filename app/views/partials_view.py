@@ -12,6 +12,7 @@ from app.analysis.take_partials import WINDOWS, PartialRow
 from app.views.figures_table import Column, FiguresTable, TableRow
 from app.views.parts import combo_box, tool_button, words_label
 from app.views.progress_strip import ProgressStrip
+from app.views.segments import SMALL
 from engine.partials import LEAST_DECAY_DB
 
 
@@ -67,12 +68,16 @@ class PartialsView(QWidget):
         self.table.row_entered.connect(lambda mode: self.mode_chosen.emit(mode))
         self.table.escaped.connect(self.solo_ended)
         self.progress = ProgressStrip("Progress of the partials")
+        for control in (self._window, copy):
+            control.setStyleSheet(SMALL)
         head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
         head.addWidget(self._window)
         head.addWidget(self._words, 1)
         head.addWidget(copy)
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self.progress)

@@ -98,6 +98,7 @@ def test_plots_take_on_another_face_and_come_back(
             assert curve.opts["pen"].color() == theme.translucent(colour, alpha)
         assert line.pen.color() == QColor(new.text)
         assert view._horizon.label.color == QColor(new.warning)
+        assert view._horizon.label.fill.color() == theme.translucent(new.panel, 170)
         assert view._untrained.brush.color() == theme.translucent(new.warning, 18)
         assert view.backgroundBrush().color() == QColor(new.panel)
         assert view.getPlotItem().getAxis("left").textPen().color() == QColor(new.faint)
