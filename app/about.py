@@ -41,7 +41,7 @@ def about_text(settings: Path, presets: Path) -> str:
             f"After {CITATION}",
             "",
             f"Settings: {settings}",
-            f"Presets: {presets}",
+            f"Shipped presets: {presets}",
             f"Your own presets: {user_folder()}",
             "",
             f"Python {platform.python_version()} on {platform.platform()}, {sys.maxsize.bit_length() + 1} bit",

@@ -107,6 +107,7 @@ class _Map(pg.PlotWidget):
         self.setMouseTracking(True)
         self.setCursor(Qt.CursorShape.CrossCursor)
         item = self.getPlotItem()
+        item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
         item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)

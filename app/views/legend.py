@@ -16,7 +16,7 @@ from app.views import theme
 STROKE = 16  # the length of a sample of colour
 FAINT_ALPHA = 185
 HEIGHT = 20
-SHARE = 0.8  # of the plot's width, at most
+SHARE = 0.92  # of the plot's width, at most
 _GAP, _BETWEEN = 6, 18
 
 

@@ -147,6 +147,7 @@ def _style_sheet() -> str:
     slots = "\n".join(
         f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
         f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; padding: 6px; }}"
+        f" QPushButton#{kind}:disabled {{ background: {RAISED}; color: {DISABLED}; border-color: {LINE}; }}"
         for kind, colour in SOURCE_COLOURS.items()
     )
     return f"""
@@ -182,7 +183,6 @@ QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, Q
     {{ border: 1px solid {TEXT}; }}
 QPushButton:disabled, QToolButton:disabled, QComboBox:disabled {{ color: {DISABLED}; }}
 {slots}
-QPushButton:checked:disabled {{ background: {LINE}; color: {DISABLED}; border-color: {LINE}; }}
 QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; padding: 6px 9px; }}
 QToolButton#solo {{ padding: 1px 9px; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}

@@ -129,7 +129,7 @@ def test_the_spectrogram_follows_the_listening_point(qtbot: QtBot, make: Make, t
 
         def drawn(listen: float = listen) -> bool:
             made = panel._drawn_of[0] if panel._drawn_of else None
-            return made is not None and made.listen == listen and panel._drawn == made.columns
+            return made is not None and made.listening == Listening((listen,)) and panel._drawn == made.columns
 
         watch(qtbot, panel, take, drawn)
         peaks_db.append(panel.view._levels_db[10].max())
