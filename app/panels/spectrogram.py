@@ -10,7 +10,7 @@ from app.panels.base import Moment, Panel
 from app.panels.follower import Follower
 from app.rendering import Take
 from app.session import Session
-from app.shown import ear
+from app.shown import ear, full_scale_words
 from app.views.spectrogram_view import SpectrogramView
 
 EVERY = 6  # moments
@@ -38,6 +38,10 @@ class SpectrogramPanel(Panel):
         self._drawn = 0  # columns
         self._drawn_of: tuple[object, ...] = ()
         self._moments = 0
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        if "pickup" in names:
+            self.view.set_full_scale(full_scale_words(self.session.choices))
 
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)

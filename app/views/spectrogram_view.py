@@ -60,10 +60,9 @@ class SpectrogramView(QWidget):
         self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
         self._image.setLookupTable(level_map().getLookupTable(nPts=256))
         item.addItem(self._image, ignoreBounds=True)
-        self._bar = pg.ColorBarItem(
-            values=(-self.range_db, 0), width=10, label="dB", colorMap=level_map(), interactive=False
-        )
+        self._bar = pg.ColorBarItem(values=(-self.range_db, 0), width=10, colorMap=level_map(), interactive=False)
         self._bar.setImageItem([], insert_in=item)
+        self._bar_label = UprightLabel(self._bar, ("dB",))
         theme.changes.face_changed.connect(self._take_face)
         self.scales.chosen.connect(self._choose_scale)
         self.ranges.activated.connect(self._choose_range)
@@ -97,6 +96,10 @@ class SpectrogramView(QWidget):
         if rate_hz / 2 != self._highest_hz:
             self._highest_hz = rate_hz / 2
             self._label_frequencies()
+
+    def set_full_scale(self, words: str) -> None:
+        """What 0 dB is the level of."""
+        self._bar_label.set(f"dB re {words}", "dB")
 
     def begin_picture(self, columns: int, rows: int, hop_s: float) -> None:
         """Forgets what is drawn: the columns to come are other ones, the k-th at the time k·hop_s."""

@@ -134,6 +134,9 @@ def test_the_spectrogram_follows_the_listening_point(qtbot: QtBot, make: Make, t
         watch(qtbot, panel, take, drawn)
         peaks_db.append(panel.view._levels_db[10].max())
     assert peaks_db[0] == pytest.approx(20 * np.log10(1.01 * 4 / 10), abs=2)
+    assert panel.view._bar.getAxis("left").labelText == "dB re 10 mm"
+    choose(panel, pickup="velocity")
+    assert panel.view._bar.getAxis("left").labelText == "dB re 30 m/s"
     assert peaks_db[1] - peaks_db[0] == pytest.approx(20 * np.log10(0.5), abs=0.1)
 
 
