@@ -22,8 +22,6 @@ QUANTITIES = (
     ("relative", "MAE and RMSE", "Relative to the truth, over all of the string, in windows of two periods"),
     ("level", "Level", "How much louder the model is than the truth, in dB"),
 )
-RMSE = theme.MODEL
-MAE = "#d98bd0"
 LOWEST_DECADE, HIGHEST_DECADE = -6, 4
 LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
@@ -54,18 +52,19 @@ class ErrorTimeView(QWidget):
         self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         item.showGrid(x=True, y=True, alpha=0.18)
         self._curves = {
-            "rmse": item.plot(pen=pg.mkPen(RMSE, width=1)),
-            "mae": item.plot(pen=pg.mkPen(MAE, width=1)),
-            "level_db": item.plot(pen=pg.mkPen(RMSE, width=1)),
+            "rmse": item.plot(pen=pg.mkPen(theme.MODEL, width=1)),
+            "mae": item.plot(pen=pg.mkPen(theme.DIFFERENCE, width=1)),
+            "level_db": item.plot(pen=pg.mkPen(theme.MODEL, width=1)),
         }
         dotted = Qt.PenStyle.DotLine
         self._stored = {
-            "rmse": item.plot(pen=pg.mkPen(RMSE, width=1, style=dotted)),
-            "mae": item.plot(pen=pg.mkPen(MAE, width=1, style=dotted)),
+            "rmse": item.plot(pen=pg.mkPen(theme.MODEL, width=1, style=dotted)),
+            "mae": item.plot(pen=pg.mkPen(theme.DIFFERENCE, width=1, style=dotted)),
         }
         self._stored_errors: dict[str, float] = {}
         self._horizon_s = 1.0
         self._range: tuple[float, float] | None = None
+        theme.changes.face_changed.connect(self._tell_legend)
         self.quantities.chosen.connect(self._choose)
         lay_out_plot(self, (self.quantities, self.longer), self.readout, self.plot)
         self._choose()
@@ -146,7 +145,7 @@ class ErrorTimeView(QWidget):
         if self.quantity == "level":
             self.readout.rest("")
             return
-        drawn = (("rmse", RMSE), ("mae", MAE))
+        drawn = (("rmse", theme.MODEL), ("mae", theme.DIFFERENCE))
         text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
         stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
         self.readout.rest(f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}" if stored else text)

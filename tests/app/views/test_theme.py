@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from app.shown import ShownSource
 from app.views import theme
 from app.views.error_plane_view import ErrorPlaneView
+from app.views.error_time_view import ErrorTimeView
 from app.views.plots import recolour
 from app.views.space_time_view import SpaceTimeView
 from app.views.spectrogram_view import SpectrogramView
@@ -119,6 +120,20 @@ def test_pictures_lie_on_the_ground_of_the_face(qtbot: QtBot, dark_again: None) 
             assert theme.contrast(much.name(), face.panel) > 3
         table = spectrogram._image.lut
         assert theme.contrast(QColor(*map(int, table[0][:3])).name(), face.panel) < 1.25
+
+
+def test_the_errors_legend_has_the_colours_of_its_curves(
+    qtbot: QtBot, dark_again: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
+    view = ErrorTimeView()
+    qtbot.addWidget(view)
+    for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
+        theme.use(new)
+        recolour(old, new)
+        for name, colour in (("rmse", new.model), ("mae", new.difference)):
+            assert view._curves[name].opts["pen"].color() == QColor(colour)
+            assert f"color:{colour}'>— {name.upper()}" in view.readout.text()
 
 
 def test_a_painted_view_reads_the_face_when_it_paints(qtbot: QtBot, dark_again: None) -> None:
