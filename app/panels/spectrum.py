@@ -70,7 +70,7 @@ class SpectrumPanel(Panel):
 
     def _draw(self, heard: HeardSignal, position_s: float) -> None:
         analyser = Analyser(heard.motion.rate_hz)
-        last_window = heard.motion.frames - analyser.window_frames  # at the end of a take it stays
+        last_window = heard.ready - analyser.window_frames  # at the end of what there is it stays
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
         signal = heard.read(first, first + analyser.window_frames) / heard.listening.full_scale
         self.view.show_signal(heard.motion.source, signal, analyser)

@@ -224,6 +224,19 @@ def test_at_the_end_the_spectrum_stays(qtbot: QtBot, make: Make, take: Take) -> 
         assert panel.view._levels_db["truth"].max() > -60
 
 
+def test_while_a_take_grows_the_spectrum_is_of_a_whole_window(make: Make, take: Take) -> None:
+    panel = make(SpectrumPanel)
+    growing = Take("small", take.info, take.pluck, 1.0)
+    growing.append(take.motion_m("model")[:2000], take.motion_m("truth")[:2000])
+    panel.take_started(growing)
+    for _ in range(3):
+        panel.show_moment(Moment(growing, 0.499, True, 0.016))
+    edge_db = panel.view._levels_db["truth"]
+    for _ in range(3):
+        panel.show_moment(Moment(take, 0.5 - panel.view._analysers["truth"].window_frames / 4000, True, 0.016))
+    assert edge_db == pytest.approx(panel.view._levels_db["truth"], abs=1e-6)
+
+
 def test_the_spectrums_range_is_one_for_both_sources(make: Make, take: Take) -> None:
     view = make(SpectrumPanel).view
     view.ranges.setCurrentIndex(0)
