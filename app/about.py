@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from app.help_text import CITATION
+from app.preset_folders import user_folder
 from app.version import PROGRAM, program_version
 
 LIBRARIES = (
@@ -40,7 +41,8 @@ def about_text(settings: Path, presets: Path) -> str:
             f"After {CITATION}",
             "",
             f"Settings: {settings}",
-            f"Presets: {presets}",
+            f"Shipped presets: {presets}",
+            f"Your own presets: {user_folder()}",
             "",
             f"Python {platform.python_version()} on {platform.platform()}, {sys.maxsize.bit_length() + 1} bit",
             *(f"{name} {number}" for name, number in library_versions().items()),

@@ -57,6 +57,8 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+Q", "quit_asked", "quit"),
 )
 WIDE, HIGH = 960, 560  # below, the window is sparing
+ROOMY = 1240  # below, the controls stand closer
+FACTS_HEIGHT = 20
 
 PLAYED_KEYS = (  # see `app/keyboard.py`
     ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
@@ -107,6 +109,7 @@ class MainWindow(QMainWindow):
             "Model against truth for this pluck: relative mean absolute error, all of the string"
         )
         self._solo = tool_button("", "Hear all modes", "One mode is heard alone; click, or Esc, to hear all of them")
+        self._solo.setObjectName("solo")
         self._solo.setVisible(False)
         self._solo.clicked.connect(self.all_modes_asked)
         self.rate_label = QLabel()
@@ -140,6 +143,8 @@ class MainWindow(QMainWindow):
             head.addWidget(widget)
         facts = QHBoxLayout()
         facts.setSpacing(24)
+        for part in (self.presets.card, self._solo):  # one height, so that a mode alone moves nothing
+            part.setFixedHeight(FACTS_HEIGHT)
         facts.addWidget(self.presets.card, 1)
         facts.addWidget(self._solo)
         facts.addWidget(self.error_label)
@@ -174,7 +179,7 @@ class MainWindow(QMainWindow):
         self._loading.hide()
         self._string = view
         self._stage.insertWidget(0, view)
-        self._stage.setSizes([380, 0, 250])
+        self._stage.setSizes([310, 0, 300])
         self._set_alive(True)
         view.setFocus()
 
@@ -203,7 +208,7 @@ class MainWindow(QMainWindow):
 
     def show_solo(self, mode: int) -> None:
         """Which mode is heard alone; 0: all are heard."""
-        self._solo.setText(f"mode {mode} alone  ✕")
+        self._solo.setText(f"Mode {mode} alone  ✕")
         self._solo.setVisible(mode > 0)
 
     def geometry_text(self) -> str:
@@ -218,8 +223,10 @@ class MainWindow(QMainWindow):
         """A small window spends its room on what is to be seen and turned."""
         super().resizeEvent(event)
         self._brand.setVisible(self.width() >= WIDE)
-        low = self.height() < HIGH
-        self._column.setContentsMargins(*((8, 6, 8, 6) if low else (14, 12, 14, 12)))
+        narrow, low = self.width() < ROOMY, self.height() < HIGH
+        self.transport.set_compact(narrow)
+        aside, above = 8 if narrow else 14, 6 if low else 12
+        self._column.setContentsMargins(aside, above, aside, above)
         self._column.setSpacing(6 if low else 10)
 
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -75,8 +75,10 @@ class MidiControl(QObject):
         assert self._dialog is not None
         try:
             self._dialog.show_inputs(self.input.names(), self.input.name, "")
+            self._dialog.set_learnable("")
         except MidiUnavailable as error:
             self._dialog.show_inputs([], "", str(error))
+            self._dialog.set_learnable(str(error))
 
     def _show_choices(self) -> None:
         if self._dialog is not None:

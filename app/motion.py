@@ -7,10 +7,12 @@ the playhead, at a phase of its period that moves on slowly.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
-from app.rendering.take import SOURCES, Take
+from app.analysis.heard import HeardMotion
+from app.rendering.take import Take
 from app.views.string_ink import Band, StringFrame
 
 BLUR_S = 1 / 60  # an eye's or a picture's exposure
@@ -45,56 +47,76 @@ class Strobe:
 class Envelope:
     """The range of motion within the last second of a take, kept block by block: each frame is looked at once."""
 
-    def __init__(self, take: Take) -> None:
-        self._take = take
-        self._block = math.ceil(ENVELOPE_BLOCK_S * take.info.rate_hz)
-        blocks, points = take.frames // self._block + 1, take.info.grid_points
-        self._lowest_mm = {name: np.zeros((blocks, points), np.float32) for name in SOURCES}
-        self._highest_mm = {name: np.zeros((blocks, points), np.float32) for name in SOURCES}
-        self._known = np.zeros(blocks, bool)
-        self._shown: tuple[tuple[int, int], dict[str, Band]] = ((0, 0), {})
+    def __init__(self) -> None:
+        self._ranges: dict[str, _Range] = {}
+        self._bands: dict[str, Band] = {}
 
-    def before(self, position_s: float) -> dict[str, Band]:
+    def before(self, position_s: float, motions: Iterable[HeardMotion]) -> dict[str, Band]:
         """Lowest and highest displacement (points,) in mm by source, in whole blocks up to the playhead.
 
         The same object as the last time, where nothing has changed since.
         """
-        rate_hz = self._take.info.rate_hz
-        last = min(int(position_s * rate_hz), self._take.ready_frames) // self._block
+        bands = {}
+        for motion in motions:
+            known = self._ranges.get(motion.source)
+            if known is None or known.motion != motion:
+                known = self._ranges[motion.source] = _Range(motion)
+            if band := known.before(position_s):
+                bands[motion.source] = band
+        if bands.keys() != self._bands.keys() or any(bands[name] is not self._bands[name] for name in bands):
+            self._bands = bands
+        return self._bands
+
+
+class _Range:
+    """One source's."""
+
+    def __init__(self, motion: HeardMotion) -> None:
+        self.motion = motion
+        self._block = math.ceil(ENVELOPE_BLOCK_S * motion.rate_hz)
+        blocks, points = motion.frames // self._block + 1, motion.grid_points
+        self._lowest_mm = np.zeros((blocks, points), np.float32)
+        self._highest_mm = np.zeros((blocks, points), np.float32)
+        self._known = np.zeros(blocks, bool)
+        self._blocks_shown = (0, 0)
+        self._band: Band | None = None
+
+    def before(self, position_s: float) -> Band | None:
+        last = min(int(position_s * self.motion.rate_hz), self.motion.ready) // self._block
         first = max(0, last - round(ENVELOPE_S / ENVELOPE_BLOCK_S))
-        if (first, last) != self._shown[0]:
+        if last == first:
+            return None
+        if (first, last) != self._blocks_shown:
             for block in np.flatnonzero(~self._known[first:last]) + first:
                 self._look_at(int(block))
-            bands = {
-                name: (self._lowest_mm[name][first:last].min(axis=0), self._highest_mm[name][first:last].max(axis=0))
-                for name in SOURCES
-                if first < last
-            }
-            self._shown = (first, last), bands
-        return self._shown[1]
+            self._band = self._lowest_mm[first:last].min(axis=0), self._highest_mm[first:last].max(axis=0)
+            self._blocks_shown = first, last
+        return self._band
 
     def _look_at(self, block: int) -> None:
-        frames = slice(block * self._block, (block + 1) * self._block)
-        for name in SOURCES:
-            motion = self._take.motion_m(name)[frames]
-            self._lowest_mm[name][block] = motion.min(axis=0) * MM
-            self._highest_mm[name][block] = motion.max(axis=0) * MM
+        frames = self.motion.read(block * self._block, (block + 1) * self._block)
+        self._lowest_mm[block] = frames.min(axis=0) * MM
+        self._highest_mm[block] = frames.max(axis=0) * MM
         self._known[block] = True
 
 
 def frame_at(
-    take: Take, position_s: float, shown_s: float, speed: float, envelope: Envelope | None = None
+    take: Take,
+    motions: Iterable[HeardMotion],
+    position_s: float,
+    shown_s: float,
+    speed: float,
+    envelope: Envelope | None = None,
 ) -> StringFrame:
-    """The picture of a take: the shapes at `shown_s`, blurred over the exposure before the playhead."""
-    rate_hz = take.info.rate_hz
-    last = min(max(math.ceil(position_s * rate_hz), 1), max(take.ready_frames, 1))
-    first = max(0, last - math.ceil(BLUR_S * rate_hz))
+    """The picture of a take: the motions' shapes at `shown_s`, blurred over the exposure before the playhead."""
+    there = [motion for motion in motions if motion.there]
     shapes, lowest, highest = {}, {}, {}
-    for name in SOURCES:
-        motion = take.motion_m(name)[first:last]
-        shapes[name] = take.shape_m(name, shown_s) * MM
-        lowest[name] = motion.min(axis=0) * MM
-        highest[name] = motion.max(axis=0) * MM
+    for motion in there:
+        last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
+        frames = motion.read(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
+        shapes[motion.source] = motion.shape(shown_s) * MM
+        lowest[motion.source] = frames.min(axis=0) * MM
+        highest[motion.source] = frames.max(axis=0) * MM
     caption = f"{position_s:.3f} s" + ("" if speed >= 1 else f"   slow motion × {speed:.3f}")
-    envelopes = envelope.before(position_s) if envelope else {}
+    envelopes = envelope.before(position_s, there) if envelope else {}
     return StringFrame(shapes, lowest, highest, caption, position_s > take.info.horizon_s, envelopes)

@@ -39,6 +39,7 @@ class PresetDesk(QObject):
         self._filter = PresetFilter()
         bar.step_asked.connect(self.step)
         bar.browse_asked.connect(self.toggle)
+        bar.all_asked.connect(browser.clear_filter)
         browser.opened.connect(self._reload)
         browser.filter_changed.connect(self._apply)
         browser.preset_chosen.connect(lambda name: session.update(preset=name))
@@ -92,6 +93,7 @@ class PresetDesk(QObject):
         chosen = self._session.choices.preset
         self.browser.show_entries(listed, self.favourites, chosen, len(entries), str(user_folder()))
         self._bar.set_chosen(self._library.find(chosen), chosen in self.favourites)
+        self._bar.set_listed(len(listed), len(entries))
 
     def _open_folder(self) -> None:
         folder = user_folder()

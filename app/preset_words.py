@@ -37,6 +37,11 @@ def initial_word(initial: str) -> str:
     return {"gaussian": "plucked", "noise": "random shapes", "pluck": "plucked anywhere"}.get(initial, initial)
 
 
+def shape_word(shape: str) -> str:
+    """A pluck's shape within a sentence."""
+    return "Gaussian" if shape == "gaussian" else shape.replace("_", " ")
+
+
 def rate_word(rate_hz: int) -> str:
     return f"{rate_hz / 1000:g} kHz"
 

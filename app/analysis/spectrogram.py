@@ -1,4 +1,4 @@
-"""Levels over time and frequency at the listening point, by short-time Fourier transforms."""
+"""Levels over time and frequency of what is heard at the listening point, by short-time Fourier transforms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering import Take
+from app.analysis.heard import HeardMotion, HeardSignal
+from app.rendering import SOURCES, Listening, Take
 
 FLOOR_DB = -150.0
 WINDOW_PERIODS = 7.0  # of the fundamental: the fewest that tell partials apart with a Hann window, and some more
@@ -16,7 +17,7 @@ COLUMNS_AT_A_TIME = 32
 
 
 class Spectrogram:
-    """Model, truth and error in dB, 0 dB for a sine of `full_scale_m`. A `Growing`.
+    """Model, truth and error in dB, 0 dB for a sine of the listening's full scale. A `Growing`.
 
     Column k is of the window around the time k·hop_s; the last one ends with the take. Before the take lies its
     mirror: a string that is let go from rest has moved so, and a sudden start would be a click that nobody hears.
@@ -26,14 +27,15 @@ class Spectrogram:
         levels_db: (columns, bins) each, for "model", "truth" and "error": model − truth, of the signals.
     """
 
-    def __init__(self, take: Take, listen: float, full_scale_m: float) -> None:
-        self.take, self.listen = take, listen
+    def __init__(self, take: Take, listening: Listening) -> None:
+        self.take, self.listening = take, listening
+        self._heard = {name: HeardSignal(HeardMotion(take, name), listening) for name in SOURCES}
         rate_hz = take.info.rate_hz
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP
         self.ready = 0
         self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
-        self._window *= np.float32(2 / self._window.sum() / full_scale_m)
+        self._window *= np.float32(2 / self._window.sum() / listening.full_scale)
         self.columns = self._columns_of(take.frames)
         shape = (self.columns, self.window_frames // 2 + 1)
         self.levels_db = {name: np.empty(shape, np.float32) for name in ("model", "truth", "error")}
@@ -64,7 +66,7 @@ class Spectrogram:
 
     def _possible(self) -> int:
         """Columns whose window has been rendered whole."""
-        return self._columns_of(self.take.ready_frames)
+        return self._columns_of(min(heard.ready for heard in self._heard.values()))
 
     def _columns_of(self, frames: int) -> int:
         half = self.window_frames // 2
@@ -74,9 +76,12 @@ class Spectrogram:
         """(count, bins) of the next columns."""
         first = self.ready * self.hop - self.window_frames // 2
         last = first + (count - 1) * self.hop + self.window_frames
-        signal = self.take.signal_m(source, self.listen, max(first, 0), last)
+        heard = self._heard[source]
+        signal = heard.read(max(first, 0), last)
         if first < 0:
-            mirror = self.take.signal_m(source, self.listen, 1, 1 - first)[::-1]
+            mirror = heard.read(1, 1 - first)[::-1]
+            if self.listening.pickup == "velocity":
+                mirror = -mirror
             signal = np.concatenate([mirror, signal])
         windows = np.lib.stride_tricks.sliding_window_view(signal, self.window_frames)[:: self.hop]
         return np.fft.rfft(windows * self._window, axis=1)

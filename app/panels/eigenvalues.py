@@ -41,7 +41,7 @@ class EigenvaluesPanel(Panel):
         entry = self.library.find(self.session.choices.preset)
         if entry is not None and entry.path != self._asked:
             path = self._asked = entry.path
-            self.view.show_figure(None, "reading the preset …")
+            self.view.show_figure(None, "Reading the preset …")
 
             def work(job: Job) -> PoleFigure:
                 return pole_figure(load_preset(path))
@@ -55,5 +55,5 @@ class EigenvaluesPanel(Panel):
         self.session.update(solo=0 if mode == self.session.choices.solo else mode)
 
     def _failed(self, message: str, details: str) -> None:
-        self.view.show_figure(None, "this preset cannot be read")
+        self.view.show_figure(None, "This preset cannot be read")
         self.told.emit(message, details)

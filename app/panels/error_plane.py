@@ -65,7 +65,7 @@ class ErrorPlanePanel(Panel):
         self._asked = self._wanted()
         path, pluck = entry.path, self.session.choices.pluck
         self.view.progress.show_share(0.0)
-        self.view.set_words("the model's error for every pluck: computing …")
+        self.view.set_words("The model's error for every pluck: computing …")
         self._background.start(lambda job: self._planes.compute(path, pluck, job))
 
     def close(self) -> None:
@@ -82,11 +82,11 @@ class ErrorPlanePanel(Panel):
     def _finished(self, picture: PlanePicture) -> None:
         self.view.progress.show_share(None)
         self.view.show_picture(picture)
-        self.view.set_words("relative error over the trained time, for every pluck of this shape; click to hear one")
+        self.view.set_words("Relative error over the trained time, for every pluck of this shape; click to hear one")
 
     def _failed(self, message: str, details: str) -> None:
         self.view.progress.show_share(None)
-        self.view.set_words("there is no map of this preset")
+        self.view.set_words("There is no map of this preset")
         self.told.emit(message, details)
 
     def _audition(self, position: float, amplitude_mm: float) -> None:

@@ -42,7 +42,7 @@ class PartialsPanel(Panel):
         self._waiting = None
         self._background.cancel()
         self.view.progress.show_share(None)
-        self.view.set_words("after the rendering: the partials of the new pluck")
+        self.view.set_words("After the rendering: the partials of the new pluck")
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self._waiting = take
@@ -51,7 +51,7 @@ class PartialsPanel(Panel):
         if self._waiting is not None:  # only what is looked at is measured
             take, self._waiting = self._waiting, None
             self.view.progress.show_share(0.0)
-            self.view.set_words("measuring the partials of this pluck …")
+            self.view.set_words("Measuring the partials of this pluck …")
             self._background.start(lambda job: take_partials(take, job))
 
     def close(self) -> None:
@@ -68,7 +68,7 @@ class PartialsPanel(Panel):
 
     def _failed(self, message: str, details: str) -> None:
         self.view.progress.show_share(None)
-        self.view.set_words("the partials of this pluck could not be measured")
+        self.view.set_words("The partials of this pluck could not be measured")
         self.told.emit(message, details)
 
     def _show(self) -> None:
@@ -78,4 +78,6 @@ class PartialsPanel(Panel):
         rows = self._rows.get(window, [])
         self.view.show_partials(rows)
         self.view.show_solo(self.session.choices.solo)
-        self.view.set_words("" if rows else f"{WINDOWS[window]}: too short to measure; let the pluck be longer")
+        self.view.set_words(
+            "" if rows else f"{WINDOWS[window].capitalize()}: too short to measure; let the pluck be longer"
+        )

@@ -10,8 +10,8 @@ from app.panels.base import Moment, Panel
 from app.panels.follower import Follower
 from app.rendering import Take
 from app.session import Session
+from app.shown import ear, full_scale_words
 from app.views.spectrogram_view import SpectrogramView
-from engine.sources import FULL_SCALE_M
 
 EVERY = 6  # moments
 ROWS = 320
@@ -22,7 +22,8 @@ class SpectrogramPanel(Panel):
     key = "spectrogram"
     title = "Spectrogram"
     help = (
-        "Levels over time and frequency at the listening point: model, truth or their difference, all on one scale."
+        "Levels over time and frequency of what the pick-up senses at the listening point: model, truth or their "
+        "difference, all on one scale."
     )
     view: SpectrogramView
 
@@ -38,6 +39,10 @@ class SpectrogramPanel(Panel):
         self._drawn_of: tuple[object, ...] = ()
         self._moments = 0
 
+    def choices_changed(self, names: frozenset[str]) -> None:
+        if "pickup" in names:
+            self.view.set_full_scale(full_scale_words(self.session.choices))
+
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
         self._spectrogram = None  # begun when it can be seen
@@ -49,9 +54,9 @@ class SpectrogramPanel(Panel):
         self._moments += 1
         if moment.take is None or self._moments % EVERY:
             return
-        listen = self.session.choices.listen
-        if self._spectrogram is None or self._spectrogram.listen != listen:
-            self._spectrogram = Spectrogram(moment.take, listen, FULL_SCALE_M)
+        listening = ear(self.session.choices)
+        if self._spectrogram is None or self._spectrogram.listening != listening:
+            self._spectrogram = Spectrogram(moment.take, listening)
             self._follower.follow(self._spectrogram)
         self._draw(self._spectrogram)
 

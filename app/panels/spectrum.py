@@ -1,4 +1,4 @@
-"""The spectrum at the playhead, fifteen times a second."""
+"""The spectrum of what the slots hold, as it is heard at the playhead; fifteen times a second."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
+from app.analysis.heard import HeardMotion, HeardSignal
 from app.library import Library
 from app.panels.base import Moment, Panel
-from app.rendering import SOURCES, Take
+from app.rendering import Take
 from app.session import Session
-from app.views.spectrum_view import SpectrumView
-from engine.sources import FULL_SCALE_M
+from app.shown import LEGEND_FIELDS, ear, full_scale_words, part_words, shown_sources
+from app.views.spectrum_view import Analyser, SpectrumView
 
 EVERY = 4  # moments
 
@@ -20,7 +21,7 @@ class SpectrumPanel(Panel):
     key = "spectrum"
     title = "Spectrum"
     help = (
-        "Level against frequency at the playhead and the listening point, of model and truth on the same "
+        "Level against frequency of what slots A and B hold, at the playhead and the listening point, on the same "
         "axes; 0 dB is a full-scale sine. A partial that is out of tune or decays wrongly parts here first."
     )
     view: SpectrumView
@@ -35,30 +36,44 @@ class SpectrumPanel(Panel):
         self.view.hovered.connect(self._hover)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"heard", "a", "b"}:
-            self.view.set_heard(self.session.source_heard)
+        choices = self.session.choices
+        if names & LEGEND_FIELDS:
+            self.view.set_sources(shown_sources(choices, self.library), part_words(choices))
+            self._shown = ()
+        if "pickup" in names:
+            self.view.set_full_scale(full_scale_words(choices))
 
     def take_started(self, take: Take) -> None:
         self._shown = ()  # holds nothing of the last take
-        if take.info.rate_hz != self.view.analyser.rate_hz:
-            self.view.set_rate(take.info.rate_hz)
         self._partials_hz = take.info.string.undamped_frequencies(take.info.modes).numpy() / (2 * np.pi)
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1
-        take = moment.take
+        take, choices = moment.take, self.session.choices
         if take is None or self._moments % EVERY:
             return
-        listen = self.session.choices.listen
-        shown = (take, -1 if take.complete else take.ready_frames, moment.position_s, listen)
+        motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        there = [motion for motion in motions if motion.there]
+        ready = tuple(-1 if motion.ready == motion.frames else motion.ready for motion in there)
+        shown = (take, ready, moment.position_s, ear(choices))
         if shown == self._shown:
             return
         self._shown = shown
-        first = round(moment.position_s * take.info.rate_hz)
-        last = first + self.view.analyser.window_frames
-        self.view.show_signals({name: take.signal_m(name, listen, first, last) / FULL_SCALE_M for name in SOURCES})
+        self.view.set_rate(max((motion.rate_hz for motion in there), default=take.info.rate_hz))
+        for motion in motions:
+            if motion in there:
+                self._draw(HeardSignal(motion, ear(choices)), moment.position_s)
+            else:
+                self.view.clear_signal(motion.source)
         if math.isfinite(self._hovered_hz):
             self._tell()
+
+    def _draw(self, heard: HeardSignal, position_s: float) -> None:
+        analyser = Analyser(heard.motion.rate_hz)
+        last_window = heard.ready - analyser.window_frames  # at the end of what there is it stays
+        first = max(0, min(round(position_s * analyser.rate_hz), last_window))
+        signal = heard.read(first, first + analyser.window_frames) / heard.listening.full_scale
+        self.view.show_signal(heard.motion.source, signal, analyser)
 
     def _hover(self, frequency_hz: float) -> None:
         self._hovered_hz = frequency_hz
@@ -70,8 +85,10 @@ class SpectrumPanel(Panel):
     def _tell(self) -> None:
         """The frequency under the mouse, its levels, and the nearest partial of the string at rest."""
         frequency_hz, partial_hz = self._hovered_hz, None
-        levels = "  ".join(f"{name} {level:.1f}" for name, level in self.view.levels_db(frequency_hz).items())
-        text = f"{frequency_hz:.1f} Hz   {levels} dB"
+        levels_db = self.view.levels_db(frequency_hz)
+        told = [s for s in shown_sources(self.session.choices, self.library) if s.source in levels_db]
+        levels = "   ".join(f"{source.slots} {levels_db[source.source]:.1f} dB" for source in told)
+        text = f"{frequency_hz:.1f} Hz   {levels}"
         if len(self._partials_hz):
             nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
             partial_hz = float(self._partials_hz[nearest])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from app.analysis.heard import HeardMotion
 from app.library import Library
 from app.motion import Envelope, Strobe, frame_at
 from app.panels.base import Moment, Panel
+from app.preset_words import shape_word
 from app.rendering import DIFFERENCE, Take
 from app.session import Choices, Session
+from app.shown import LEGEND_FIELDS, shown_sources
 from app.silence import why_difference_silent, why_silent
 from app.views.string_ground import TrainedPlucks
 from app.views.string_ink import ShownPluck
@@ -26,7 +29,7 @@ class StringPanel(Panel):
     key = "string"
     title = "String"
     help = (
-        "The string seen from the side: model and truth in motion, slowed as by a stroboscope, or the pluck "
+        "The string seen from the side: what slots A and B hold in motion, slowed as by a stroboscope, or the pluck "
         "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Darker parts lie "
         "outside the training."
     )
@@ -60,14 +63,15 @@ class StringPanel(Panel):
             self._take = None
         if names & WARNING_FIELDS:
             self._show_pluck()
-        if names & {"heard", "a", "b"}:
-            self.view.set_heard(self.session.source_heard)
+        if names & LEGEND_FIELDS:
+            self.view.set_sources(shown_sources(choices, self.library))
+            self._shown = ()
         if names & {"motion", "envelope"}:
             self.view.set_shown(choices.motion, choices.envelope)
 
     def take_started(self, take: Take) -> None:
         self._strobe.restart()
-        self._envelope = Envelope(take)
+        self._envelope = Envelope()
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self._take = take
@@ -79,14 +83,16 @@ class StringPanel(Panel):
             self.view.show_frame(None)
             self._shown = ()
             return
-        shown = (take, min(take.ready_frames, position_s * take.info.rate_hz), choices.speed, choices.envelope)
+        motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        ready = [min(motion.ready, position_s * motion.rate_hz) for motion in motions if motion.there]
+        shown = (take, ready, choices.speed, choices.envelope)
         if not moment.playing and shown == self._shown:
             return
         self._shown = shown
         self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, choices.speed, take.fundamental_hz)
         shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
         envelope = self._envelope if choices.envelope else None
-        self.view.show_frame(frame_at(take, position_s, shown_s, choices.speed, envelope))
+        self.view.show_frame(frame_at(take, motions, position_s, shown_s, choices.speed, envelope))
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
@@ -134,7 +140,7 @@ class StringPanel(Panel):
 
 
 def _label(choices: Choices) -> str:
-    words = choices.shape.replace("_", " ")
+    words = shape_word(choices.shape)
     return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
 
 

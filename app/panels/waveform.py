@@ -1,27 +1,52 @@
-"""The waveform of the whole take at the listening point."""
+"""What the slots hold over the whole take, as it is heard at the listening point."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.analysis.heard import HeardMotion, HeardSignal
 from app.library import Library
 from app.panels.base import Moment, Panel
-from app.rendering import SOURCES, Take
+from app.rendering import Take
 from app.session import Session
+from app.shown import LEGEND_FIELDS, ear, part_words, readable_unit, shown_sources
 from app.views.waveform_view import WaveformView
 
-MM = 1000.0
 EVERY = 3  # moments
-MOST_FRAMES = 65_536  # at a time: what is new after the listening point has moved comes in a few steps
+MOST_FRAMES = 32_768  # at a time: what is new after the listening point has moved comes in a few steps
+AIR = 1.25  # how much higher the axis is than the peak
+FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
+
+
+@dataclass
+class _Drawn:
+    """A signal as far as it has been read."""
+
+    heard: HeardSignal
+    signal: NDArray[np.float32] = field(init=False)
+    ready: int = 0
+    peak: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.signal = np.empty(self.heard.motion.frames, np.float32)
+
+    def catch_up(self) -> None:
+        new = self.heard.read(self.ready, self.ready + MOST_FRAMES)
+        self.signal[self.ready : self.ready + len(new)] = new
+        self.ready += len(new)
+        self.peak = max(self.peak, float(np.abs(new).max(initial=0.0)))
 
 
 class WaveformPanel(Panel):
     key = "waveform"
     title = "Waveform"
     help = (
-        "The displacement at the listening point over the whole pluck. Click to move the playhead; the wheel "
-        "zooms. Behind the red line the model goes on without training."
+        "What the pick-up senses at the listening point over the whole pluck, of slots A and B: displacement or "
+        "velocity, all modes or one. Click to move the playhead; the wheel zooms. Behind the red line the model goes "
+        "on without training."
     )
     view: WaveformView
 
@@ -30,44 +55,61 @@ class WaveformPanel(Panel):
         self.view = WaveformView()
         self.view.seek_asked.connect(self.seek_asked)
         self._take: Take | None = None
-        self._listen = 0.0
-        self._signals_mm: dict[str, NDArray[np.float32]] = {}
-        self._ready = 0  # frames of them
+        self._drawn: dict[str, _Drawn] = {}
+        self._full = 0.0  # of the axis, in m or m/s
         self._moments = 0
         self._shown: tuple[object, ...] = ()
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"heard", "a", "b"}:
-            self.view.set_heard(self.session.source_heard)
+        if names & LEGEND_FIELDS:
+            choices = self.session.choices
+            self.view.set_sources(shown_sources(choices, self.library), part_words(choices))
+            self._shown = ()
 
     def take_started(self, take: Take) -> None:
-        self._shown = ()  # holds nothing of the last take
-        listen = self.session.choices.listen
-        peak_mm = max(1e-3, float(np.abs(take.signal_m("truth", listen)).max()) * MM)
-        self.view.set_take(take.seconds, take.info.horizon_s, 1.25 * peak_mm)
-        self._begin(take, listen)
+        self._take, self._drawn, self._shown, self._full = take, {}, (), 0.0  # holds nothing of the last take
+        self.view.set_take(take.seconds, take.info.horizon_s)
 
     def show_moment(self, moment: Moment) -> None:
         self.view.show_playhead(moment.position_s)
         self._moments += 1
-        take, listen = self._take, self.session.choices.listen
+        take = self._take
         if take is None or self._moments % EVERY:
             return
-        if listen != self._listen:
-            self._begin(take, listen)
-        self._catch_up(take)
-        shown = (take, self._ready, listen, self.view.times_s)
+        self._follow(take)
+        choices, ready = self.session.choices, {name: drawn.ready for name, drawn in self._drawn.items()}
+        shown = (take, ready, ear(choices), self.view.times_s)
         if shown != self._shown:
             self._shown = shown
-            signals_mm = {name: signal[: self._ready] for name, signal in self._signals_mm.items()}
-            self.view.show_signals(signals_mm, take.info.rate_hz)
+            self._draw()
 
-    def _begin(self, take: Take, listen: float) -> None:
-        self._take, self._listen, self._ready = take, listen, 0
-        self._signals_mm = {name: np.empty(take.frames, np.float32) for name in SOURCES}
+    def _follow(self, take: Take) -> None:
+        """Reads on what the slots hold, each from its start where it is another signal than before."""
+        choices = self.session.choices
+        before, self._drawn = self._drawn, {}
+        for source in shown_sources(choices, self.library):
+            motion = HeardMotion(take, source.source, source.gain)
+            if not motion.there:
+                continue  # another preset's model is still on its way
+            heard, known = HeardSignal(motion, ear(choices)), before.get(source.source)
+            drawn = known if known is not None and known.heard == heard else _Drawn(heard)
+            drawn.catch_up()
+            self._drawn[source.source] = drawn
+        if any(self._drawn.get(name) is not drawn for name, drawn in before.items()):
+            self._full = 0.0  # something else is drawn: its own scale
 
-    def _catch_up(self, take: Take) -> None:
-        start, stop = self._ready, min(take.ready_frames, self._ready + MOST_FRAMES)
-        for name, signal in self._signals_mm.items():
-            signal[start:stop] = take.signal_m(name, self._listen, start, stop) * MM
-        self._ready = stop
+    def _draw(self) -> None:
+        choices, view = self.session.choices, self.view
+        peak = max((drawn.peak for drawn in self._drawn.values()), default=0.0)
+        if peak > self._full or self._full == 0.0:
+            self._full = max(AIR * peak, FLAT)
+        factor, unit = readable_unit(self._full, choices.pickup)
+        view.set_scale(factor * self._full, choices.pickup, unit)
+        for source in shown_sources(choices, self.library):
+            if source.source in self._drawn:
+                drawn = self._drawn[source.source]
+                view.show_signal(
+                    source.source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.motion.rate_hz
+                )
+            else:
+                view.clear_signal(source.source)

@@ -1,4 +1,7 @@
-"""Perceptually uniform colour maps (P. Kovesi's, from pyqtgraph) whose ground is that of our panels."""
+"""Perceptually uniform colour maps (P. Kovesi's, from pyqtgraph) whose ground is that of our panels.
+
+They are those of the present face: what draws with one takes it anew when the face changes.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,15 @@ def error_map() -> pg.ColorMap:
 
 
 def level_map() -> pg.ColorMap:
-    """From the ground by violet and amber to white."""
-    return _grounded("inferno", 0.0)
+    """From the ground by violet and amber to white; on a light ground by amber and red to dark blue."""
+    return _grounded("inferno" if theme.face == theme.DARK else "CET-L17", 0.0)
+
+
+def share_map() -> pg.ColorMap:
+    """Of the ground where there is little, further from it the more there is: also without colour."""
+    dark = ["#10202e", "#1d5a78", "#8a6f52", "#f0a63c", "#fff1d6"]
+    light = ["#f2f6f9", "#a9cde0", "#d8b287", "#b5650b", "#4a2300"]
+    return pg.ColorMap([0, 0.3, 0.55, 0.78, 1], dark if theme.face == theme.DARK else light, mapping="clip")
 
 
 def _grounded(name: str, ground_at: float) -> pg.ColorMap:

@@ -14,6 +14,7 @@ from app.library import PresetEntry
 from app.views.figures_table import Column, FiguresTable, TableRow
 from app.views.parts import tool_button, words_label
 from app.views.progress_strip import ProgressStrip
+from app.views.segments import SMALL
 
 
 def percent(value: float) -> str:
@@ -35,21 +36,21 @@ def times(value: float) -> str:
 
 
 COLUMNS = (
-    Column("preset", "Double-click or Enter loads it"),
+    Column("Preset", "Double-click or Enter loads it"),
     Column("MAE", "Relative mean absolute error over the trained horizon, all of the string", percent),
     Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
     Column(
-        "null dB",
+        "Null, dB",
         "What is left of the sound at the listening point where model and truth are subtracted, all of the pluck",
         decibels,
     ),
-    Column("speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
-    Column("parameters", "Trainable numbers", lambda n: f"{n:,}"),
+    Column("Speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
+    Column("Parameters", "Trainable numbers", lambda n: f"{n:,}"),
     Column("MSE", "Relative mean squared error over the trained horizon", scientific),
     Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
-    Column("rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
-    Column("model", "The model's family"),
-    Column("note", "Why there are no figures"),
+    Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
+    Column("Model", "The model's family"),
+    Column("Note", "Why there are no figures"),
 )
 
 
@@ -84,13 +85,17 @@ class CompareView(QWidget):
         self.table.row_entered.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_deleted.connect(lambda name: self.preset_toggled.emit(name, False))
         self.progress = ProgressStrip("Progress of the comparison")
+        for control in (presets, self._stop, copy):
+            control.setStyleSheet(SMALL)
         head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
         head.addWidget(presets)
         head.addWidget(self._words, 1)
         head.addWidget(self._stop)
         head.addWidget(copy)
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self.progress)

@@ -12,19 +12,21 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.analysis.poles import PoleFigure, Poles
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks, fit_foot
 from app.views.parts import ENTER_KEYS, combo_box, keeps_own_keys, words_label
+from app.views.segments import SMALL
 
 NEAR_PIXELS = 16
 CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
 TIP_MS = 3000  # it hides what is pointed at
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
-AXES = {"musical": "frequency and decay", "complex": "complex plane"}
+AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
 
 Array = NDArray[np.float64]
 
@@ -53,12 +55,16 @@ class EigenvaluesView(QWidget):
         self.plane.pointed.connect(self._tell)
         self.plane.taken.connect(self._take)
         self.plane.escaped.connect(self.solo_ended)
+        for control in (self._axes, self._layer):
+            control.setStyleSheet(SMALL)
         head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
         head.addWidget(self._axes)
         head.addWidget(self._layer)
         head.addWidget(self._words, 1)
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self.plane, 1)
@@ -72,8 +78,8 @@ class EigenvaluesView(QWidget):
         if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
             self._layer.clear()
             for layer in range(figure.layers):
-                self._layer.addItem("first layer" if layer == 0 else f"layer {layer + 1}", layer)
-            self._layer.addItem("all layers", None)
+                self._layer.addItem("First layer" if layer == 0 else f"Layer {layer + 1}", layer)
+            self._layer.addItem("All layers", None)
         self._figure = figure
         self._layer.setVisible(figure is not None and figure.layers > 1)
         self._draw()
@@ -112,7 +118,7 @@ class EigenvaluesView(QWidget):
         if point >= 0:
             self._words.setText(self._describe(figure, point))
         elif self._solo:
-            self._words.setText(f"mode {self._solo} alone is heard; Esc: all of them")
+            self._words.setText(f"Mode {self._solo} alone is heard; Esc: all of them")
         else:
             self._words.setText(figure.note)
 
@@ -121,7 +127,7 @@ class EigenvaluesView(QWidget):
         learned = point < count
         poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)
         mode = int(poles.mode[place])
-        text = f"{'learned, nearest to' if learned else 'the string’s'} mode {mode}:  {poles.mode_hz[place]:.1f} Hz"
+        text = f"{'Learned, nearest to' if learned else 'The string’s'} mode {mode}:  {poles.mode_hz[place]:.1f} Hz"
         if poles.folded_hz[place] < poles.mode_hz[place] - 0.1:
             text += f" (heard at {poles.folded_hz[place]:.0f} Hz)"
         if learned:
@@ -182,10 +188,17 @@ class _Plane(pg.PlotWidget):
         self._ring = pg.ScatterPlotItem(symbol="o", size=21, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for layer in (self._learned, self._string, self._ring):
             item.addItem(layer)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self._places = np.empty((0, 2))
         self._learned_count = 0
         self._at = -1
         self._pressed: QPointF | None = None
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # it is, while this is being made
+            fit_foot(self)
 
     def clear_points(self) -> None:
         self._places, self._at = np.empty((0, 2)), -1
@@ -218,14 +231,14 @@ class _Plane(pg.PlotWidget):
         item.setAspectLocked(not musical)
         if musical:
             item.setLabel("bottom", "frequency (Hz)")
-            item.setLabel("left", "decay: T60 (s)")
-            item.getAxis("left").setTicks([[(math.log10(s), f"{s:g}") for s in _LABELLED_S]])
+            self._label.set("decay: T60 (s)", "T60 (s)", "s")
             item.setLimits(xMin=-0.02 * rate_hz, xMax=0.52 * rate_hz)
         else:
             item.setLabel("bottom", "Re λ")
-            item.setLabel("left", "Im λ")
-            item.getAxis("left").setTicks(None)
+            self._label.set("Im λ")
             item.setLimits(xMin=None, xMax=None)
+        self._ticks.set([(math.log10(s), f"{s:g}") for s in _LABELLED_S] if musical else None)
+        fit_foot(self)
         self._musical, self._rate_hz = musical, rate_hz
         self.show_all()
 

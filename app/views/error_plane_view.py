@@ -10,11 +10,13 @@ import math
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, PlanePicture, nearest_cell, refine
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks, fit_foot
+from app.views.colour_maps import share_map
 from app.views.parts import ENTER_KEYS, keeps_own_keys, words_label
 from app.views.progress_strip import ProgressStrip
 
@@ -25,10 +27,6 @@ _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _STEP_X = POSITIONS[1] - POSITIONS[0]
 _STEP_Y = math.log10(AMPLITUDES_MM[1] / AMPLITUDES_MM[0])
-# dark where model and truth are alike, brighter the more they differ: also without colour
-COLOURS = pg.ColorMap(
-    [0, 0.3, 0.55, 0.78, 1], ["#10202e", "#1d5a78", "#8a6f52", "#f0a63c", "#fff1d6"], mapping="clip"
-)
 
 Range = tuple[float, float]
 
@@ -43,6 +41,7 @@ class ErrorPlaneView(QWidget):
         self.setAccessibleName("Error map")
         self.setMinimumHeight(84)
         self._words = words_label()
+        self._words.setContentsMargins(4, 0, 4, 0)
         self.progress = ProgressStrip("Progress of the error map")
         self.map = _Map()
         self.map.pointed.connect(self._tell)
@@ -50,7 +49,7 @@ class ErrorPlaneView(QWidget):
         self._picture: PlanePicture | None = None
         self._resting = ""
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 4, 0, 0)
         column.setSpacing(4)
         column.addWidget(self._words)
         column.addWidget(self.progress)
@@ -87,7 +86,7 @@ class ErrorPlaneView(QWidget):
         about = "" if self._picture.spacing == 1 else "about "
         text = "runs away" if math.isinf(error) else f"error {about}{100 * error:.3g} %"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the trained range"
-        self._words.setText(f"pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
+        self._words.setText(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
 
 class _Map(pg.PlotWidget):
@@ -108,13 +107,13 @@ class _Map(pg.PlotWidget):
         self.setMouseTracking(True)
         self.setCursor(Qt.CursorShape.CrossCursor)
         item = self.getPlotItem()
+        item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
         item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)
         item.setLabel("bottom", "position of the pluck")
         item.getAxis("bottom").enableAutoSIPrefix(False)
-        item.setLabel("left", "amplitude (mm)")
-        item.getAxis("left").setTicks([[(math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM]])
+        self._label = UprightLabel(item, ("amplitude (mm)", "mm"))
         self._area = QRectF(
             POSITIONS[0] - _STEP_X / 2,
             math.log10(AMPLITUDES_MM[0]) - _STEP_Y / 2,
@@ -122,15 +121,18 @@ class _Map(pg.PlotWidget):
             math.log10(AMPLITUDES_MM[-1] / AMPLITUDES_MM[0]) + _STEP_Y,
         )
         item.setRange(self._area, padding=0)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
         self._image = pg.ImageItem()
-        self._image.setColorMap(COLOURS)
         self._image.setLevels([math.log10(end) for end in SCALE])
         item.addItem(self._image)
         self._bar = pg.ColorBarItem(
-            values=tuple(math.log10(end) for end in SCALE), colorMap=COLOURS, interactive=False, width=14
+            values=tuple(math.log10(end) for end in SCALE), colorMap=share_map(), interactive=False, width=14
         )
-        self._bar.axis.setTicks([[(math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS]])
+        self._bar_ticks = UprightTicks(self._bar.axis, self._bar.vb)
+        self._bar_ticks.set((math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS)
         self._bar.setImageItem(self._image, insert_in=item)
+        theme.changes.face_changed.connect(self._take_face)
         dashed = pg.mkPen(theme.TEXT, width=1, style=Qt.PenStyle.DashLine)
         self._outline = item.plot(pen=dashed)
         self._pluck = pg.ScatterPlotItem(symbol="o", size=13, pen=pg.mkPen(theme.TEXT, width=2), brush=None)
@@ -140,6 +142,9 @@ class _Map(pg.PlotWidget):
         self._trained: tuple[Range, Range] | None = None
         self._present = (0.35, 4.0)
         self.cursor: tuple[float, float] | None = None
+
+    def _take_face(self) -> None:
+        self._bar.setColorMap(share_map())
 
     def show_picture(self, picture: PlanePicture | None) -> None:
         if picture is None:
@@ -172,6 +177,11 @@ class _Map(pg.PlotWidget):
             low - 1e-9 <= value <= high + 1e-9
             for value, (low, high) in zip((position, amplitude_mm), self._trained, strict=True)
         )
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # it is, while this is being made
+            fit_foot(self)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         at = self._at(event.position())

@@ -11,6 +11,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.parts import lay_out_plot, tool_button
 from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
@@ -21,8 +22,6 @@ QUANTITIES = (
     ("relative", "MAE and RMSE", "Relative to the truth, over all of the string, in windows of two periods"),
     ("level", "Level", "How much louder the model is than the truth, in dB"),
 )
-RMSE = theme.MODEL
-MAE = "#d98bd0"
 LOWEST_DECADE, HIGHEST_DECADE = -6, 4
 LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
@@ -49,20 +48,23 @@ class ErrorTimeView(QWidget):
         )
         item = self.plot.getPlotItem()
         item.getAxis("left").enableAutoSIPrefix(False)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         item.showGrid(x=True, y=True, alpha=0.18)
         self._curves = {
-            "rmse": item.plot(pen=pg.mkPen(RMSE, width=1)),
-            "mae": item.plot(pen=pg.mkPen(MAE, width=1)),
-            "level_db": item.plot(pen=pg.mkPen(RMSE, width=1)),
+            "rmse": item.plot(pen=pg.mkPen(theme.MODEL, width=1)),
+            "mae": item.plot(pen=pg.mkPen(theme.DIFFERENCE, width=1)),
+            "level_db": item.plot(pen=pg.mkPen(theme.MODEL, width=1)),
         }
         dotted = Qt.PenStyle.DotLine
         self._stored = {
-            "rmse": item.plot(pen=pg.mkPen(RMSE, width=1, style=dotted)),
-            "mae": item.plot(pen=pg.mkPen(MAE, width=1, style=dotted)),
+            "rmse": item.plot(pen=pg.mkPen(theme.MODEL, width=1, style=dotted)),
+            "mae": item.plot(pen=pg.mkPen(theme.DIFFERENCE, width=1, style=dotted)),
         }
         self._stored_errors: dict[str, float] = {}
         self._horizon_s = 1.0
         self._range: tuple[float, float] | None = None
+        theme.changes.face_changed.connect(self._tell_legend)
         self.quantities.chosen.connect(self._choose)
         lay_out_plot(self, (self.quantities, self.longer), self.readout, self.plot)
         self._choose()
@@ -107,7 +109,7 @@ class ErrorTimeView(QWidget):
             curve.setVisible((name == "level_db") == level)
         for line in self._stored.values():
             line.setVisible(not level)
-        self.plot.getPlotItem().setLabel("left", "level error (dB)" if level else "relative error")
+        self._label.set(*(("level error (dB)", "dB") if level else ("relative error", "error")))
         self._range = None
         self._fit([])
         self._tell_legend()
@@ -130,7 +132,8 @@ class ErrorTimeView(QWidget):
         if wanted != self._range:
             self._range = wanted
             item.setYRange(*wanted, padding=0)
-            item.getAxis("left").setTicks(None if self.quantity == "level" else _decades(*wanted))
+            level = self.quantity == "level"
+            self._ticks.set(None if level else _decades(*wanted), _between_decades(*wanted))
 
     def _always_in_view(self) -> list[NDArray[np.float64]]:
         if self.quantity == "level":
@@ -142,7 +145,7 @@ class ErrorTimeView(QWidget):
         if self.quantity == "level":
             self.readout.rest("")
             return
-        drawn = (("rmse", RMSE), ("mae", MAE))
+        drawn = (("rmse", theme.MODEL), ("mae", theme.DIFFERENCE))
         text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
         stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
         self.readout.rest(f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}" if stored else text)
@@ -153,7 +156,9 @@ def percent(error: float) -> str:
     return f"{100 * error:.3g} %"
 
 
-def _decades(low: float, high: float) -> list[list[tuple[float, str]]]:
-    decades = range(math.ceil(low), math.floor(high) + 1)
-    between = [d + math.log10(n) for d in range(math.floor(low), math.ceil(high)) for n in range(2, 10)]
-    return [[(d, f"{100 * 10.0**d:g} %") for d in decades], [(place, "") for place in between]]
+def _decades(low: float, high: float) -> list[tuple[float, str]]:
+    return [(d, f"{100 * 10.0**d:g} %") for d in range(math.ceil(low), math.floor(high) + 1)]
+
+
+def _between_decades(low: float, high: float) -> list[float]:
+    return [d + math.log10(n) for d in range(math.floor(low), math.ceil(high)) for n in range(2, 10)]

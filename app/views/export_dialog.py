@@ -27,7 +27,7 @@ from app.library import PresetEntry
 from app.session import Choices
 from app.settings import ExportChoices
 from app.sound_names import Pickup
-from app.views.export_pages import BatchPage, SoundPage
+from app.views.export_pages import BatchPage, SoundPage, as_heard
 from app.views.sound_form import SoundForm, wav_settings
 from engine.preset import load_preset
 
@@ -35,7 +35,7 @@ _RECIPE_NOTE = "Each file carries its recipe: drop it on the window, and its pre
 
 
 class ExportDialog(QDialog):
-    """Remembers its last state in `export_choices`.
+    """Offers first what is heard, and remembers its last state in `export_choices`.
 
     Args:
         entries: the presets of a batch; `choices.preset` is among them.
@@ -55,6 +55,7 @@ class ExportDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Export WAV")
         self.setMinimumWidth(680)
+        choices, export = as_heard(entries, choices, export)
         self._preset = next(entry for entry in entries if entry.name == choices.preset)
         self._choices, self._export = choices, export
         self._listen_right, self._pickup = listen_right, pickup

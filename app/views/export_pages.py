@@ -20,8 +20,10 @@ from PySide6.QtWidgets import (
 from app.batch import BatchPlan
 from app.export import Source, default_file_name
 from app.library import PresetEntry
+from app.preset_words import shape_word
 from app.session import Choices
 from app.settings import BatchChoices, ExportChoices
+from app.slots import other_preset
 from app.sound import SOURCES
 from app.sound_names import Pickup
 from app.views.parts import combo_box, tool_button
@@ -35,6 +37,27 @@ SOURCE_NAMES = (
     ("Both, in two files", "files"),
     ("Both, model left and truth right", "both"),
 )
+
+
+def as_heard(
+    entries: Sequence[PresetEntry], choices: Choices, export: ExportChoices
+) -> tuple[Choices, ExportChoices]:
+    """Both with what the heard slot holds as the sound to save.
+
+    Model and truth together, where they were saved last, stay if one of them is heard. Another preset in the slot
+    is the preset whose model is saved.
+    """
+    source = choices.source_heard
+    if name := other_preset(source):
+        if any(entry.name == name and not entry.unplayable for entry in entries):
+            choices = choices.model_copy(update={"preset": name})
+        source = "model"
+    if source == "difference":
+        gain_db = choices.difference_gain_db
+        return choices, export.model_copy(update={"source": source, "difference_gain_db": gain_db})
+    if export.source in ("files", "both") and not name:
+        return choices, export
+    return choices, export.model_copy(update={"source": source})
 
 
 class SoundPage(QWidget):
@@ -64,12 +87,12 @@ class SoundPage(QWidget):
         self.path.textEdited.connect(self._name_edited)
         browse = tool_button("Browse …", tip="Choose the file")
         browse.clicked.connect(self._browse)
-        what = QLabel(_pluck_text(preset, choices))
-        what.setObjectName("faint")
-        what.setWordWrap(True)
+        self.what = QLabel(_pluck_text(preset, choices))
+        self.what.setObjectName("faint")
+        self.what.setWordWrap(True)
         form = QFormLayout(self)
         form.setContentsMargins(0, 12, 0, 0)
-        form.addRow(label("Sound"), what)
+        form.addRow(label("Sound"), self.what)
         form.addRow(label("Source"), row_of(self.source))
         place = row_of(browse)
         place.insertWidget(0, self.path, 100)
@@ -199,15 +222,15 @@ class BatchPage(QWidget):
 
 
 def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
-    shape = choices.shape.replace("_", " ")
+    shape = shape_word(choices.shape)
     heard = f"{choices.listen:.2f}"
     if choices.stereo:
         heard += f" (left) and {choices.listen_right:.2f} (right)"
     if choices.pickup == "velocity":
         heard += ", velocity"
-    return (
-        f"{preset.info.title}, {shape} pluck at {choices.position:.2f}, {choices.amplitude_mm:g} mm, heard at {heard}"
-    )
+    pluck = f"{shape} pluck at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
+    modes = f". All modes, though mode {choices.solo} is heard alone" if choices.solo else ""
+    return f"{preset.info.title}, {pluck}, heard at {heard}{modes}"
 
 
 def _line(name: str, text: str, example: str) -> QLineEdit:

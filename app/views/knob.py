@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 from app.views import theme
 
 SWEEP_DEGREES = 270
+WIDTH, NARROW_WIDTH = 62, 54
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
@@ -77,6 +78,7 @@ class Knob(QWidget):
         self._dragged_at: QPointF | None = None
         self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
         self._editor: QLineEdit | None = None
+        self._width = WIDTH
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(name)
@@ -101,10 +103,16 @@ class Knob(QWidget):
         return self.limits.text.format(self._value)
 
     def sizeHint(self) -> QSize:
-        return QSize(60, 82)
+        return QSize(self._width, 82)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(62, 82)
+        return QSize(self._width, 82)
+
+    def set_narrow(self, narrow: bool) -> None:
+        """For a window with little room."""
+        self._width = NARROW_WIDTH if narrow else WIDTH
+        self.updateGeometry()
+        self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -218,7 +226,7 @@ class Knob(QWidget):
         painter.setPen(QPen(ink, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
         width = self.width()
-        painter.setFont(theme.small_font(10))
+        painter.setFont(theme.small_font(9 if self._width == NARROW_WIDTH else 10))
         painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
         painter.drawText(QRectF(0, 3, width, 14), Qt.AlignmentFlag.AlignCenter, self._name.upper())
         painter.setPen(ink)

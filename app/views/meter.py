@@ -29,7 +29,7 @@ class Meter(QWidget):
         return QSize(150, 40)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(110, 40)
+        return QSize(100, 40)
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)
@@ -47,7 +47,7 @@ class Meter(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         bar = QRectF(12, 8, self.width() - 68, 9)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.RAISED))
+        painter.setBrush(QColor(theme.LINE))
         painter.drawRoundedRect(bar, 3, 3)
         gradient = QLinearGradient(bar.left(), 0, bar.right(), 0)
         gradient.setColorAt(0, QColor(theme.GOOD))
@@ -63,7 +63,7 @@ class Meter(QWidget):
             painter.drawText(QRectF(x - 14, 20, 28, 12), Qt.AlignmentFlag.AlignCenter, f"{db}")
         light = QRectF(self.width() - 44, 5, 44, 16)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.WARNING if self._hold else theme.RAISED))
+        painter.setBrush(QColor(theme.WARNING if self._hold else theme.LINE))
         painter.drawRoundedRect(light, 3, 3)
         painter.setPen(QColor(theme.BACKGROUND if self._hold else theme.FAINT))
         painter.drawText(light, Qt.AlignmentFlag.AlignCenter, "LIMIT")

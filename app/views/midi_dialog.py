@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
 from app.views.parts import combo_box
 
 NOTE_MODES = (
-    ("say where the string is plucked", "position"),
-    ("choose the preset", "preset"),
+    ("Say where the string is plucked", "position"),
+    ("Choose the preset", "preset"),
 )
 
 
@@ -46,10 +46,13 @@ class MidiDialog(QDialog):
         self._problem.setTextInteractionFlags(
             Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
+        self._turned = turned
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
-        form.addRow("Input", self._inputs)
-        form.addRow("Notes", self._notes)
+        for name, box in (("Input", self._inputs), ("Notes", self._notes)):
+            label = QLabel(name)
+            label.setMinimumHeight(box.sizeHint().height())  # else it stands higher than its box
+            form.addRow(label, box)
         column = QVBoxLayout(self)
         column.setContentsMargins(18, 16, 18, 16)
         column.setSpacing(12)
@@ -63,6 +66,7 @@ class MidiDialog(QDialog):
         close.setAutoDefault(False)
         close.clicked.connect(self.reject)
         column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
+        self.set_learnable("")
 
     def _build_rows(self, turned: Mapping[str, str]) -> QGridLayout:
         grid = QGridLayout()
@@ -73,13 +77,12 @@ class MidiDialog(QDialog):
             learn, forget = QPushButton("Learn"), QPushButton("Forget")
             learn.setCheckable(True)
             learn.setAccessibleName(f"Learn a controller for {label}")
-            learn.setToolTip(f"Then move the controller that shall turn {label}")
             forget.setAccessibleName(f"Forget the controller of {label}")
             forget.setToolTip(f"No controller turns {label} any more")
             for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
                 button.setAutoDefault(False)
                 button.clicked.connect(lambda _=False, asked=asked, field=field: asked.emit(field))
-            for place, widget in enumerate((QLabel(label), taught, learn, forget)):
+            for place, widget in enumerate((QLabel(label[:1].upper() + label[1:]), taught, learn, forget)):
                 grid.addWidget(widget, row, place)
             self._rows[field] = taught, learn, forget
         return grid
@@ -88,12 +91,18 @@ class MidiDialog(QDialog):
         """The inputs that there are, and the one that is open; or why there are none."""
         with QSignalBlocker(self._inputs):
             self._inputs.clear()
-            self._inputs.addItem("none" if names else "no MIDI input found", "")
+            self._inputs.addItem("None" if names else "No MIDI input found", "")
             for name in names:
                 self._inputs.addItem(name, name)
             self._inputs.setCurrentIndex(max(0, self._inputs.findData(open_name)))
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
+
+    def set_learnable(self, why_not: str) -> None:
+        """Whether controllers can be taught; where not, why, with the remedy."""
+        for field, (_, learn, _) in self._rows.items():
+            learn.setEnabled(not why_not)
+            learn.setToolTip(why_not or f"Then move the controller that shall turn {self._turned[field]}")
 
     def show_problem(self, text: str) -> None:
         self._problem.setText(text)
@@ -104,7 +113,7 @@ class MidiDialog(QDialog):
         self._notes.setCurrentIndex(max(0, self._notes.findData(notes)))
         for field, (taught, learn, forget) in self._rows.items():
             waits, number = field == learning, controllers.get(field)
-            taught.setText("move a controller …" if waits else "–" if number is None else f"controller {number}")
+            taught.setText("Move a controller …" if waits else "–" if number is None else f"Controller {number}")
             taught.setObjectName("" if waits or number is not None else "faint")
             taught.style().polish(taught)
             learn.setChecked(waits)

@@ -12,6 +12,7 @@ from app.analysis.take_partials import WINDOWS, PartialRow
 from app.views.figures_table import Column, FiguresTable, TableRow
 from app.views.parts import combo_box, tool_button, words_label
 from app.views.progress_strip import ProgressStrip
+from app.views.segments import SMALL
 from engine.partials import LEAST_DECAY_DB
 
 
@@ -32,15 +33,15 @@ def signed(value: float, digits: int = 1) -> str:
 
 _NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
 COLUMNS = (
-    Column("n", "The mode: so many half waves along the string", lambda n: f"{n}"),
-    Column("truth Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
-    Column("model Hz", "Frequency of the model in Hz", hertz, "model"),
-    Column("cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
-    Column("level dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
-    Column("T60 %", "Error of the model's decay time in %", signed),
-    Column("truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
-    Column("model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
-    Column("note", "Why a row is grey"),
+    Column("Mode", "The mode: so many half waves along the string", lambda n: f"{n}"),
+    Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
+    Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
+    Column("Cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
+    Column("Level, dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
+    Column("T60, %", "Error of the model's decay time in %", signed),
+    Column("Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
+    Column("Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
+    Column("Note", "Why a row is grey"),
 )
 
 
@@ -55,7 +56,7 @@ class PartialsView(QWidget):
         super().__init__(parent)
         self.setAccessibleName("Partials")
         self.setMinimumHeight(84)
-        self._window = combo_box("Window of time", [(text, key) for key, text in WINDOWS.items()])
+        self._window = combo_box("Window of time", [(text.capitalize(), key) for key, text in WINDOWS.items()])
         self._window.setToolTip("Which part of the pluck the figures are of")
         self._window.activated.connect(lambda _: self.window_chosen.emit(self.window_key))
         self._words = words_label()
@@ -67,12 +68,16 @@ class PartialsView(QWidget):
         self.table.row_entered.connect(lambda mode: self.mode_chosen.emit(mode))
         self.table.escaped.connect(self.solo_ended)
         self.progress = ProgressStrip("Progress of the partials")
+        for control in (self._window, copy):
+            control.setStyleSheet(SMALL)
         head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
         head.addWidget(self._window)
         head.addWidget(self._words, 1)
         head.addWidget(copy)
         column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
+        column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(4)
         column.addLayout(head)
         column.addWidget(self.progress)

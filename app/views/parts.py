@@ -8,6 +8,8 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
+from app.views.elided_label import ElidedLabel
+
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
@@ -32,7 +34,7 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
 
 def words_label() -> QLabel:
     """A faint line of words that takes the room there is: what it says never moves what is beside it."""
-    label = QLabel()
+    label = ElidedLabel()
     label.setObjectName("faint")
     label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
     return label

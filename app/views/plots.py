@@ -86,6 +86,7 @@ def _recolour_item(item: Any, swap: _Swap) -> None:
             item.setHoverBrush(swap.brush(item.hoverBrush))
         case pg.TextItem():
             item.setColor(swap.colour(item.color))
+            item.fill = swap.brush(item.fill)
         case pg.AxisItem():
             item.setPen(swap.pen(item.pen()))
             item.setTextPen(swap.pen(item.textPen()))

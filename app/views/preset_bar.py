@@ -1,12 +1,16 @@
-"""Which preset: previous, next, its name, which opens the browser, and what the preset says of itself."""
+"""Which preset: previous, next, its name, which opens the browser, and what the preset says of itself.
+
+Previous and next go through the browser's list. While that is filtered, a button beside them says so and clears it.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
+from app.views.elided_label import ElidedLabel
 from app.views.parts import tool_button
 
 if TYPE_CHECKING:
@@ -18,34 +22,49 @@ class PresetBar(QWidget):
 
     browse_asked = Signal()
     step_asked = Signal(int)
+    all_asked = Signal()  # clear the browser's filter
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        previous = tool_button("◀", "Previous preset", "Previous preset of the browser's list (Page up)")
-        following = tool_button("▶", "Next preset", "Next preset of the browser's list (Page down)")
+        previous = tool_button("◀", "Previous preset", "Previous preset in the browser's list (Page up)")
+        following = tool_button("▶", "Next preset", "Next preset in the browser's list (Page down)")
         previous.clicked.connect(lambda: self.step_asked.emit(-1))
         following.clicked.connect(lambda: self.step_asked.emit(1))
-        self.name = QPushButton("no preset found")
+        self.name = QPushButton("Reading presets …")
         self.name.setObjectName("preset")
         self.name.setMinimumWidth(180)
         self.name.setMaximumWidth(420)
         self.name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name.clicked.connect(self.browse_asked)
-        self.card = QLabel()  # placed by the window
+        self.filtered = tool_button("", "Clear the filter")
+        self.filtered.setObjectName("filter")
+        self.filtered.clicked.connect(self.all_asked)
+        self.filtered.hide()
+        self.card = ElidedLabel()  # placed by the window
         self.card.setObjectName("faint")
-        self.card.setWordWrap(True)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
         row.addWidget(previous)
         row.addWidget(self.name, 1000)  # all of the room, up to its greatest width
         row.addWidget(following)
+        row.addWidget(self.filtered)
         row.addStretch(1)
+
+    def set_listed(self, listed: int, total: int) -> None:
+        """How many presets pass the browser's filter."""
+        self.filtered.setVisible(listed < total)
+        self.filtered.setText(f"{listed} of {total}  ✕")
+        self.filtered.setAccessibleName(f"Filtered: {listed} of {total} presets; clear the filter")
+        self.filtered.setToolTip(
+            f"The browser lists {listed} of {total} presets, and previous and next go through these.\n"
+            "Click to clear the filter"
+        )
 
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
         from app.views.preset_card import preset_card, preset_summary  # the engine with them: not for the first sight
 
-        title = entry.info.title if entry else "no preset found"
+        title = entry.info.title if entry else "No preset found"
         self.name.setText(f"{'★  ' if favourite else ''}{title}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Preset: {title}")
         self.name.setToolTip("Browse the presets (Ctrl+P)")

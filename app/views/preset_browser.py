@@ -204,6 +204,19 @@ class PresetBrowser(QFrame):
         if self._before is not None and self._before.isVisible():
             self._before.setFocus()
 
+    def clear_filter(self) -> None:
+        """All presets are listed again; told once."""
+        boxes = (self._strings, self._models, self._rates)
+        for widget in (self.search, *boxes, self._starred):
+            widget.blockSignals(True)
+        self.search.clear()
+        for box in boxes:
+            box.setCurrentIndex(0)
+        self._starred.setChecked(False)
+        for widget in (self.search, *boxes, self._starred):
+            widget.blockSignals(False)
+        self._tell_filter()
+
     def _tell_filter(self) -> None:
         self.filter_changed.emit(
             PresetFilter(

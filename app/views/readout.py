@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.views.elided_label import ElidedLabel
 
 
-class Readout(QLabel):
+class Readout(ElidedLabel):
     """Shows the `resting` text while there is nothing to tell."""
 
     def __init__(self, parent: QWidget | None = None) -> None:

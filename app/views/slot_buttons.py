@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)
-WIDTH = 138  # fixed, so that a longer title moves nothing
+WIDTH, NARROW_WIDTH = 138, 112  # fixed, so that a longer title moves nothing
 PADDING = 18  # of the style sheet, with the borders
 
 _SOURCES = (
@@ -36,6 +36,7 @@ class SlotButtons(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._choices = Choices()
+        self._width = WIDTH
         self._entries: Sequence[PresetEntry] = ()
         self._gains_db: dict[str, float | None] = {}
         self._buttons: dict[str, QPushButton] = {}
@@ -47,7 +48,7 @@ class SlotButtons(QWidget):
         for row, slot in enumerate(SLOTS):
             button = QPushButton()
             button.setCheckable(True)
-            button.setFixedWidth(WIDTH)
+            button.setFixedWidth(self._width)
             button.clicked.connect(lambda _=False, slot=slot: self.change_asked.emit("heard", slot))
             group.addButton(button)
             self._buttons[slot] = button
@@ -58,6 +59,13 @@ class SlotButtons(QWidget):
     def set_entries(self, entries: Sequence[PresetEntry]) -> None:
         """The presets that a slot may hold."""
         self._entries = entries
+        self._show()
+
+    def set_narrow(self, narrow: bool) -> None:
+        """For a window with little room."""
+        self._width = NARROW_WIDTH if narrow else WIDTH
+        for button in self._buttons.values():
+            button.setFixedWidth(self._width)
         self._show()
 
     def show_choices(self, choices: Choices) -> None:
@@ -75,8 +83,7 @@ class SlotButtons(QWidget):
             source = getattr(self._choices, slot)
             title, short = self._title(source)
             gain = self._gain_text(slot)
-            parts = [slot.upper(), self._fitted(short.upper(), f"{slot.upper()}    {gain}"), gain]
-            button.setText("  ".join(part for part in parts if part))
+            button.setText(self._fitted(slot.upper(), short, gain))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
             told = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
@@ -94,16 +101,21 @@ class SlotButtons(QWidget):
         """In full, and as short as a button needs it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
-                return entry.info.title, entry.info.model
+                return entry.info.title, entry.info.title
         name = source.removeprefix("preset:")
-        return name, "diff." if source == "difference" else name
+        return name, "DIFF." if source == "difference" else name.upper()
 
-    @staticmethod
-    def _fitted(text: str, beside: str) -> str:
-        """`text`, cut where it does not fit on a button with `beside`."""
+    def _fitted(self, letter: str, text: str, gain: str) -> str:
+        """What a button has room for: where it is little, the gain without its unit, then the text cut."""
         metrics = QFontMetrics(theme.small_font(12, bold=True))
-        room = WIDTH - PADDING - metrics.horizontalAdvance(beside)
-        return metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
+        room = self._width - PADDING
+        for beside in (gain, gain.removesuffix(" dB")):
+            words = "  ".join(part for part in (letter, text, beside) if part)
+            if metrics.horizontalAdvance(words) <= room:
+                return words
+        room -= metrics.horizontalAdvance(f"{letter}    {beside}")
+        cut = metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
+        return "  ".join(part for part in (letter, cut, beside) if part)
 
     def _gain_text(self, slot: str) -> str:
         gain_db = self._gains_db.get(slot)

@@ -9,6 +9,7 @@ from PySide6.QtCore import QRectF, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.colour_maps import displacement_map, error_map
 from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
@@ -55,9 +56,10 @@ class SpaceTimeView(QWidget):
         self._full_scale_mm = 1.0
         self._listen = 0.0
         item = self.plot.getPlotItem()
-        item.setLabel("left", "place")
-        item.getAxis("left").setTicks([[(place, f"{place:g}") for place in PLACES]])
         item.setYRange(0, 1, padding=0)
+        self._label = UprightLabel(item, ("place",))
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._ticks.set((place, f"{place:g}") for place in PLACES)
         self._image = pg.ImageItem(axisOrder="row-major")
         item.addItem(self._image, ignoreBounds=True)
         self._listening = pg.InfiniteLine(0, angle=0, pen=pg.mkPen(theme.translucent(theme.TEXT, 90), width=1))
@@ -69,6 +71,7 @@ class SpaceTimeView(QWidget):
         self._bar.setImageItem(self._image, insert_in=item)
         self._maps = {"displacement": displacement_map(), "error": error_map()}
         self._map_shown = "displacement"
+        theme.changes.face_changed.connect(self._take_face)
         self.quantities.chosen.connect(self._choose_quantity)
         self.gains.activated.connect(self._choose_gain)
         self.plot.pointed.connect(lambda _, place: self.listening_point_moved.emit(min(max(place, 0.0), 1.0)))
@@ -118,6 +121,10 @@ class SpaceTimeView(QWidget):
     @property
     def _kind(self) -> str:
         return "error" if self.quantity == "error" else "displacement"
+
+    def _take_face(self) -> None:
+        self._maps = {"displacement": displacement_map(), "error": error_map()}
+        self._bar.setColorMap(self._maps[self._map_shown])
 
     def _choose_quantity(self) -> None:
         self.gains.setCurrentIndex(self.gains.findData(self._gain[self._kind]))

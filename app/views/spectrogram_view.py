@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtWidgets import QWidget
 
+from app.views import theme
+from app.views.axis_label import UprightLabel, UprightTicks
 from app.views.colour_maps import level_map
 from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
@@ -51,14 +53,17 @@ class SpectrogramView(QWidget):
         self._pixels = np.zeros((0, 0), np.uint8)
         self._hop_s = 1.0
         item = self.plot.getPlotItem()
-        item.getAxis("left").enableAutoSIPrefix(False)
+        axis = item.getAxis("left")
+        axis.enableAutoSIPrefix(False)
+        self._label = UprightLabel(item, ("frequency (Hz)", "Hz"))
+        self._ticks = UprightTicks(axis, item.vb)
         self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
         self._image.setLookupTable(level_map().getLookupTable(nPts=256))
         item.addItem(self._image, ignoreBounds=True)
-        self._bar = pg.ColorBarItem(
-            values=(-self.range_db, 0), width=10, label="dB", colorMap=level_map(), interactive=False
-        )
+        self._bar = pg.ColorBarItem(values=(-self.range_db, 0), width=10, colorMap=level_map(), interactive=False)
         self._bar.setImageItem([], insert_in=item)
+        self._bar_label = UprightLabel(self._bar, ("dB",))
+        theme.changes.face_changed.connect(self._take_face)
         self.scales.chosen.connect(self._choose_scale)
         self.ranges.activated.connect(self._choose_range)
         self._label_frequencies()
@@ -92,6 +97,10 @@ class SpectrogramView(QWidget):
             self._highest_hz = rate_hz / 2
             self._label_frequencies()
 
+    def set_full_scale(self, words: str) -> None:
+        """What 0 dB is the level of."""
+        self._bar_label.set(f"dB re {words}", "dB")
+
     def begin_picture(self, columns: int, rows: int, hop_s: float) -> None:
         """Forgets what is drawn: the columns to come are other ones, the k-th at the time k·hop_s."""
         self._levels_db = np.zeros((columns, rows), np.float32)
@@ -118,6 +127,10 @@ class SpectrogramView(QWidget):
             half = self._hop_s / 2
             self._image.setRect(QRectF(-half, low, self._drawn * self._hop_s, high - low))
 
+    def _take_face(self) -> None:
+        self._image.setLookupTable(level_map().getLookupTable(nPts=256))
+        self._bar.setColorMap(level_map())
+
     def _choose_scale(self) -> None:
         self._label_frequencies()
         self.frequencies_changed.emit()
@@ -134,10 +147,6 @@ class SpectrogramView(QWidget):
 
     def _label_frequencies(self) -> None:
         item = self.plot.getPlotItem()
-        axis = item.getAxis("left")
-        item.setLabel("left", "frequency (Hz)")
-        if self.logarithmic:
-            axis.setTicks([[(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in LABELLED_HZ]])
-        else:
-            axis.setTicks(None)
         item.setYRange(*self._heights(), padding=0)
+        ticks = [(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in LABELLED_HZ]
+        self._ticks.set(ticks if self.logarithmic else None)

@@ -1,4 +1,4 @@
-"""The spectrum at the playhead: model and truth, dB against log frequency."""
+"""The spectrum of what is heard at the playhead: dB against log frequency."""
 
 from __future__ import annotations
 
@@ -10,10 +10,15 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 from scipy.fft import rfft
 
+from app.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
+from app.views.axis_label import UprightLabel, fit_foot
+from app.views.curves import set_curves
+from app.views.legend import Legend
 from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL
@@ -76,7 +81,7 @@ class Analyser:
 
 
 class SpectrumView(QWidget):
-    """Two curves on one locked pair of axes; the heard source is on top. The mouse reads a frequency."""
+    """What the slots hold, on one locked pair of axes; the heard source is on top. The mouse reads a frequency."""
 
     hovered = Signal(float)  # a frequency in Hz; not a number where the mouse has left
 
@@ -87,14 +92,14 @@ class SpectrumView(QWidget):
         self.plot.setAccessibleName("Spectrum")
         self.plot.setToolTip("The spectrum at the listening point, at the playhead; 0 dB is a sine of full scale")
         self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), RANGES_DB[-1])
-        self.ranges.setToolTip("How far below full scale the axis reaches, the same for model and truth")
+        self.ranges.setToolTip("How far below full scale the axis reaches, the same for every source")
         self.ranges.setStyleSheet(SMALL)
         self.ranges.activated.connect(self._fit)
         self.readout = Readout()
         item = self.plot.getPlotItem()
         item.setLogMode(x=True)
-        item.setLabel("bottom", "frequency", units="Hz", siPrefix=False)
-        item.setLabel("left", "dB")
+        item.setLabel("bottom", "frequency (Hz)")
+        self._label = UprightLabel(item)
         item.showGrid(x=True, y=True, alpha=0.18)
         item.setMenuEnabled(False)
         item.hideButtons()
@@ -103,57 +108,73 @@ class SpectrumView(QWidget):
             [[(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in _LABELLED_HZ]]
         )
         item.getAxis("bottom").enableAutoSIPrefix(False)
-        self._curves = {
-            name: item.plot(pen=pg.mkPen(theme.SOURCE_COLOURS[name], width=1)) for name in ("truth", "model")
-        }
-        # an area of a third of the points, not smoothed: as a fill of the curve it takes longer than all else here
-        brush = pg.mkBrush(theme.translucent(theme.TRUTH, 28))
-        self._area = pg.PlotCurveItem(pen=None, brush=brush, fillLevel=FLOOR_DB, antialias=False)
+        self._curves: dict[str, pg.PlotDataItem] = {}
+        # slot B's, an area of a third of the points, not smoothed: a fill of the curve takes longer than all else
+        self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
+        self._area_of: str | None = None
         item.addItem(self._area)
+        self.legend = Legend(self.plot)
         self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
         self._partial.hide()
         item.addItem(self._partial, ignoreBounds=True)
         self._levels_db: dict[str, NDArray[np.float64]] = {}
+        self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
         self._analyser = Analyser(16_000)
-        self.set_rate(16_000)
-        self.set_heard("model")
+        self.set_sources(DEFAULT_SOURCES)
+        self.set_full_scale("10 mm")
+        self._fit()
         self.plot.viewport().installEventFilter(self)
         lay_out_plot(self, (self.ranges,), self.readout, self.plot)
-
-    @property
-    def analyser(self) -> Analyser:
-        return self._analyser
 
     @property
     def range_db(self) -> int:
         return int(self.ranges.currentData())
 
     def set_rate(self, rate_hz: int) -> None:
-        """Fits the frequency axis to a model's rate."""
-        self._analyser = Analyser(rate_hz)
-        self._levels_db = {}
-        self._fit()
+        """Fits the frequency axis to a rate: the highest of what is drawn."""
+        if rate_hz != self._analyser.rate_hz:
+            self._analyser = Analyser(rate_hz)
+            self._fit()
 
-    def set_heard(self, source: str) -> None:
-        for name, curve in self._curves.items():
-            colour = theme.translucent(theme.SOURCE_COLOURS[name], 255 if name == source else 150)
-            curve.setPen(pg.mkPen(colour, width=1))
-            curve.setZValue(2 if name == source else 1)
+    def set_full_scale(self, words: str) -> None:
+        """What 0 dB is the level of."""
+        self._label.set(f"dB re {words}", "dB")
 
-    def show_signals(self, signals: dict[str, NDArray[np.float32]]) -> None:
-        """Signals in units of full scale, at least a window each."""
-        for name, signal in signals.items():
-            self._levels_db[name] = self._analyser.level_db(signal)
-            self._curves[name].setData(self._analyser.column_hz, self._levels_db[name])
-        if "truth" in signals:
-            tops_db = self._levels_db["truth"].reshape(-1, AREA_STEP).max(axis=1)
-            middles = np.log10(self._analyser.column_hz[AREA_STEP // 2 :: AREA_STEP])
+    def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
+        """As `WaveformView.set_sources`; slot B's curve is filled."""
+        set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=150)
+        self._area_of = next((s.source for s in sources if "B" in s.slots and len(sources) > 1), None)
+        if self._area_of:
+            hue = theme.SOURCE_COLOURS[theme.source_kind(self._area_of)]
+            self._area.setBrush(pg.mkBrush(theme.translucent(hue, 28)))
+        self._levels_db = {name: levels for name, levels in self._levels_db.items() if name in self._curves}
+        self.legend.show_sources(sources, part)
+
+    def show_signal(self, source: str, signal: NDArray[np.float32], analyser: Analyser) -> None:
+        """A signal in units of full scale, a window of it."""
+        levels = analyser.level_db(signal)
+        self._levels_db[source], self._analysers[source] = levels, analyser
+        self._curves[source].setData(analyser.column_hz, levels)
+        if source == self._area_of:
+            tops_db = levels.reshape(-1, AREA_STEP).max(axis=1)
+            middles = np.log10(analyser.column_hz[AREA_STEP // 2 :: AREA_STEP])
             self._area.setData(middles, tops_db, skipFiniteCheck=True)
 
+    def clear_signal(self, source: str) -> None:
+        self._levels_db.pop(source, None)
+        self._curves[source].setData([], [])
+        if source == self._area_of:
+            self._area.setData([], [])
+
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
-        """What is drawn at a frequency, by source."""
-        column = int(np.abs(np.log(self._analyser.column_hz / frequency_hz)).argmin())
-        return {name: float(levels[column]) for name, levels in self._levels_db.items()}
+        """What is drawn at a frequency, by source; nothing of those whose rate does not reach so far."""
+        levels_db = {}
+        for source, levels in self._levels_db.items():
+            analyser = self._analysers[source]
+            if frequency_hz <= analyser.rate_hz / 2:
+                column = int(np.abs(np.log(analyser.column_hz / frequency_hz)).argmin())
+                levels_db[source] = float(levels[column])
+        return levels_db
 
     def show_readout(self, text: str, partial_hz: float | None = None) -> None:
         """Text beside the axes, and a line at a partial."""
@@ -161,6 +182,10 @@ class SpectrumView(QWidget):
         self._partial.setVisible(partial_hz is not None)
         if partial_hz is not None:
             self._partial.setValue(math.log10(partial_hz))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        fit_foot(self.plot)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseMove:

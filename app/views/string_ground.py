@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPen
+from PySide6.QtCore import QLineF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QFontMetrics, QLinearGradient, QPainter, QPen
 
+from app.shown import ShownSource
 from app.views import theme
+from app.views.legend import paint_sources
 from app.views.string_axes import MARGIN_X, StringAxes
 
 LINE_HEIGHT = 15
+LEGEND_Y = 17.5  # the middle of the line above the string
+LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
 SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
 
 
@@ -68,24 +72,20 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
         )
 
 
-def paint_legend(painter: QPainter, heard: str, warning: str, right: float) -> None:
-    """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`."""
-    painter.setFont(theme.small_font(12, bold=True))
-    x = float(MARGIN_X)
-    names = ["model", "truth"]
-    for name in names if heard in names else [*names, heard]:
-        hue = theme.SOURCE_COLOURS[theme.source_kind(name)]
-        painter.setPen(QPen(theme.translucent(hue, 255 if name == heard else 150), 3))
-        painter.drawLine(QPointF(x, 18), QPointF(x + 18, 18))
-        text = f"{name.removeprefix('preset:')} (heard)" if name == heard else name
-        painter.drawText(QPointF(x + 24, 22), text)
-        x += 44 + painter.fontMetrics().horizontalAdvance(text)
+def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
+    """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`.
+
+    What warns is whole first, as far as it leaves room for the letters of the slots.
+    """
+    warned = QFontMetrics(theme.small_font(11)).horizontalAdvance(warning) + 8 if warning else 0
+    room = right - MARGIN_X
+    x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
     if warning:
         painter.setPen(QColor(theme.WARNING))
         painter.setFont(theme.small_font(11))
-        room = max(0, int(right - x - 8))
-        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, room)
-        painter.drawText(QPointF(x + 8, 22), text)
+        place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
+        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
+        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
 
 
 def _shade(painter: QPainter, area: QRectF) -> None:

@@ -38,9 +38,9 @@ class StringFrame:
     envelopes: Mapping[str, Band] = field(default_factory=dict)
 
     def largest_mm(self) -> float:
-        """The largest displacement that is drawn of the motion itself."""
+        """The largest displacement that is drawn of the motion itself; 0 where nothing is drawn yet."""
         bands = [*self.lowest.values(), *self.highest.values()]
-        return max(float(np.abs(band).max()) for band in bands)
+        return max((float(np.abs(band).max()) for band in bands), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class ShownPluck:
 
 
 def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
-    """Both sources, the heard one in front. Opaque fills and thin pens only: this is drawn sixty times a second."""
+    """The sources, the heard one in front. Opaque fills and thin pens only: this is drawn sixty times a second."""
     order = sorted(frame.shapes, key=lambda name: name == heard)
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in order:
@@ -64,7 +64,7 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard:
     paint_grid(painter, axes)  # the opaque bands have covered it
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
     for name in order:
-        painter.setPen(QPen(QColor(theme.SOURCE_COLOURS[name]), 1))
+        painter.setPen(QPen(QColor(_hue(name)), 1))
         curve = axes.curve(frame.shapes[name])
         for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower
             painter.drawPolyline(curve.translated(0, shift))
@@ -80,7 +80,7 @@ def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str,
 
 def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
     """An area with thin edges, so that what lies behind another still tells its extent."""
-    colour = theme.SOURCE_COLOURS[name]
+    colour = _hue(name)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.blended(colour, theme.PANEL, strength))
@@ -170,6 +170,10 @@ def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> No
     area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
     text = frame.caption + ("   past training" if frame.past_horizon else "")
     painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+def _hue(source: str) -> str:
+    return theme.SOURCE_COLOURS[theme.source_kind(source)]
 
 
 @lru_cache(maxsize=4)

@@ -1,4 +1,4 @@
-"""The string: model and truth in motion, the pluck that is being drawn, and the listening points.
+"""The string: what the slots hold in motion, the pluck that is being drawn, and the listening points.
 
 Drag on the string: where and how far it is pulled; the wheel over the handle sets the width, with Shift the shape.
 Drag a marker beneath it: where it is heard. A double-click on either goes back to the default.
@@ -21,6 +21,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QApplication, QSizePolicy, QToolButton, QWidget
 
+from app.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.parts import tool_button
 from app.views.string_axes import MARGIN_X, StringAxes
@@ -84,7 +85,7 @@ class StringView(QWidget):
         self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
         self._trained = TrainedPlucks()
         self._warning = ""
-        self._heard = "model"
+        self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
         self._span_mm = 5.0
         self._drag: str | None = None  # "pluck" or a side
         self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
@@ -134,8 +135,9 @@ class StringView(QWidget):
         self._warning = text
         self.update()
 
-    def set_heard(self, source: str) -> None:
-        self._heard = source
+    def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
+        """What the slots hold; frames should have their motions."""
+        self._sources = sources
         self.update()
 
     def set_shown(self, motion: bool, envelope: bool) -> None:
@@ -352,6 +354,10 @@ class StringView(QWidget):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
 
+    @property
+    def _heard(self) -> str:
+        return next((source.source for source in self._sources if source.heard), "")
+
     def _behind(self, axes: StringAxes) -> QPixmap:
         """The ground, and the envelopes of a motion, painted anew only when one of them changes."""
         ground = self._ground(axes)
@@ -374,7 +380,7 @@ class StringView(QWidget):
         """The picture behind the string, painted anew only when something in it changes."""
         # on which side words would be in the way of the pluck, with the words at its handle
         pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
-        key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._heard, self._warning, theme.face)
+        key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._sources, self._warning, theme.face)
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF())
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
@@ -382,7 +388,7 @@ class StringView(QWidget):
             painter = QPainter(pixmap)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             paint_ground(painter, axes, self._trained, pluck)
-            paint_legend(painter, self._heard, self._warning, self._toggles[0].x() - 14)
+            paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
         return self._ground_pixmap

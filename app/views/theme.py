@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -79,6 +80,8 @@ LIGHT = Face(
     shade_alpha=26,
 )
 
+SIGNS = Path(__file__).parent / "signs"  # pictures for the style sheet, in the faces' colours
+
 _SCHEMES: dict[FaceChoice, Qt.ColorScheme] = {
     "system": Qt.ColorScheme.Unknown,
     "dark": Qt.ColorScheme.Dark,
@@ -140,9 +143,11 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
+    tick = (SIGNS / f"tick_{'dark' if face == DARK else 'light'}.svg").as_posix()
     slots = "\n".join(
         f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
         f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; padding: 6px; }}"
+        f" QPushButton#{kind}:disabled {{ background: {RAISED}; color: {DISABLED}; border-color: {LINE}; }}"
         for kind, colour in SOURCE_COLOURS.items()
     )
     return f"""
@@ -161,6 +166,7 @@ QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; 
 QPushButton#preset {{ text-align: left; font-weight: 600; padding: 6px 12px; }}
 QLabel {{ background: transparent; }}
 QLabel#faint {{ color: {FAINT}; }}
+QLabel#knob {{ color: {FAINT}; font-size: 10px; padding-top: 4px; }}
 QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
 QLabel#badge {{
     color: {FAINT}; background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 8px; }}
@@ -177,8 +183,12 @@ QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, Q
     {{ border: 1px solid {TEXT}; }}
 QPushButton:disabled, QToolButton:disabled, QComboBox:disabled {{ color: {DISABLED}; }}
 {slots}
+QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; padding: 6px 9px; }}
+QToolButton#solo {{ padding: 1px 9px; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
+*[compact="true"] {{ padding: 6px 8px; }}
+QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 8px; }}
 QToolButton#narrow {{ padding: 6px 5px; }}
 QToolButton::menu-indicator {{ image: none; }}
 QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}
@@ -193,12 +203,14 @@ QDoubleSpinBox::up-button, QDoubleSpinBox::down-button {{ width: 0; border: none
 QComboBox::drop-down {{ border: none; width: 22px; }}
 QComboBox::down-arrow {{ image: none; width: 0; height: 0; border-left: 4px solid {RAISED};
     border-right: 4px solid {RAISED}; border-top: 5px solid {FAINT}; }}
-QCheckBox {{ spacing: 8px; }}
+QCheckBox {{ spacing: 8px; border: 1px solid transparent; border-radius: 4px; padding: 1px 4px; }}
+QCheckBox:disabled {{ color: {DISABLED}; }}
 QCheckBox::indicator, QListWidget::indicator {{
     width: 13px; height: 13px; background: {RAISED}; border: 1px solid {FAINT}; border-radius: 3px; }}
-QCheckBox::indicator:checked, QListWidget::indicator:checked {{ background: {TEXT}; border-color: {TEXT}; }}
-QCheckBox:focus {{ color: white; }}
-QCheckBox::indicator:focus {{ border-color: {TEXT}; }}
+QCheckBox::indicator:checked, QListWidget::indicator:checked {{
+    background: {TEXT}; border-color: {TEXT}; image: url("{tick}"); }}
+QCheckBox::indicator:disabled {{ border-color: {DISABLED}; }}
+QCheckBox::indicator:checked:disabled {{ background: {DISABLED}; }}
 QListWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
 QListWidget:focus {{ border: 1px solid {FAINT}; }}
 QListWidget::item {{ padding: 3px 5px; }}
@@ -215,7 +227,8 @@ QProgressBar {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4
 QProgressBar::chunk {{ background: {TRUTH}; }}
 QTabWidget::pane {{ border: none; }}
 QTabBar {{ background: transparent; qproperty-drawBase: 0; }}
-QTabBar::tab {{ color: {FAINT}; padding: 4px 10px; border: none; border-bottom: 2px solid transparent; }}
+QTabBar QToolButton {{ padding: 0; border-radius: 3px; }}
+QTabBar::tab {{ color: {FAINT}; padding: 4px 9px; border: none; border-bottom: 2px solid transparent; }}
 QTabBar::tab:hover {{ color: {TEXT}; }}
 QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
 QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}

@@ -12,13 +12,13 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
+from app.views.axis_label import fit_foot
 from app.views.kept_plot import KeptPlot
 
 SEEK_STEP_S = 0.1
 SEEK_STEP_SHARE = 0.05  # of what is in view, where that is less
 ZOOM_STEP = 1.25
 SHORTEST_VIEW_S = 0.002
-LABELLED_HEIGHT = 170  # in pixels: where there is less, the picture needs the room of the word "time"
 _PAN_BUTTONS = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
 
 
@@ -37,7 +37,7 @@ class TimePlot(KeptPlot):
         self.setMinimumHeight(84)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         item = self.getPlotItem()
-        item.setLabel("bottom", "time", units="s", siPrefix=False)
+        item.setLabel("bottom", "time (s)")
         item.getAxis("bottom").enableAutoSIPrefix(False)
         item.setContentsMargins(0, 6, 4, 0)  # room for half of the topmost number
         item.setMenuEnabled(False)
@@ -57,10 +57,11 @@ class TimePlot(KeptPlot):
                 "color": theme.WARNING,
                 "position": 0.86,
                 "anchors": [(0, 0.5), (0, 0.5)],
-                "fill": theme.translucent(theme.PANEL, 170),
+                "fill": theme.translucent(theme.PANEL, 170 if shaded else 235),
             },
         )
-        for thing, depth in ((self._untrained, -10), (self._horizon, 20)):
+        self._edge = pg.InfiniteLine(1, pen=pg.mkPen(theme.translucent(theme.PANEL, 235), width=3))
+        for thing, depth in ((self._untrained, -10), (self._edge, 19), (self._horizon, 20)):
             thing.setZValue(depth)
             item.addItem(thing, ignoreBounds=True)
         item.setXRange(0, self._seconds, padding=0)
@@ -78,6 +79,8 @@ class TimePlot(KeptPlot):
         inside = horizon_s < seconds
         self._untrained.setRegion((horizon_s, max(seconds, horizon_s)))
         self._horizon.setValue(horizon_s)
+        self._edge.setValue(horizon_s)
+        self._edge.setVisible(inside and not self._shaded)  # what sets the line off from a picture
         self._horizon.setVisible(inside)
         self._untrained.setVisible(inside and self._shaded)
 
@@ -180,9 +183,8 @@ class TimePlot(KeptPlot):
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:
         super().resizeEvent(event)
-        item = self.getPlotItem()
-        if item is not None:  # as it is while the plot is being made, and when it has been closed
-            item.getAxis("bottom").showLabel(self.height() >= LABELLED_HEIGHT)
+        if self.getPlotItem() is not None:  # as it is while the plot is being made, and when it has been closed
+            fit_foot(self)
 
     def _follow(self, event: QMouseEvent) -> None:
         point = self._point_at(event.position())

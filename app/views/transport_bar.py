@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
@@ -73,7 +73,8 @@ class TransportBar(QFrame):
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
         self.meter = Meter()
-        row = QHBoxLayout(self)
+        self._compact = False
+        self._row = row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
         row.setSpacing(5)
         row.addLayout(self._build_transport())
@@ -97,6 +98,23 @@ class TransportBar(QFrame):
         row.addWidget(self.knobs["volume_db"])
         row.addLayout(self._build_output())
 
+    def set_compact(self, compact: bool) -> None:
+        """Narrower by a fifth, for a window with little room."""
+        if compact == self._compact:
+            return
+        self._compact = compact
+        self._row.setContentsMargins(*((8, 8, 8, 8) if compact else (12, 8, 12, 8)))
+        self._row.setSpacing(2 if compact else 5)
+        for knob in self.knobs.values():
+            knob.set_narrow(compact)
+        self.slots.set_narrow(compact)
+        self._shape.setFixedWidth(94 if compact else 106)
+        self._export.setText("Export …" if compact else "Export WAV …")
+        for button in (self._play, self._loop, self._stereo, self._velocity, self._export):
+            button.setProperty("compact", compact)
+            button.style().unpolish(button)
+            button.style().polish(button)
+
     def show_choices(self, choices: Choices) -> None:
         for field, knob in self.knobs.items():
             knob.set_value(getattr(choices, field))
@@ -104,7 +122,7 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
-        self.knobs["listen_right"].setVisible(choices.stereo)
+        self.knobs["listen_right"].setEnabled(choices.stereo)  # hidden, it would move all that is beside it
         with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
             self._stereo.setChecked(choices.stereo)
             self._velocity.setChecked(choices.pickup == "velocity")
@@ -122,6 +140,7 @@ class TransportBar(QFrame):
         self._play.clicked.connect(self.play_asked)
         self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
         self._loop.setCheckable(True)
+        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         column = QVBoxLayout()
         column.addWidget(self._play)
@@ -154,17 +173,20 @@ class TransportBar(QFrame):
         self._shape.setFixedWidth(106)
         self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
         label = QLabel("PLUCK")
-        label.setObjectName("faint")
+        label.setObjectName("knob")
         column = QVBoxLayout()
-        column.addWidget(label)
+        column.addWidget(label, alignment=Qt.AlignmentFlag.AlignHCenter)
+        column.addStretch(1)
         column.addWidget(self._shape)
+        column.addStretch(2)
         return column
 
     def _build_output(self) -> QVBoxLayout:
-        export = QPushButton("Export WAV …")
-        export.setToolTip("Save this pluck as a file (Ctrl+E)")
-        export.clicked.connect(self.export_asked)
+        self._export = QPushButton("Export WAV …")
+        self._export.setAccessibleName("Export WAV")
+        self._export.setToolTip("Save this pluck as a WAV file (Ctrl+E)")
+        self._export.clicked.connect(self.export_asked)
         column = QVBoxLayout()
         column.addWidget(self.meter)
-        column.addWidget(export)
+        column.addWidget(self._export)
         return column

@@ -1,4 +1,4 @@
-"""The waveform of the whole take at the listening point."""
+"""What is heard over the whole take, at the listening point."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QWidget
 
-from app.views import theme
+from app.shown import DEFAULT_SOURCES, ShownSource
+from app.views.axis_label import UprightLabel
+from app.views.curves import set_curves
+from app.views.legend import Legend
 from app.views.time_plot import TimePlot
 
 COLUMNS = 1600
@@ -30,38 +33,46 @@ class WaveformView(TimePlot):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
             "Waveform",
-            "Click moves the playhead; the wheel zooms in time, the right button pans; double-click shows all.\n"
-            "Arrow keys move the playhead, + and − zoom",
+            "What the pick-up senses. Click moves the playhead; the wheel zooms in time, the right button pans;\n"
+            "double-click shows all. Arrow keys move the playhead, + and − zoom",
             parent,
         )
         item = self.getPlotItem()
-        item.setLabel("left", "mm")
         item.showGrid(x=True, y=True, alpha=0.18)
-        self._curves = {
-            name: item.plot(pen=pg.mkPen(theme.SOURCE_COLOURS[name], width=1)) for name in ("truth", "model")
-        }
-        self.set_heard("model")
+        item.getAxis("left").enableAutoSIPrefix(False)
+        self._horizon.label.setPosition(0.1)  # the legend has the upper edge
+        self._label = UprightLabel(item)
+        self._curves: dict[str, pg.PlotDataItem] = {}
+        self.legend = Legend(self)
+        self.set_sources(DEFAULT_SOURCES)
+        self.set_scale(5.0, "displacement", "mm")
 
-    def set_take(self, seconds: float, horizon_s: float, peak_mm: float) -> None:
-        """Axes for a take of `seconds` of a model that was trained for `horizon_s`."""
-        peak_mm = max(peak_mm, 1e-3)
-        self.getPlotItem().setYRange(-peak_mm, peak_mm, padding=0.02)
+    def set_take(self, seconds: float, horizon_s: float) -> None:
+        """A time axis for a take of `seconds` of a model that was trained for `horizon_s`."""
         self.set_times(seconds, horizon_s)
-        for curve in self._curves.values():
-            curve.setData([], [])
+        for source in self._curves:
+            self.clear_signal(source)
 
-    def set_heard(self, source: str) -> None:
-        for name, curve in self._curves.items():
-            colour = theme.translucent(theme.SOURCE_COLOURS[name], 255 if name == source else 130)
-            curve.setPen(pg.mkPen(colour, width=1))
-            curve.setZValue(2 if name == source else 1)
+    def set_scale(self, full: float, quantity: str, unit: str) -> None:
+        """The upright axis from −full to full in `unit`, which alone is told where there is little room."""
+        self.getPlotItem().setYRange(-full, full, padding=0.02)
+        self._label.set(f"{quantity} ({unit})", unit)
 
-    def show_signals(self, signals_mm: dict[str, NDArray[np.float32]], rate_hz: int) -> None:
-        """What has been rendered so far, from time 0. What lies in view is drawn at full detail."""
+    def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
+        """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""
+        set_curves(self.getPlotItem(), self._curves, sources, faint_alpha=130)
+        self.legend.show_sources(sources, part)
+
+    def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
+        """What there is so far, from time 0, in the unit of the axis. What lies in view is drawn at full detail."""
         low_s, high_s = self.times_s
-        for name, signal in signals_mm.items():
-            first = min(max(int(low_s * rate_hz), 0), len(signal))
-            last = min(max(int(high_s * rate_hz) + 2, first), len(signal))
-            if last > first:
-                places, values = extremes(signal[first:last], COLUMNS)
-                self._curves[name].setData((places + first) / rate_hz, values)
+        first = min(max(int(low_s * rate_hz), 0), len(signal))
+        last = min(max(int(high_s * rate_hz) + 2, first), len(signal))
+        if last > first:
+            places, values = extremes(signal[first:last], COLUMNS)
+            self._curves[source].setData((places + first) / rate_hz, values)
+        else:
+            self.clear_signal(source)
+
+    def clear_signal(self, source: str) -> None:
+        self._curves[source].setData([], [])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from app.controller import GIVE_WAY_TICKS, Controller
@@ -368,6 +369,32 @@ def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -
     qtbot.waitUntil(lambda: "+30 dB" in slots._buttons["a"].text(), timeout=5_000)
 
 
+def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controller) -> None:
+    """From the slot's menu to every view of the sound, and from the session too."""
+    slots, session = controller.window.transport.slots, controller.session
+    views = [view(controller, "string"), view(controller, "waveform"), view(controller, "spectrum")]
+    menu = next(
+        button.menu() for button in slots.findChildren(QToolButton) if button.accessibleName() == "What B holds"
+    )
+    slots._fill(menu, "b")
+    next(action for action in menu.actions() if action.text().startswith("Difference")).trigger()
+    assert session.choices.b == "difference"
+    assert set(views[1]._curves) == set(views[2]._curves) == {"model", "difference"}
+    assert [source.title for source in views[0]._sources] == ["model", "difference"]
+    wait_for_take(qtbot, controller)
+    session.update(a="preset:second", heard="a")
+    title = controller.library.find("second").info.title
+    qtbot.waitUntil(lambda: controller._stage.take.others != {}, timeout=20_000)
+    qtbot.waitUntil(lambda: views[1]._curves["preset:second"].getData()[0] is not None, timeout=20_000)
+    assert views[1].legend.text == f"A  {title} · heard   B  difference +20 dB"
+    controller.play_or_stop()
+    controller.player.seek(0.2)
+    qtbot.waitUntil(
+        lambda: views[0]._frame is not None and set(views[0]._frame.shapes) == {"preset:second", "difference"},
+        timeout=20_000,
+    )
+
+
 def test_a_slot_whose_preset_is_gone_falls_back(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> None:
     window = MainWindow()
     qtbot.addWidget(window)
@@ -379,9 +406,14 @@ def test_a_slot_whose_preset_is_gone_falls_back(qtbot: QtBot, preset_folder: Pat
 
 def test_solo_is_shown_and_left_with_escape(qtbot: QtBot, controller: Controller) -> None:
     window, session = controller.window, controller.session
+    parts = (window.presets.card, view(controller, "string"), window.left, window.error_label)
+    wait_for_take(qtbot, controller)
+    before = [(part.y(), part.height()) for part in parts]
     session.update(solo=3)
     assert window._solo.isVisible()
-    assert "mode 3" in window._solo.text()
+    assert "Mode 3" in window._solo.text()
+    qtbot.wait(20)
+    assert [(part.y(), part.height()) for part in parts] == before  # nothing has moved
     qtbot.keyClick(window, Qt.Key.Key_Escape)
     assert session.choices.solo == 0
     assert not window._solo.isVisible()
@@ -389,12 +421,15 @@ def test_solo_is_shown_and_left_with_escape(qtbot: QtBot, controller: Controller
 
 def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) -> None:
     transport, session = controller.window.transport, controller.session
-    assert not transport.knobs["listen_right"].isVisible()
+    assert not transport.knobs["listen_right"].isEnabled()
+    places = [knob.pos() for knob in transport.knobs.values()]
     transport._stereo.click()
     transport._velocity.click()
     assert session.choices.stereo
     assert session.choices.pickup == "velocity"
-    assert transport.knobs["listen_right"].isVisible()
+    assert transport.knobs["listen_right"].isEnabled()
+    qtbot.wait(20)
+    assert [knob.pos() for knob in transport.knobs.values()] == places
     wait_for_take(qtbot, controller)
     player = controller.player
     qtbot.waitUntil(lambda: player.track is not None and player.track.channels == 2, timeout=20_000)

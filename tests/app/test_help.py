@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from pytestqt.qtbot import QtBot
 
 from app.about import about_text, library_versions
@@ -34,9 +35,19 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
     dialog.close()
 
 
-def test_about_can_be_copied_whole(qtbot: QtBot) -> None:
+def test_about_can_be_copied_whole(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", "my/own")
     text = about_text(Path("here/settings.json"), Path("there"))
-    for part in ("Learned Strings", "MIT", "DAFx24", str(Path("here/settings.json")), "there", "torch", "PySide6"):
+    for part in (
+        "Learned Strings",
+        "MIT",
+        "DAFx24",
+        str(Path("here/settings.json")),
+        "there",
+        str(Path("my/own")),
+        "torch",
+        "PySide6",
+    ):
         assert part in text
     assert "not installed" not in library_versions().values()
     dialog = AboutDialog(text)

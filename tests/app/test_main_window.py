@@ -63,6 +63,7 @@ def test_it_waits_until_its_parts_are_there(qtbot: QtBot) -> None:
     with qtbot.waitSignal(window.first_painted):
         window.show()
     assert not window.transport.isEnabled()
+    assert window.presets.name.text() == "Reading presets …"  # nobody has looked yet whether there are any
     window.show_string(QWidget())
     assert window.transport.isEnabled()
 
@@ -123,6 +124,17 @@ def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controll
         assert (window.width(), window.height()) == (width, height)
         assert least.width() <= width
         assert least.height() <= height
+
+
+def test_in_a_narrow_window_the_controls_stand_closer_and_all_are_seen(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    transport = window.transport
+    for width, words in ((1000, "Export …"), (1280, "Export WAV …"), (1000, "Export …")):
+        window.resize(width, 600)
+        qtbot.waitUntil(lambda words=words: transport._export.text() == words)
+        qtbot.waitUntil(lambda: transport.minimumSizeHint().width() <= transport.parentWidget().width())
+        right = transport._export.mapTo(window, transport._export.rect().topRight()).x()
+        assert right < width
 
 
 def test_every_key_has_its_signal_and_words() -> None:

@@ -111,11 +111,11 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     dialog.port_chosen.emit("Pads:Pads 24:0")
     assert midi.choices.port == "Pads:Pads 24:0"
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
-    assert "move" in taught.text()
+    assert "Move" in taught.text()
     with qtbot.waitSignal(midi.performed, timeout=5_000):
         backend.send("control_change", control=74, value=127)
     assert midi.choices.controllers == {"width": 74}
-    assert taught.text() == "controller 74"
+    assert taught.text() == "Controller 74"
     with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
         backend.send("control_change", control=74, value=0)
     assert performed.args == [{"width": pytest.approx(0.02)}, False]
@@ -124,6 +124,30 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)  # thought better of it
     assert not learn.isChecked()
+
+
+def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
+    """And the dialog says how to get them; with them, it can."""
+    window, missing = QWidget(), True
+    qtbot.addWidget(window)
+
+    def load() -> FakeBackend:
+        if missing:
+            raise MidiUnavailable("Get them with: pip install mido python-rtmidi")
+        return FakeBackend()
+
+    midi = MidiControl(MidiChoices(), lambda: Reach((0.3, 0.7), (1, 10)), lambda: [], None, load)
+    midi.show_dialog(window)
+    dialog = midi._dialog
+    assert dialog is not None
+    for _, learn, _ in dialog._rows.values():
+        assert not learn.isEnabled()
+        assert "pip install mido" in learn.toolTip()
+    assert "pip install mido" in dialog._problem.text()
+    missing = False
+    midi.show_dialog(window)
+    assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())
+    assert "move the controller" in dialog._rows["width"][1].toolTip()
 
 
 def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
@@ -136,4 +160,4 @@ def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl,
     qtbot.addWidget(window)
     midi.show_dialog(window)
     assert midi._dialog is not None
-    assert midi._dialog._inputs.currentText() == "no MIDI input found"
+    assert midi._dialog._inputs.currentText() == "No MIDI input found"

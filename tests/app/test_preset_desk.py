@@ -98,6 +98,27 @@ def test_filters_by_kind(controller: Controller, browser: PresetBrowser) -> None
     assert listed(browser) == ["first", "second"]
 
 
+def test_a_filter_is_told_beside_the_preset_and_cleared_there(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    """Previous and next go through what it leaves."""
+    bar, session = controller.window.presets, controller.session
+    assert not bar.filtered.isVisible()
+    qtbot.keyClicks(browser.search, "second")
+    browser._rates.setCurrentIndex(1)
+    browser.dismiss()
+    assert bar.filtered.isVisible()
+    assert bar.filtered.text() == "1 of 2  ✕"
+    for _ in range(2):
+        bar.step_asked.emit(1)
+        assert session.choices.preset == "second"
+    bar.filtered.click()
+    assert not bar.filtered.isVisible()
+    assert (browser.search.text(), browser._rates.currentIndex(), len(listed(browser))) == ("", 0, 2)
+    bar.step_asked.emit(1)
+    assert session.choices.preset == "first"
+
+
 def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
     qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
     assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}

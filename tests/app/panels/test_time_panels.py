@@ -17,8 +17,10 @@ from pytestqt.qtbot import QtBot
 from app.controller import Controller
 from app.library import Library
 from app.panels import ErrorTimePanel, Moment, Panel, SpaceTimePanel, SpectrogramPanel, SpectrumPanel, WaveformPanel
-from app.rendering import Take
+from app.rendering import Listening, Take
+from app.rendering.take import Motion
 from app.session import Choices, Session
+from app.shown import ShownSource
 from app.views.space_time_view import AUTO
 from engine.pluck import Pluck
 from engine.preset import read_info
@@ -127,11 +129,14 @@ def test_the_spectrogram_follows_the_listening_point(qtbot: QtBot, make: Make, t
 
         def drawn(listen: float = listen) -> bool:
             made = panel._drawn_of[0] if panel._drawn_of else None
-            return made is not None and made.listen == listen and panel._drawn == made.columns
+            return made is not None and made.listening == Listening((listen,)) and panel._drawn == made.columns
 
         watch(qtbot, panel, take, drawn)
         peaks_db.append(panel.view._levels_db[10].max())
     assert peaks_db[0] == pytest.approx(20 * np.log10(1.01 * 4 / 10), abs=2)
+    assert panel.view._bar.getAxis("left").labelText == "dB re 10 mm"
+    choose(panel, pickup="velocity")
+    assert panel.view._bar.getAxis("left").labelText == "dB re 30 m/s"
     assert peaks_db[1] - peaks_db[0] == pytest.approx(20 * np.log10(0.5), abs=0.1)
 
 
@@ -202,11 +207,34 @@ def test_the_spectrum_tells_level_and_nearest_partial(qtbot: QtBot, make: Make, 
     second_hz = float(take.info.string.undamped_frequencies(2)[1]) / (2 * np.pi)
     panel.view.hovered.emit(second_hz * 2 ** (10 / 1200))
     assert f"partial 2: {second_hz:.1f} Hz (+10 cents)" in panel.view.readout.text()
-    assert "model" in panel.view.readout.text()
+    assert "A −" in panel.view.readout.text().replace("-", "−")
     assert 10 ** panel.view._partial.value() == pytest.approx(second_hz)
     panel.view.hovered.emit(float("nan"))
     assert panel.view.readout.text() == ""
     assert not panel.view._partial.isVisible()
+
+
+def test_at_the_end_the_spectrum_stays(qtbot: QtBot, make: Make, take: Take) -> None:
+    panel = make(SpectrumPanel)
+    for position_s in (1.0, 0.9):  # both within the last window
+        panel.show_moment(Moment(take, position_s, False, 0.016))
+        qtbot.waitUntil(
+            lambda at=position_s: panel.show_moment(Moment(take, at, False, 0.016)) or panel._shown[2:3] == (at,)
+        )
+        assert panel.view._levels_db["truth"].max() > -60
+
+
+def test_while_a_take_grows_the_spectrum_is_of_a_whole_window(make: Make, take: Take) -> None:
+    panel = make(SpectrumPanel)
+    growing = Take("small", take.info, take.pluck, 1.0)
+    growing.append(take.motion_m("model")[:2000], take.motion_m("truth")[:2000])
+    panel.take_started(growing)
+    for _ in range(3):
+        panel.show_moment(Moment(growing, 0.499, True, 0.016))
+    edge_db = panel.view._levels_db["truth"]
+    for _ in range(3):
+        panel.show_moment(Moment(take, 0.5 - panel.view._analysers["truth"].window_frames / 4000, True, 0.016))
+    assert edge_db == pytest.approx(panel.view._levels_db["truth"], abs=1e-6)
 
 
 def test_the_spectrums_range_is_one_for_both_sources(make: Make, take: Take) -> None:
@@ -214,7 +242,7 @@ def test_the_spectrums_range_is_one_for_both_sources(make: Make, take: Take) -> 
     view.ranges.setCurrentIndex(0)
     view.ranges.activated.emit(0)
     for source in ("model", "truth"):
-        view.set_heard(source)
+        view.set_sources((ShownSource(source, "A B", source, heard=True),))
         view.set_rate(16_000)
         assert view.plot.getPlotItem().vb.viewRange()[1] == pytest.approx([-60, 0])
 
@@ -223,12 +251,102 @@ def test_the_waveform_is_that_of_the_listening_point(qtbot: QtBot, make: Make, t
     panel = make(WaveformPanel)
     for listen in (0.37, 0.8):
         panel.session.update(listen=listen)
-        watch(qtbot, panel, take, lambda listen=listen: panel._shown[1:3] == (FRAMES, listen))
+        ears = Listening((listen,))
+        watch(qtbot, panel, take, lambda ears=ears: panel._shown[1:3] == ({"model": FRAMES, "truth": FRAMES}, ears))
         time_s, drawn_mm = panel.view._curves["model"].getData()
         signal_mm = 1000 * take.signal_m("model", listen)
         assert drawn_mm.max() == pytest.approx(signal_mm.max(), rel=1e-5)
         assert drawn_mm.min() == pytest.approx(signal_mm.min(), rel=1e-5)
         assert time_s[-1] == pytest.approx(1.0, abs=0.001)
+
+
+def drawn(view: Any, source: str) -> Any:
+    """The values of a source's curve, or nothing."""
+    values = view._curves[source].getData()[1]
+    return np.zeros(0) if values is None else values
+
+
+def choose(panel: Panel, **choices: Any) -> None:
+    panel.session.update(**choices)
+    panel.choices_changed(frozenset(choices))
+
+
+def test_a_velocity_is_drawn_in_m_s(qtbot: QtBot, make: Make, take: Take) -> None:
+    waveform, spectrum = make(WaveformPanel), make(SpectrumPanel)
+    choose(waveform, pickup="velocity", listen=0.5)
+    choose(spectrum, pickup="velocity", listen=0.5)
+    watch(qtbot, waveform, take, lambda: waveform._shown[1:2] == ({"model": FRAMES, "truth": FRAMES},))
+    watch(qtbot, spectrum, take, lambda: bool(spectrum.view._levels_db))
+    omega = 2 * np.pi * take.fundamental_hz
+    assert drawn(waveform.view, "truth").max() == pytest.approx(0.004 * omega, rel=0.02)
+    assert waveform.view.getPlotItem().getAxis("left").labelText == "velocity (m/s)"
+    choose(waveform, amplitude_mm=4.0, listen=0.999)
+    watch(qtbot, waveform, take, lambda: "mm/s" in waveform.view.getPlotItem().getAxis("left").labelText)
+    assert drawn(waveform.view, "truth").max() == pytest.approx(4 * omega * np.sin(0.001 * np.pi), rel=0.05)
+    # The spectrum at 0.5 s: a sine of 0.004·e^−1.5·ω, in units of 30 m/s
+    expected_db = 20 * np.log10(0.004 * np.exp(-1.5) * omega / 30)
+    assert spectrum.view._levels_db["truth"].max() == pytest.approx(expected_db, abs=2.5)
+    assert "30 m/s" in spectrum.view.plot.getPlotItem().getAxis("left").labelText
+    choose(spectrum, pickup="displacement")
+    watch(qtbot, spectrum, take, lambda: spectrum._shown[3:] == (Listening((0.5,)),))
+    assert spectrum.view._levels_db["truth"].max() == pytest.approx(
+        20 * np.log10(0.004 * np.exp(-1.5) / 0.01), abs=2.5
+    )
+    assert "10 mm" in spectrum.view.plot.getPlotItem().getAxis("left").labelText
+
+
+def test_a_slot_with_the_difference_is_drawn_with_its_gain(qtbot: QtBot, make: Make, take: Take) -> None:
+    waveform, spectrum = make(WaveformPanel), make(SpectrumPanel)
+    for panel in (waveform, spectrum):
+        choose(panel, b="difference", difference_gain_db=20.0, listen=0.5)
+        assert set(panel.view._curves) == {"model", "difference"}
+        assert panel.view.legend.text == "A  model · heard   B  difference +20 dB"
+    watch(qtbot, waveform, take, lambda: waveform._shown[1:2] == ({"model": FRAMES, "difference": FRAMES},))
+    watch(qtbot, spectrum, take, lambda: set(spectrum.view._levels_db) == {"model", "difference"})
+    assert drawn(waveform.view, "difference").max() == pytest.approx(0.4, rel=1e-2)  # 1 % of 4 mm, ten times
+    levels_db = spectrum.view._levels_db
+    assert levels_db["model"].max() - levels_db["difference"].max() == pytest.approx(20.1, abs=0.1)
+    choose(waveform, difference_gain_db=40.0)
+    watch(qtbot, waveform, take, lambda: drawn(waveform.view, "difference").max() > 3.9)
+    choose(waveform, heard="b")
+    top = max(waveform.view._curves.items(), key=lambda pair: pair[1].zValue())
+    assert top[0] == "difference"
+    choose(waveform, a="truth", b="truth")
+    assert set(waveform.view._curves) == {"truth"}
+    watch(qtbot, waveform, take, lambda: len(drawn(waveform.view, "truth")) > 0)
+
+
+def test_another_preset_is_drawn_at_its_rate_when_it_is_there(qtbot: QtBot, make: Make, take: Take) -> None:
+    waveform, spectrum = make(WaveformPanel), make(SpectrumPanel)
+    source = "preset:other"
+    for panel in (waveform, spectrum):
+        choose(panel, b=source, heard="b", listen=0.5)
+    watch(qtbot, waveform, take, lambda: waveform._shown[1:2] == ({"model": FRAMES},))
+    watch(qtbot, spectrum, take, lambda: "model" in spectrum.view._levels_db)
+    assert len(drawn(waveform.view, source)) == 0
+    time_s = np.arange(16_001)[:, None] / 16_000
+    motion = 1e-3 * np.cos(2 * np.pi * 3_000 * time_s) * np.sin(np.pi * np.linspace(0, 1, 51))
+    take.others[source] = Motion(16_000, 51, 1.0)
+    take.others[source].append(motion.astype(np.float32))
+    watch(qtbot, waveform, take, lambda: len(drawn(waveform.view, source)) > 0)
+    watch(qtbot, spectrum, take, lambda: source in spectrum.view._levels_db)
+    assert drawn(waveform.view, source).max() == pytest.approx(1.0, rel=1e-3)
+    assert waveform.view._curves[source].getData()[0][-1] == pytest.approx(1.0, abs=1e-3)
+    loudest_hz = spectrum.view._curves[source].getData()[0][spectrum.view._levels_db[source].argmax()]
+    assert loudest_hz == pytest.approx(np.log10(3_000), abs=0.01) or loudest_hz == pytest.approx(3_000, rel=0.02)
+    assert set(spectrum.view.levels_db(3_000)) == {source}  # the model's rate ends before
+
+
+def test_a_mode_alone_and_the_ear_are_told(qtbot: QtBot, make: Make, take: Take) -> None:
+    panel = make(WaveformPanel)
+    choose(panel, solo=2, stereo=True)
+    watch(qtbot, panel, take, lambda: panel._shown[1:2] == ({"model": FRAMES, "truth": FRAMES},))
+    assert "(µm)" in panel.view.getPlotItem().getAxis("left").labelText
+    assert np.abs(drawn(panel.view, "truth")).max() < 1e-3  # the take has the first mode alone
+    assert panel.view.legend.text.startswith("mode 2, left   A  model")
+    choose(panel, solo=0, stereo=False)
+    watch(qtbot, panel, take, lambda: drawn(panel.view, "truth").max() > 1)
+    assert panel.view.legend.text.startswith("A  model")
 
 
 def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Controller) -> None:

@@ -28,10 +28,13 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
         shutil.copy(small_preset, folder / f"{name}.safetensors")
     entries, _ = list_presets(folder)
 
-    def make(more: dict[str, object] | None = None, **listening: object) -> ExportDialog:
+    def make(
+        more: dict[str, object] | None = None, heard: dict[str, object] | None = None, **listening: object
+    ) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
         export = ExportChoices.model_validate(settings)
-        dialog = ExportDialog(entries, Choices(preset="small", position=0.4), export, **listening)  # type: ignore[arg-type]
+        choices = Choices(preset="small", position=0.4).model_copy(update=heard or {})
+        dialog = ExportDialog(entries, choices, export, **listening)  # type: ignore[arg-type]
         qtbot.addWidget(dialog)
         dialog.show()
         return dialog
@@ -132,7 +135,33 @@ def test_its_state_is_remembered(made, tmp_path: Path) -> None:
     choices = dialog.export_choices()
     assert (choices.source, choices.folder, choices.seconds) == ("difference", str(tmp_path), 0.5)
     assert (choices.difference_gain_db, choices.batch.positions) == (30, "0.1, 0.2")
-    assert made(choices.model_dump()).export_choices() == choices
+    assert made(choices.model_dump(), {"a": "difference", "difference_gain_db": 30.0}).export_choices() == choices
+
+
+def test_what_is_heard_is_offered_first(qtbot: QtBot, made, tmp_path: Path) -> None:
+    assert made({"source": "difference"}).sound.source.currentData() == "model"
+    dialog = made({"source": "model"}, {"heard": "b"})
+    assert dialog.sound.source.currentData() == "truth"
+    run(qtbot, dialog, "Saved")
+    assert wavs(tmp_path) == ["small_x0.40_a4.0_4000_truth.wav"]
+    dialog = made({}, {"a": "difference", "difference_gain_db": 36.0, "solo": 2})
+    assert dialog.sound.source.currentData() == "difference"
+    assert (dialog.form.gain.isVisible(), dialog.form.gain.value()) == (True, 36)
+    assert "All modes" in dialog.sound.what.text()
+
+
+def test_another_preset_that_is_heard_is_the_one_that_is_saved(made) -> None:
+    dialog = made({"source": "files"}, {"b": "preset:other", "heard": "b"})
+    assert dialog.sound.source.currentData() == "model"
+    assert Path(dialog.sound.path.text()).name.startswith("other_")
+    gone = made({}, {"a": "preset:gone"})
+    assert Path(gone.sound.path.text()).name.startswith("small_")
+
+
+def test_both_stay_chosen_while_one_of_them_is_heard(made) -> None:
+    assert made({"source": "files"}, {"heard": "b"}).sound.source.currentData() == "files"
+    assert made({"source": "both"}).sound.source.currentData() == "both"
+    assert made({"source": "both"}, {"a": "difference"}).sound.source.currentData() == "difference"
 
 
 def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Path) -> None:

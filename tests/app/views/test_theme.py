@@ -8,11 +8,16 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
 
+from app.shown import ShownSource
 from app.views import theme
+from app.views.error_plane_view import ErrorPlaneView
+from app.views.error_time_view import ErrorTimeView
 from app.views.plots import recolour
+from app.views.space_time_view import SpaceTimeView
+from app.views.spectrogram_view import SpectrogramView
 from app.views.string_view import StringView
 from app.views.waveform_view import WaveformView
 
@@ -39,6 +44,26 @@ def test_no_two_roles_share_a_colour(face: theme.Face) -> None:
     assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
 
 
+def test_a_checked_box_has_a_tick_that_is_seen(qtbot: QtBot, qapp: QApplication, dark_again: None) -> None:
+    style, palette = qapp.styleSheet(), qapp.palette()
+    for choice, face in (("dark", theme.DARK), ("light", theme.LIGHT)):
+        theme.apply_theme(qapp, choice)  # type: ignore[arg-type]
+        box = QCheckBox("tick")
+        qtbot.addWidget(box)
+        box.setChecked(True)
+        picture = box.grab().toImage()
+        ratio = picture.devicePixelRatio()
+        seen = {picture.pixelColor(x, y).rgb() for x in range(int(22 * ratio)) for y in range(picture.height())}
+        assert QColor(face.text).rgb() in seen  # the box is filled
+        assert QColor(face.background).rgb() in seen  # and the tick stands out from it
+        assert f'stroke="{face.background}"' in (theme.SIGNS / f"tick_{choice}.svg").read_text()
+        box.setChecked(False)
+        assert box.grab().toImage() != picture
+    qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
+    qapp.setStyleSheet(style)
+    qapp.setPalette(palette)
+
+
 def test_contrast_is_that_of_the_standard() -> None:
     assert theme.contrast("#000000", "#ffffff") == pytest.approx(21)
     assert theme.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
@@ -58,21 +83,57 @@ def test_plots_take_on_another_face_and_come_back(
     monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
     view = WaveformView()
     qtbot.addWidget(view)
-    view.set_heard("truth")
-    curve, line = view._curves["model"], view._horizon
-    faint = curve.opts["pen"].color().alpha()
+    sources = ("model", "truth", "difference", "preset:other")
+    view.set_sources(tuple(ShownSource(source, "A", source, source == "truth") for source in sources))
+    line = view._horizon
+    faint = view._curves["model"].opts["pen"].color().alpha()
     stranger = pg.PlotDataItem(pen=pg.mkPen("#123456"))
     view.addItem(stranger)
     for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
         theme.use(new)
         recolour(old, new)
-        assert curve.opts["pen"].color() == theme.translucent(new.model, faint)
+        for curve, colour in zip(
+            view._curves.values(), (new.model, new.truth, new.difference, new.other), strict=True
+        ):
+            alpha = 255 if colour == new.truth else faint
+            assert curve.opts["pen"].color() == theme.translucent(colour, alpha)
         assert line.pen.color() == QColor(new.warning)
         assert view._horizon.label.color == QColor(new.warning)
+        assert view._horizon.label.fill.color() == theme.translucent(new.panel, 170)
         assert view._untrained.brush.color() == theme.translucent(new.warning, 18)
         assert view.backgroundBrush().color() == QColor(new.panel)
         assert view.getPlotItem().getAxis("left").textPen().color() == QColor(new.faint)
         assert stranger.opts["pen"].color() == QColor("#123456")
+
+
+def test_pictures_lie_on_the_ground_of_the_face(qtbot: QtBot, dark_again: None) -> None:
+    """What is nothing is as light, or as dark, as the panel; what is much is not."""
+    spectrogram, space_time, plane = SpectrogramView(), SpaceTimeView(), ErrorPlaneView()
+    for widget in (spectrogram, space_time, plane):
+        qtbot.addWidget(widget)
+    for face in (theme.LIGHT, theme.DARK):
+        theme.use(face)
+        for view, ground_at in ((spectrogram, 0.0), (space_time, 0.5), (plane.map, 0.0)):
+            colours = view._bar.colorMap()
+            ground, much = (colours.map(place, mode="qcolor") for place in (ground_at, 1.0))
+            assert theme.contrast(ground.name(), face.panel) < 1.25
+            assert theme.contrast(much.name(), face.panel) > 3
+        table = spectrogram._image.lut
+        assert theme.contrast(QColor(*map(int, table[0][:3])).name(), face.panel) < 1.25
+
+
+def test_the_errors_legend_has_the_colours_of_its_curves(
+    qtbot: QtBot, dark_again: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
+    view = ErrorTimeView()
+    qtbot.addWidget(view)
+    for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
+        theme.use(new)
+        recolour(old, new)
+        for name, colour in (("rmse", new.model), ("mae", new.difference)):
+            assert view._curves[name].opts["pen"].color() == QColor(colour)
+            assert f"color:{colour}'>— {name.upper()}" in view.readout.text()
 
 
 def test_a_painted_view_reads_the_face_when_it_paints(qtbot: QtBot, dark_again: None) -> None:

@@ -41,6 +41,19 @@ def turn(plot: TimePlot, place: QPoint, steps: int) -> None:
     QApplication.sendEvent(plot.viewport(), event)
 
 
+def test_the_end_of_training_is_set_off_from_a_picture(qtbot: QtBot) -> None:
+    for shaded in (True, False):
+        plot = TimePlot("t", "", shaded=shaded)
+        qtbot.addWidget(plot)
+        plot.set_times(2.0, 0.5)
+        assert plot._horizon.isVisible()
+        assert plot._edge.isVisible() != shaded
+        assert plot._edge.value() == 0.5
+        assert plot._edge.pen.width() > plot._horizon.pen.width()
+        plot.set_times(2.0, 3.0)
+        assert not plot._edge.isVisible()
+
+
 def test_the_keyboard_seeks_and_zooms(qtbot: QtBot, plot: TimePlot) -> None:
     asked: list[float] = []
     plot.seek_asked.connect(asked.append)

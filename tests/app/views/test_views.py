@@ -82,13 +82,14 @@ def test_animated_plots_survive(qtbot: QtBot) -> None:
         view.resize(600, 240)
         view.show()
     spectrum.set_rate(16_000)
-    waveform.set_take(1.0, 0.25, 5.0)
+    waveform.set_take(1.0, 0.25)
     random = np.random.default_rng(0)
     for frame in range(300):
         noise = {name: random.standard_normal(16_000).astype(np.float32) for name in ("model", "truth")}
         if frame % 4 == 0:
-            spectrum.show_signals(noise)
-            waveform.show_signals(noise, 16_000)
+            for name, signal in noise.items():
+                spectrum.show_signal(name, signal, Analyser(16_000))
+                waveform.show_signal(name, signal, 16_000)
         waveform.show_playhead(frame / 300)
         shapes = {name: signal[:101] for name, signal in noise.items()}
         string.show_frame(StringFrame(shapes, shapes, shapes))
@@ -103,7 +104,7 @@ def test_a_click_on_the_waveform_asks_to_seek(qtbot: QtBot) -> None:
     qtbot.addWidget(view)
     view.resize(600, 240)
     view.show()
-    view.set_take(2.0, 0.25, 5.0)
+    view.set_take(2.0, 0.25)
     qtbot.waitExposed(view)
     with qtbot.waitSignal(view.seek_asked) as asked:
         qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=view.viewport().rect().center())

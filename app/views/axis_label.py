@@ -1,0 +1,80 @@
+"""Labels and numbers of axes that fit: the longest wording that there is room for, and numbers that do not touch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import pyqtgraph as pg
+from PySide6.QtGui import QFontMetrics
+
+from app.views import theme
+
+LABELLED_HEIGHT = 170  # pixels of a plot: where there is less, the picture needs the room of the words beneath it
+LETTER_PIXELS = 12
+AIR = 8  # of a label, at its ends together
+TICK_PIXELS = 14  # an upright axis needs them for each of its numbers
+
+
+class UprightLabel:
+    """The label of a plot's left axis in several wordings, the longest first; follows the plot's height."""
+
+    def __init__(self, plot: pg.PlotItem, wordings: Sequence[str] = ()) -> None:
+        self._axis = plot.getAxis("left")
+        self._box = plot.vb
+        self._wordings = tuple(wordings)
+        self._box.sigResized.connect(self._fit)
+        self._fit()
+
+    def set(self, *wordings: str) -> None:
+        if wordings != self._wordings:
+            self._wordings = wordings
+            self._fit()
+
+    def _fit(self) -> None:
+        metrics = QFontMetrics(theme.small_font(LETTER_PIXELS))
+        height = self._box.boundingRect().height()
+        text = next((words for words in self._wordings if metrics.horizontalAdvance(words) + AIR <= height), "")
+        if text != self._axis.labelText:
+            self._axis.setLabel(text)
+        self._axis.showLabel(bool(text))
+        self._axis.resizeEvent(None)  # puts the label in the middle again
+
+
+def fit_foot(plot: pg.PlotWidget) -> None:
+    """Shows the words beneath a plot only where it is high enough; to be called when it is resized."""
+    plot.getPlotItem().getAxis("bottom").showLabel(plot.height() >= LABELLED_HEIGHT)
+
+
+class UprightTicks:
+    """The numbers of an upright axis: of a chosen list as many as there is room for, its ends before the others."""
+
+    def __init__(self, axis: pg.AxisItem, box: pg.ViewBox) -> None:
+        self._axis, self._box = axis, box
+        self._ticks: tuple[tuple[float, str], ...] | None = None
+        self._between: list[tuple[float, str]] = []
+        box.sigResized.connect(self._fit)
+        box.sigYRangeChanged.connect(self._fit)
+
+    def set(self, ticks: Iterable[tuple[float, str]] | None, between: Iterable[float] = ()) -> None:
+        """Places and texts, in rising order, and ticks without numbers. None: the axis chooses."""
+        self._ticks = None if ticks is None else tuple(ticks)
+        self._between = [(place, "") for place in between]
+        self._fit()
+
+    def _fit(self) -> None:
+        if self._ticks is None:
+            self._axis.setTicks(None)
+            return
+        low, high = self._axis.range
+        seen = [tick for tick in self._ticks if low <= tick[0] <= high]  # those out of sight take no room
+        room = TICK_PIXELS * (high - low) / max(self._box.boundingRect().height(), 1.0)
+        self._axis.setTicks([sparse(seen, room), self._between])
+
+
+def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float, str]]:
+    """Those of `ticks` that are at least `room` apart, the first and the last before the others."""
+    kept: list[tuple[float, str]] = []
+    for tick in (*ticks[:1], *ticks[:0:-1][:1], *ticks[1:-1]):
+        if all(abs(tick[0] - other) >= room for other, _ in kept):
+            kept.append(tick)
+    return sorted(kept)
