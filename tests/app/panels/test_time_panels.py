@@ -17,6 +17,7 @@ from pytestqt.qtbot import QtBot
 from app.controller import Controller
 from app.library import Library
 from app.panels import ErrorTimePanel, Moment, Panel, SpaceTimePanel, SpectrogramPanel, SpectrumPanel, WaveformPanel
+from app.panels.spectrum import EVERY
 from app.rendering import Listening, Take
 from app.rendering.take import Motion
 from app.session import Choices, Session
@@ -229,10 +230,10 @@ def test_while_a_take_grows_the_spectrum_is_of_a_whole_window(make: Make, take: 
     growing = Take("small", take.info, take.pluck, 1.0)
     growing.append(take.motion_m("model")[:2000], take.motion_m("truth")[:2000])
     panel.take_started(growing)
-    for _ in range(3):
+    for _ in range(EVERY):
         panel.show_moment(Moment(growing, 0.499, True, 0.016))
     edge_db = panel.view._levels_db["truth"]
-    for _ in range(3):
+    for _ in range(EVERY):
         panel.show_moment(Moment(take, 0.5 - panel.view._analysers["truth"].window_frames / 4000, True, 0.016))
     assert edge_db == pytest.approx(panel.view._levels_db["truth"], abs=1e-6)
 
