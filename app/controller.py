@@ -74,6 +74,7 @@ class Controller(QObject):
         self.appearance = Appearance(window, settings.look)
         self._last_tick_s = time.monotonic()
         self._ticks_given = 0
+        self._pictures_held = False
         self._abx: AbxDialog | None = None  # while it is open, the player is its own
         self._help: HelpDialog | None = None
         self.library = Library([])
@@ -159,6 +160,7 @@ class Controller(QObject):
 
     def pluck(self) -> None:
         self.performance.pluck()
+        self._hold_pictures(bool(self.performance.strikes.awaited))
 
     def play_or_stop(self) -> None:
         self.performance.play_or_stop()
@@ -276,9 +278,20 @@ class Controller(QObject):
         if "volume_db" in names:
             self.player.set_volume_db(choices.volume_db)
 
+    def _hold_pictures(self, on: bool) -> None:
+        """Nothing is painted while a struck pluck's first block is rendered: both need the interpreter."""
+        if on != self._pictures_held:
+            self._pictures_held = on
+            for panel in self.panels:
+                panel.view.setUpdatesEnabled(not on)
+
     # Sixty times a second
 
     def _tick(self) -> None:
+        self._ticks_given = self._ticks_given + 1 if self.performance.strikes.awaited else 0
+        if 0 < self._ticks_given <= GIVE_WAY_TICKS:
+            return  # whoever renders it needs the interpreter more
+        self._hold_pictures(False)
         now_s = time.monotonic()
         elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
         status = self.player.status()
@@ -292,9 +305,6 @@ class Controller(QObject):
         self.audio.show(status, take)
         position_s = min(status.position_s, take.seconds) if take is not None else 0.0
         moment = Moment(take, position_s, status.playing, elapsed_s)
-        self._ticks_given = self._ticks_given + 1 if self.performance.strikes.awaited else 0
-        if 0 < self._ticks_given <= GIVE_WAY_TICKS:
-            return  # whoever renders it needs the interpreter more
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)

@@ -27,6 +27,7 @@ class ComparePanel(Panel):
         self._tried: tuple[object, ...] = ()  # what the latest job was started for
         self._unchanged_s = 0.0
         self._stopped = False
+        self._stale = False  # the table is of choices that have changed since
         view.set_presets(library.entries)
         view.set_computing(None)
         view.preset_toggled.connect(self._toggle)
@@ -46,13 +47,15 @@ class ComparePanel(Panel):
                 self._background.cancel()
                 self.view.set_computing(None)
                 self._stopped = False
-            self._show()
+            self._stale = True  # shown when it is looked at: a pluck may be waiting
 
     def take_started(self, take: Take) -> None:
         self._background.give_way_to(take)
 
     def show_moment(self, moment: Moment) -> None:
         self._unchanged_s += moment.elapsed_s
+        if self._stale:
+            self._show()
         if self._unchanged_s < SETTLED_S or self._stopped or self._tried == self._wanted():
             return
         self._compute()
@@ -122,6 +125,7 @@ class ComparePanel(Panel):
         self._show()
 
     def _show(self) -> None:
+        self._stale = False
         entries, trial = self._entries, self._trial
         self.view.set_chosen([entry.name for entry in entries])
         shown = []

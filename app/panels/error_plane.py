@@ -33,6 +33,7 @@ class ErrorPlanePanel(Panel):
         self.view.pluck_chosen.connect(self._audition)
         self._asked: tuple[object, ...] = ()
         self._unchanged_s = 0.0
+        self._moved = False  # the pluck's mark is of choices that have changed since
         self._planes = _Planes()
         self._background = Background("error-map", self)
         self._background.progressed.connect(self._progressed)
@@ -40,9 +41,8 @@ class ErrorPlanePanel(Panel):
         self._background.failed.connect(self._failed)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
-        if names & {"position", "amplitude_mm"}:
-            self.view.set_pluck(choices.position, choices.amplitude_mm)
+        entry = self.library.find(self.session.choices.preset)
+        self._moved |= bool(names & {"position", "amplitude_mm"})
         if "preset" in names and entry is not None:
             trained = entry.info.trained_range
             self.view.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
@@ -59,6 +59,9 @@ class ErrorPlanePanel(Panel):
 
     def show_moment(self, moment: Moment) -> None:
         self._unchanged_s += moment.elapsed_s
+        if self._moved:
+            self.view.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)
+            self._moved = False
         entry = self.library.find(self.session.choices.preset)
         if entry is None or self._asked == self._wanted() or self._unchanged_s < SETTLED_S:
             return

@@ -213,6 +213,17 @@ def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
             assert np.ptp(curve.getData()[1]) > 0
 
 
+def test_pictures_wait_for_a_struck_pluck_and_no_longer(qtbot: QtBot, controller: Controller) -> None:
+    views = [panel.view for panel in controller.panels]
+    controller.session.update(position=0.61)
+    controller.pluck()  # not rendered yet
+    assert not any(view.updatesEnabled() for view in views)
+    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.waitUntil(lambda: all(view.updatesEnabled() for view in views), timeout=5_000)
+    controller.pluck()  # is on stage: nothing to wait for
+    assert all(view.updatesEnabled() for view in views)
+
+
 def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller) -> None:
     controller.session.update(position=0.1)
     assert "outside the trained" in view(controller, "string")._warning
@@ -384,7 +395,7 @@ def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controll
     wait_for_take(qtbot, controller)
     session.update(a="preset:second", heard="a")
     title = controller.library.find("second").info.title
-    qtbot.waitUntil(lambda: controller._stage.take.others != {}, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.take.others != {}, timeout=20_000)
     qtbot.waitUntil(lambda: views[1]._curves["preset:second"].getData()[0] is not None, timeout=20_000)
     assert views[1].legend.text == f"A  {title} · heard   B  difference +20 dB"
     controller.play_or_stop()

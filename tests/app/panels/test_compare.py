@@ -33,7 +33,7 @@ def test_presets_of_the_same_string_are_compared(qtbot: QtBot, controller: Contr
     assert [row.bold for row in shown.table.rows if row.key == "first"] == [True]
     before = figures(shown)["first"][1]
     controller.session.update(position=0.6)
-    assert all(row.grey for row in shown.table.rows)
+    qtbot.waitUntil(lambda: all(row.grey for row in shown.table.rows))
     qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
     assert figures(shown)["first"][1] != before
 
@@ -56,7 +56,7 @@ def test_enter_loads_a_preset(qtbot: QtBot, controller: Controller, shown: Any) 
     shown.table.choose("second")
     qtbot.keyClick(shown.table, Qt.Key.Key_Return)
     assert controller.session.choices.preset == "second"
-    assert [row.bold for row in shown.table.rows if row.key == "second"] == [True]
+    qtbot.waitUntil(lambda: [row.bold for row in shown.table.rows if row.key == "second"] == [True])
 
 
 def test_a_bad_preset_is_a_row_with_the_reason(

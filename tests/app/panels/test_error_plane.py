@@ -50,7 +50,7 @@ def test_a_click_plucks_there(qtbot: QtBot, controller: Controller, shown: Any) 
     choices = controller.session.choices
     assert choices.position == pytest.approx(0.6, abs=0.01)
     assert choices.amplitude_mm == pytest.approx(8, rel=0.05)
-    assert shown.map._present == (choices.position, choices.amplitude_mm)
+    qtbot.waitUntil(lambda: shown.map._present == (choices.position, choices.amplitude_mm))
     assert choices.position == round(choices.position, 3)  # no more digits than can be read
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
 
