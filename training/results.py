@@ -20,6 +20,7 @@ from engine.whole_file import whole_file
 
 QUARTERS = 4  # windows of the horizon, with an error each
 SHORT_HORIZON = 400  # frames; the paper's second horizon, over which every run is measured too
+PRIOR_KNOWLEDGE = ("physics", "averaging", "matching pursuit")  # starts that know the string's modes
 RESULTS = Path(__file__).parent / "results.csv"
 
 Status = Literal["done", "diverged", "failed"]
@@ -85,7 +86,7 @@ class Row:
     @property
     def structured(self) -> bool:
         """Whether it started from prior knowledge of the string, which the paper's models do not have."""
-        return self.initialisation in ("physics", "averaging")
+        return self.initialisation in PRIOR_KNOWLEDGE
 
 
 COLUMNS = tuple(field.name for field in fields(Row))

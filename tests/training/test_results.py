@@ -10,6 +10,7 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError
+from training.fitting.fit import LEAST_SQUARES, PURSUIT
 from training.results import COLUMNS, Row, add_rows, read_results
 
 
@@ -34,6 +35,12 @@ def row(digest: str = "a", **changes: Any) -> Row:
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "results.csv"
+
+
+def test_a_start_that_knows_the_string_is_no_black_box() -> None:
+    known = (PURSUIT, "physics", "averaging")
+    assert all(row(initialisation=how).structured for how in known)
+    assert not any(row(initialisation=how).structured for how in ("", "paper", "random", LEAST_SQUARES))
 
 
 def test_rows_come_back_as_they_were(path: Path) -> None:
