@@ -21,8 +21,8 @@ of its Table 3 as printed (5 seeds).
   the two; at least {PRINTED:g}, to which the paper's figures are printed). **equal**: within it.
 - **{NOT_RUN}**: there is no run of ours. **{NONE}**: the paper has no figure.
 - **diverged (n of m seeds)**: these runs ended without a model; the figure beside it is of the others.
-- **prior knowledge**: training started from what is known of the string (its modes and eigenvalues, or averaged equations),
-  which the paper's models do not have. Lines without these words are black boxes as in the paper.
+- **prior knowledge**: training started from what is known of the string (its modes and eigenvalues, or averaged
+  equations), which the paper's models do not have. Lines without these words are black boxes as in the paper.
 - **our best**: the lowest error of our learned models (DMD is fitted, not learned) as a multiple of the paper's best
   in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below {PRINTED:g}."""
 SHORT_LEGEND = """\
