@@ -86,6 +86,8 @@ class Recipe:
         for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
+        if self.latent_polish and not self.latent_epochs:
+            raise ValueError("latent_polish needs latent_epochs: it is the last of their steps")
         for name in ("warm_up", "grow_until", "average_decay"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must lie in 0 … 1, not {getattr(self, name)}")

@@ -80,6 +80,11 @@ def test_latents_that_are_learned_first_are_too(small_dataset: Dataset, runs: Pa
     check_cuts(small("koopman", latent_epochs=2), small_dataset, runs)
 
 
+def test_a_polish_without_latents_is_refused() -> None:
+    with pytest.raises(ValueError, match="latent_polish needs latent_epochs"):
+        Recipe(epochs=1, latent_polish=1)
+
+
 def test_a_polish_is_too_and_lowers_the_error(
     small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
