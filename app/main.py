@@ -73,8 +73,11 @@ class _Start(QObject):
 def load_engine() -> None:
     """What the window does not need in order to be seen: two seconds and more, most of it for torch."""
     import torch
+    from threadpoolctl import threadpool_limits
 
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
+    # NumPy's products are small here. Its BLAS would wait for the next one in a loop, a thread a core, for nothing.
+    threadpool_limits(limits=1, user_api="blas")
 
 
 def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:

@@ -78,7 +78,7 @@ class WaveformPanel(Panel):
             return
         self._follow(take)
         choices, ready = self.session.choices, {name: drawn.ready for name, drawn in self._drawn.items()}
-        shown = (take, ready, ear(choices), self.view.times_s)
+        shown = (take, ready, ear(choices), self.view.times_s, self.view.columns)
         if shown != self._shown:
             self._shown = shown
             self._draw()

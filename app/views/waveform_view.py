@@ -13,17 +13,17 @@ from app.views.curves import set_curves
 from app.views.legend import Legend
 from app.views.time_plot import TimePlot
 
-COLUMNS = 1600
-
 
 def extremes(signal: NDArray[np.float32], columns: int) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """Lowest and highest value of each column, alternating: (places in samples, values) to draw as one line."""
-    if len(signal) <= 2 * columns:
-        return np.arange(len(signal), dtype=np.float64), signal
+    """An upright stroke a column, from lowest to highest: (places in samples, values), pairs of ends.
+
+    Each reaches as far as the next one's first sample, so that a steep flank has no gaps.
+    """
     edges = np.linspace(0, len(signal), columns, endpoint=False).astype(int)
+    meets = np.append(signal[edges[1:]], signal[-1])
     values = np.empty(2 * columns, np.float32)
-    values[0::2] = np.minimum.reduceat(signal, edges)
-    values[1::2] = np.maximum.reduceat(signal, edges)
+    values[0::2] = np.minimum(np.minimum.reduceat(signal, edges), meets)
+    values[1::2] = np.maximum(np.maximum.reduceat(signal, edges), meets)
     return np.repeat(edges.astype(np.float64), 2), values
 
 
@@ -58,6 +58,11 @@ class WaveformView(TimePlot):
         self.getPlotItem().setYRange(-full, full, padding=0.02)
         self._label.set(f"{quantity} ({unit})", unit)
 
+    @property
+    def columns(self) -> int:
+        """How many pixels of the screen a signal over all of the axis is drawn in."""
+        return max(1, round(self.getPlotItem().vb.width() * self.devicePixelRatioF()))
+
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
         """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""
         set_curves(self.getPlotItem(), self._curves, sources, faint_alpha=130)
@@ -68,11 +73,19 @@ class WaveformView(TimePlot):
         low_s, high_s = self.times_s
         first = min(max(int(low_s * rate_hz), 0), len(signal))
         last = min(max(int(high_s * rate_hz) + 2, first), len(signal))
-        if last > first:
-            places, values = extremes(signal[first:last], COLUMNS)
-            self._curves[source].setData((places + first) / rate_hz, values)
+        in_view, columns = signal[first:last], round(self.columns * (last - first) / rate_hz / (high_s - low_s))
+        # A smoothed line that goes to and fro within a pixel takes ten times as long as strokes of whole pixels,
+        # and nothing else in this process runs meanwhile, not even what feeds the loudspeaker.
+        if len(in_view) > columns > 0:
+            places, values = extremes(in_view, columns)
+            dense = {"connect": "pairs", "antialias": False}
+        elif len(in_view):
+            places, values = np.arange(len(in_view), dtype=np.float64), in_view
+            dense = {"connect": "all", "antialias": True}
         else:
             self.clear_signal(source)
+            return
+        self._curves[source].setData((places + first) / rate_hz, values, **dense)
 
     def clear_signal(self, source: str) -> None:
         self._curves[source].setData([], [])

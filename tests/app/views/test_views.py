@@ -37,10 +37,34 @@ def test_extremes_keep_every_peak() -> None:
     assert abs(places[values.argmax()] - 12_345) < 100
 
 
-def test_short_signals_are_drawn_as_they_are() -> None:
-    signal = np.arange(10, dtype=np.float32)
-    places, values = extremes(signal, 1000)
-    assert (places == values).all()
+def test_strokes_of_a_steep_flank_have_no_gaps_between_them() -> None:
+    _, values = extremes(np.linspace(0, 1, 10_000, dtype=np.float32), 100)
+    lowest, highest = values[0::2], values[1::2]
+    assert (highest[:-1] >= lowest[1:]).all()
+    assert (lowest[:-1] < highest[:-1]).all()
+
+
+def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_where_it_has_few(
+    qtbot: QtBot,
+) -> None:
+    view = WaveformView()
+    qtbot.addWidget(view)
+    view.resize(600, 240)
+    view.show()
+    view.set_take(1.0, 0.25)
+    signal = np.sin(np.arange(48_000, dtype=np.float32))
+    view.show_signal("model", signal, 48_000)
+    curve = view._curves["model"]
+    assert len(curve.getData()[0]) == 2 * view.columns
+    assert (curve.opts["connect"], curve.opts["antialias"]) == ("pairs", False)
+    view.show_signal("model", signal[:24_000], 48_000)  # rendered half-way: half of the columns
+    assert len(curve.getData()[0]) == pytest.approx(view.columns, abs=2)
+    view.getPlotItem().setXRange(0.1, 0.102, padding=0)
+    view.show_signal("model", signal, 48_000)
+    assert (curve.opts["connect"], curve.opts["antialias"]) == ("all", True)
+    assert len(curve.getData()[0]) == pytest.approx(96, abs=3)
+    view.show_signal("model", signal[:10], 48_000)  # nothing of what is in view
+    assert curve.getData()[0] is None or len(curve.getData()[0]) == 0
 
 
 @pytest.mark.parametrize(
