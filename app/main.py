@@ -23,7 +23,8 @@ from app.views.theme import apply_theme
 if TYPE_CHECKING:
     from app.controller import Controller
 
-SWITCH_INTERVAL_S = 0.0001  # callback and rendering must get the interpreter in time from the picture
+# The callback and what feeds it must get the interpreter from the picture soon, and then keep it for a whole block.
+SWITCH_INTERVAL_S = 0.001
 
 
 class _Start(QObject):

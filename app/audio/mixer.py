@@ -5,6 +5,7 @@ Commands take effect at the next frame that is rendered, each as a short cross-f
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.audio.levels import Levels, SmoothGain
 from app.audio.limiter import Limiter
+from app.audio.pieces import pieces
 from app.audio.strand import CROSS_FADE_S, DECLICK_S, Strand
 from app.audio.track import Track
 
@@ -56,6 +58,7 @@ class Mixer:
         self._volume = SmoothGain(1.0, rate_hz)
         self._levels = Levels()
         self._limiter = Limiter(rate_hz)
+        self._gain_reduction_db = 0.0  # the most within the last block
         self._peak_db = METER_FLOOR_DB
         self._non_finite = False
 
@@ -141,10 +144,31 @@ class Mixer:
         mixer._source, mixer._loop, mixer._volume_db = self._source, self._loop, self._volume_db
         return mixer
 
+    def copied(self) -> Mixer:
+        """The same state again, on the same tracks: what is done to one does nothing to the other."""
+        mixer = copy.copy(self)
+        mixer._main = None if self._main is None else self._main.copied()
+        mixer._ringing = [strand.copied() for strand in self._ringing]
+        mixer._leaving = [strand.copied() for strand in self._leaving]
+        mixer._volume, mixer._limiter = copy.copy(self._volume), copy.copy(self._limiter)
+        return mixer
+
     # Sound
+
+    def steady(self, frames: int) -> bool:
+        """Whether the next frames will be the same whatever is rendered meanwhile."""
+        return all(strand.steady(frames) for strand in self._strands())
 
     def next_block(self, frames: int) -> NDArray[np.float32]:
         """Renders the next samples, shape (frames, 2), below the limiter's ceiling; mono is the same in both."""
+        block = np.empty((frames, 2), np.float32)
+        self._gain_reduction_db = 0.0
+        for piece in pieces(frames):
+            block[piece] = self._next_piece(piece.stop - piece.start)
+        return block
+
+    def _next_piece(self, frames: int) -> NDArray[np.float64]:
+        """Shape (frames, 1 or 2)."""
         if self._main is not None and self._main.let_incoming_take_over():
             self._non_finite = False
         for strand in self._ringing:
@@ -165,8 +189,9 @@ class Mixer:
             self._non_finite = True
         self._volume.apply(mix, 10 ** (self._volume_db / 20))
         mix = self._limiter.process(mix)
+        self._gain_reduction_db = max(self._gain_reduction_db, self._limiter.gain_reduction_db)
         self._measure(mix)
-        return np.ascontiguousarray(np.broadcast_to(mix.astype(np.float32), (frames, 2)))
+        return mix
 
     @property
     def position_frames(self) -> int:
@@ -180,7 +205,7 @@ class Mixer:
             waiting=main is not None and main.waiting,
             source=self._source if main is None else main.source_heard,
             peak_db=self._peak_db,
-            gain_reduction_db=self._limiter.gain_reduction_db,
+            gain_reduction_db=self._gain_reduction_db,
             non_finite=self._non_finite,
             ringing=len(self._ringing),
         )

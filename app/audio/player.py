@@ -4,8 +4,8 @@
     any thread ◄── status() ── (owns mixer and output)
 
 Only the feeder touches the mixer and the output. Public methods put a command into its queue and return at
-once; it obeys them right before it renders a block, so none waits longer than the short block queue takes to
-play.
+once; it obeys them right before it renders a block. It mixes further ahead than a command may wait, so for one
+it first goes back to the earliest block that can still be another.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from types import TracebackType
 
 import numpy as np
 
+from app.audio.ahead import Ahead, Moment
 from app.audio.devices import AudioDevice
 from app.audio.levels import Levels
 from app.audio.mixer import Mixer
@@ -67,6 +68,7 @@ class Player:
         self._output: Output = SilentOutput(rate_hz)
         self._buffer_s = BUFFER_S
         self._timeline = Timeline(0)
+        self._ahead = Ahead()
         self._wanted = Wanted()
         self._changes_done = 0
         self._tone: Tone | None = None
@@ -183,9 +185,9 @@ class Player:
     def _feed(self) -> None:
         try:
             while not self._closing.is_set():
-                self._output.wait_for_space(_WAIT_S)
+                self._wait_for_space(_WAIT_S)
                 self._obey_commands()  # after the wait, so that the block to come knows the latest of them
-                if self._output.wait_for_space(0):  # again: a command may have used it, or changed the output
+                if self._wait_for_space(0):  # again: a command may have used it, or changed the output
                     self._write_block()
                     self._end_stall()
                 elif self._output.lost():
@@ -211,7 +213,12 @@ class Player:
                 while True:  # they may hold tracks
                     self._commands.get_nowait()
 
+    def _wait_for_space(self, timeout_s: float) -> bool:
+        return self._output.wait_for_space(timeout_s, self._mixer.steady(self._output.block_frames))
+
     def _obey_commands(self) -> None:
+        if not self._commands.empty():
+            self._rewind()
         while True:
             try:
                 command = self._commands.get_nowait()
@@ -229,13 +236,23 @@ class Player:
         with contextlib.suppress(ValueError):
             self._mixer.select(source)
 
+    def _rewind(self) -> None:
+        """Goes back to the first block that can still be another."""
+        self._ahead.forget_played(self._output.queued_blocks)
+        moment = self._ahead.go_back(self._output.take_back())
+        if moment is not None:
+            self._mixer, self._tone = moment.mixer, moment.tone
+        self._timeline.take_back(self._output.frames_queued)
+
     def _write_block(self) -> None:
+        before = Moment.of(self._mixer, self._tone)
         block = self._mixer.next_block(self._output.block_frames)
         if self._tone is not None:
             block = np.clip(block + self._tone.next_block(len(block)), -1, 1)
             self._tone = None if self._tone.over else self._tone
         self._output.write(block)
         state = self._mixer.status()
+        self._ahead.note(before, state)
         self._timeline.note(self._output.frames_queued, state.position_frames, state.playing and not state.waiting)
 
     def _start_tone(self, side: Side) -> None:
@@ -323,7 +340,7 @@ class Player:
         old, self._output, self._stalled = self._output, output, False
         if output.rate_hz != self._mixer.rate_hz:
             self._mixer = self._mixer.emptied(output.rate_hz)
-        self._timeline = Timeline(self._mixer.position_frames)
+        self._timeline, self._ahead = Timeline(self._mixer.position_frames), Ahead()
         old.close()
 
     def _report(self, problem: AudioProblem) -> None:
@@ -334,7 +351,9 @@ class Player:
             self._on_problem(problem)
 
     def _publish(self) -> None:
-        output, state = self._output, self._mixer.status()
+        output = self._output
+        self._ahead.forget_played(output.queued_blocks)
+        state = self._ahead.status_in(output.prompt_blocks) or self._mixer.status()
         heard_frame = output.frames_written - round(output.latency_s * output.rate_hz)
         self._status = PlayerStatus(
             position_s=self._timeline.position_at(heard_frame) / output.rate_hz,

@@ -21,6 +21,7 @@ class SilentOutput:
         self.rate_hz = rate_hz
         self.block_frames = block_frames
         self.latency_s = 0.0
+        self.prompt_blocks = 0
         self.underruns = 0
         self.frames_queued = 0
         self._next_block_s = time.monotonic()
@@ -29,7 +30,14 @@ class SilentOutput:
     def frames_written(self) -> int:
         return self.frames_queued
 
-    def wait_for_space(self, timeout_s: float) -> bool:
+    @property
+    def queued_blocks(self) -> int:
+        return 0
+
+    def take_back(self) -> int:
+        return 0
+
+    def wait_for_space(self, timeout_s: float, ahead: bool = False) -> bool:
         wait_s = self._next_block_s - time.monotonic()
         if wait_s > 0:
             time.sleep(min(wait_s, timeout_s))

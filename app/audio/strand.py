@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,6 +67,24 @@ class Strand:
     @property
     def source_heard(self) -> str:
         return self.source if self.source in self.track.sources else self.track.sources[0]
+
+    def copied(self) -> Strand:
+        """The same state again, on the same track."""
+        strand = copy.copy(self)
+        strand._voice = None if self._voice is None else self._voice.copied()
+        strand._leaving = [voice.copied() for voice in self._leaving]
+        return strand
+
+    def steady(self, frames: int) -> bool:
+        """Whether the next frames will be the same whatever is rendered meanwhile."""
+        if not self.running:
+            return True
+        if self.incoming is not None:
+            return False
+        ready_frames = self.track.ready_frames - self._frames(DECLICK_S)
+        return self.track.complete or (
+            self._voice is not None and not self._voice.fading_out and self.position_frames + frames <= ready_frames
+        )
 
     def place(self, position_frames: int, fade_in_s: float) -> None:
         """Puts the playhead down where the next voice is to begin; a present voice must have been retired."""

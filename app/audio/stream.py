@@ -1,7 +1,11 @@
 """An open sound device behind a bounded queue of ready blocks.
 
 Two threads meet here. The device's callback copies one ready block per call, or zeros if there is none, and
-does nothing else. The feeder renders the next block whenever one of the few buffers has come back.
+does nothing else. The feeder renders the next block whenever the queue has room.
+
+The queue is prompt and patient at once. A command must be heard soon, so that only a few blocks may lie before it;
+yet Python, or the computer, is busy elsewhere for a tenth of a second now and then. So the feeder goes on far beyond
+those few blocks as long as nothing can change them but a command; and for a command it takes them back.
 """
 
 from __future__ import annotations
@@ -9,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
+from collections import deque
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -17,11 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.audio.devices import AudioDevice, Callback, RawStream, open_device
+from app.audio.pieces import pieces
 from app.audio.problems import refused
 
 BLOCK_FRAMES = 256
 SHORTEST_BLOCK = 64
-BUFFER_S = 0.025  # of ready sound: outlasts a busy moment of Python, and delays a command by as much
+BUFFER_S = 0.025  # of ready sound that a command waits for
+AHEAD_S = 0.25  # and of more, which it takes back: outlasts a busy moment of Python
 STALLED_AFTER_S = 1.5  # without a callback
 LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
 SETTLING_S = 0.1
@@ -33,12 +40,12 @@ OpenDevice = Callable[[AudioDevice, float, int, Callback], RawStream]
 class OutputStream:
     """A device that plays, at its own rate, what is written block by block.
 
-    A few preallocated buffers travel in a circle: free → (write) → ready → (callback) → free. So the queue is
-    bounded by construction, and the callback neither allocates nor waits.
+    Preallocated buffers travel in a circle: free → (write) → ready → (callback) → free. So the queue is bounded
+    by construction, and the callback neither allocates nor waits.
 
     Args:
         device: Where to play.
-        buffer_s: Sound kept ready in the queue, and at least as much in the device's own buffer.
+        buffer_s: Sound that is always kept ready in the queue, and at least as much in the device's own buffer.
         block_frames: Frames per block, for the device as well as for `write`; fewer where the buffer is short.
         open_device: Makes the raw stream; tests put another one in.
 
@@ -60,17 +67,22 @@ class OutputStream:
         self.frames_written = 0  # by the callback to the device, without the zeros of underruns
         self.underruns = 0  # blocks that came too late, and gaps that the device itself has noticed
         self.frames_queued = 0  # by `write`
-        self._free: SimpleQueue[NDArray[np.float32]] = SimpleQueue()
-        self._ready: SimpleQueue[NDArray[np.float32]] = SimpleQueue()
-        self._next: NDArray[np.float32] | None = None  # the free buffer that wait_for_space has found
+        self._free: deque[NDArray[np.float32]] = deque()
+        self._ready: deque[NDArray[np.float32]] = deque()
+        self._taken: SimpleQueue[None] = SimpleQueue()  # a token for each block that the device has asked for
+        self._taken_back_at = 0  # the callback_count then
         self._raw = open_device(device, buffer_s, block_frames, self._callback)
         self.latency_s = float(self._raw.latency)
         # A device that starts fills its own buffer, some twice, faster than the queue follows: inaudibly.
         self._settled_count = math.ceil((self.latency_s + SETTLING_S) * self.rate_hz / block_frames)
         # Devices with a long buffer ask for many blocks at a time; half of that buffer is a safe guess.
         blocks = max(2, int(max(buffer_s, self.latency_s / 2) * self.rate_hz / block_frames))
+        self.prompt_blocks = blocks  # always kept ready; a command is heard after them
+        self._most_blocks = blocks + math.ceil(AHEAD_S * self.rate_hz / block_frames)
+        for _ in range(self._most_blocks + 1):  # one is with the callback
+            self._free.append(np.zeros((block_frames, min(device.channels, 2)), np.float32))
         for _ in range(blocks):  # the queue starts full, of silence
-            self._ready.put(np.zeros((block_frames, min(device.channels, 2)), np.float32))
+            self._ready.append(self._free.pop())
             self.frames_queued += block_frames
         self._alive = _Heartbeat(grace_s=START_GRACE_S)
         try:
@@ -79,21 +91,44 @@ class OutputStream:
             self.close()
             raise refused(error, device.name, self.rate_hz) from error
 
-    def wait_for_space(self, timeout_s: float) -> bool:
-        """Waits until a block can be written."""
-        if self._next is None:
-            with contextlib.suppress(Empty):
-                self._next = self._free.get(timeout=timeout_s)
-        return self._next is not None
+    @property
+    def queued_blocks(self) -> int:
+        """Written, and not yet taken by the device."""
+        return len(self._ready)
+
+    def wait_for_space(self, timeout_s: float, ahead: bool = False) -> bool:
+        """Waits until a block can be written.
+
+        Args:
+            ahead: Up to `AHEAD_S` beyond what is always kept ready. That room opens with every block that is
+                played since `take_back`, so that the feeder catches up at twice the pace of the sound and a
+                knob that is turned costs little.
+        """
+        while not self._has_space(ahead):
+            try:
+                self._taken.get(timeout=timeout_s)
+            except Empty:
+                return False
+        return True
 
     def write(self, block: NDArray[np.float32]) -> None:
         """Queues one block, shape (block_frames, 2), after `wait_for_space` has returned True."""
-        if self._next is None:
+        if not self._free:
             raise RuntimeError("The queue is full: wait_for_space comes first.")
-        np.copyto(self._next, block[:, : self._next.shape[1]])
-        self._ready.put(self._next)
-        self._next = None
+        buffer = self._free.popleft()
+        _copy(buffer, block[:, : buffer.shape[1]])
+        self._ready.append(buffer)
         self.frames_queued += self.block_frames
+
+    def take_back(self) -> int:
+        """Takes the latest blocks out of the queue that need not be ready yet; returns how many, the last first."""
+        taken = 0
+        while len(self._ready) > max(1, self.prompt_blocks - 1):  # the callback is never left without a next one
+            self._free.append(self._ready.pop())
+            taken += 1
+        self.frames_queued -= taken * self.block_frames
+        self._taken_back_at = self.callback_count
+        return taken
 
     def stalled(self) -> bool:
         """Whether the device takes nothing at the moment. To be asked again and again, by one thread."""
@@ -119,22 +154,33 @@ class OutputStream:
         if status and status.output_underflow:
             self._count_underrun()
         try:
-            block = self._ready.get_nowait()
-        except Empty:
+            block = self._ready.popleft()
+        except IndexError:
             outdata.fill(0)
             self._count_underrun()
+            self._taken.put(None)
             return
         if len(block) == len(outdata):  # always, unless a driver ignores the block size that it was given
-            outdata[:] = block
+            _copy(outdata, block)
             self.frames_written += frames
         else:
             outdata.fill(0)
             self._count_underrun()
-        self._free.put(block)
+        self._free.append(block)
+        self._taken.put(None)
+
+    def _has_space(self, ahead: bool) -> bool:
+        earned = self.callback_count - self._taken_back_at if ahead else 0
+        return len(self._ready) < min(self.prompt_blocks + earned, self._most_blocks)
 
     def _count_underrun(self) -> None:
         if self.callback_count > self._settled_count:
             self.underruns += 1
+
+
+def _copy(into: NDArray[np.float32], block: NDArray[np.float32]) -> None:
+    for piece in pieces(len(into)):
+        into[piece] = block[piece]
 
 
 class _Heartbeat:

@@ -22,6 +22,11 @@ class Timeline:
     def note(self, end_frame: int, position_frames: int, moving: bool) -> None:
         self._entries.append(_Entry(end_frame, position_frames, moving))
 
+    def take_back(self, end_frame: int) -> None:
+        """Forgets the blocks after `end_frame`: they left the queue unheard."""
+        while self._entries and self._entries[-1].end_frame > end_frame:
+            self._entries.pop()
+
     def position_at(self, frame: int) -> int:
         """The playhead when output frame `frame` is heard; frames are asked for in rising order.
 

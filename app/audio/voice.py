@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +33,12 @@ class Voice:
         self._fade_out_frames = 0
         self._fade_out_done: int | None = None
         self._gain: SmoothGain | None = None  # at its target when the first samples sound
+
+    def copied(self) -> Voice:
+        """The same state again, on the same track."""
+        voice = copy.copy(self)
+        voice._gain = copy.copy(self._gain)
+        return voice
 
     @property
     def silent(self) -> bool:

@@ -120,18 +120,10 @@ def _choose_seconds(stage: Stage, seconds: float) -> None:
 
 
 def _buffer_s(stage: Stage) -> float:
-    """Of the queue, which is full but for a moment after each callback."""
-    output, most_frames, looks = stage.card.output, 0, 0
-
-    def look() -> bool:
-        nonlocal most_frames, looks
-        assert output is not None
-        most_frames, looks = max(most_frames, output.frames_queued - output.frames_written), looks + 1
-        return looks > 50
-
-    stage.wait_for(look, "the queue")
+    """Of the sound that a command waits for."""
+    output = stage.card.output
     assert output is not None
-    return most_frames / output.rate_hz
+    return output.prompt_blocks * output.block_frames / output.rate_hz
 
 
 def _pluck_s(stage: Stage, **changes: float) -> float:

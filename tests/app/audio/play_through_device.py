@@ -17,6 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from app.audio import AudioProblem, Mixer, Player, Track
+from app.audio.stream import OutputStream
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
@@ -26,15 +27,20 @@ def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
 
 
 def kept_blocks() -> list[np.ndarray]:
-    """All blocks that any mixer gives from now on."""
+    """All blocks that any mixer gives from now on, without those that were taken back unheard."""
     blocks: list[np.ndarray] = []
-    next_block = Mixer.next_block
+    next_block, take_back = Mixer.next_block, OutputStream.take_back
 
     def keep(mixer: Mixer, frames: int) -> np.ndarray:
         blocks.append(next_block(mixer, frames))
         return blocks[-1]
 
-    Mixer.next_block = keep  # type: ignore[method-assign]
+    def drop(stream: OutputStream) -> int:
+        taken = take_back(stream)
+        del blocks[len(blocks) - taken :]
+        return taken
+
+    Mixer.next_block, OutputStream.take_back = keep, drop  # type: ignore[method-assign]
     return blocks
 
 

@@ -276,6 +276,50 @@ def test_any_splitting_gives_the_same_samples(block_frames: int) -> None:
     np.testing.assert_allclose(split, whole, atol=1e-6)
 
 
+def test_a_copy_goes_its_own_way_from_the_same_state() -> None:
+    """Between all commands of a session, blocks are mixed with a copy, which other commands then change."""
+
+    class Wandering(Mixer):
+        def next_block(self, frames: int) -> np.ndarray:
+            copy = Mixer.copied(self)
+            ahead = Mixer.next_block(copy, frames)
+            copy.select("truth")
+            copy.set_volume_db(-20.0)
+            copy.seek(0.3)
+            copy.load(make_track(0.1, peak=0.3), ring=True)
+            Mixer.next_block(copy, frames)
+            own = super().next_block(frames)
+            np.testing.assert_array_equal(own, ahead)
+            return own
+
+    mixers = [Mixer(RATE_HZ), Wandering(RATE_HZ)]
+    for mixer in mixers:
+        mixer.load(make_track())
+        mixer.play()
+    expected, found = (perform(mixer, 64) for mixer in mixers)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_it_is_steady_where_no_rendering_can_change_what_comes() -> None:
+    assert Mixer(RATE_HZ).steady(1000)
+    track = Track(RATE_HZ, SECOND, ("model", "truth"))
+    mixer = playing(track)
+    assert not mixer.steady(1), "it waits for the first samples"
+    track.append({"model": tone(0.5), "truth": tone(0.5)})
+    mono(mixer, 100)
+    fade = frames(DECLICK_S)
+    assert mixer.steady(SECOND // 2 - 100 - fade)
+    assert not mixer.steady(SECOND // 2 - 100 - fade + 1), "it may run dry"
+    mixer.load(make_track(), keep_position=True)
+    assert not mixer.steady(1), "another listening point is about to take over"
+    mono(mixer, 1)
+    assert mixer.steady(10 * SECOND)
+    plucked_again(mixer, Track(RATE_HZ, SECOND, ("model", "truth")))
+    assert not mixer.steady(1)
+    mixer.stop()
+    assert mixer.steady(SECOND)
+
+
 # No clicks
 
 
@@ -408,9 +452,9 @@ def test_what_is_not_finite_never_leaves(value: float, monkeypatch: pytest.Monke
 def test_the_meter_shows_the_peak_and_falls() -> None:
     mixer = playing(make_track(0.5, peak=0.5))
     assert mixer.status().peak_db == -120
-    mono(mixer, SECOND // 2)
+    mono(mixer, SECOND // 2 - frames(DECLICK_S))
     assert mixer.status().peak_db == pytest.approx(20 * np.log10(0.5), abs=0.1)
-    mono(mixer, SECOND)
+    mono(mixer, SECOND + frames(DECLICK_S))
     assert mixer.status().peak_db == pytest.approx(20 * np.log10(0.5) - 20, abs=0.2)
 
 
@@ -595,3 +639,15 @@ def test_levels_are_matched_and_gains_stated() -> None:
     parts.append(mono(mixer, frames(0.2)))
     np.testing.assert_allclose(parts[2][-100:], track.read("truth", 38_500, 38_600), atol=1e-6)
     assert click_db(np.concatenate(parts)) < -90
+
+
+def test_a_reduction_anywhere_in_a_block_is_told() -> None:
+    track = Track(RATE_HZ, SECOND, ("model", "truth"))
+    samples = np.zeros(SECOND)
+    samples[frames(ATTACK_S) + 10] = 3.0  # by the end of the block the limiter has let go of all of it
+    track.append({"model": samples, "truth": samples})
+    mixer = playing(track)
+    mono(mixer, frames(0.3))
+    assert mixer.status().gain_reduction_db == pytest.approx(20 * np.log10(3.0) + 0.3, abs=0.01)
+    mono(mixer, frames(0.3))
+    assert not mixer.status().limiting

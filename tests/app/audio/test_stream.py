@@ -9,7 +9,7 @@ import pytest
 
 from app.audio import AudioDevice, AudioUnavailable, ProblemKind
 from app.audio import stream as stream_module
-from app.audio.stream import BLOCK_FRAMES, OutputStream
+from app.audio.stream import AHEAD_S, BLOCK_FRAMES, OutputStream
 
 
 @pytest.fixture
@@ -54,8 +54,46 @@ def test_blocks_come_out_in_order_and_whole(stream: OutputStream, raw_streams: l
 
 def test_the_queue_is_bounded(stream: OutputStream) -> None:
     assert stream.frames_queued <= 0.03 * stream.rate_hz
+    while stream._free:
+        stream.write(block(0))
+    assert stream.frames_queued <= 0.03 * stream.rate_hz + (AHEAD_S + 0.02) * stream.rate_hz
     with pytest.raises(RuntimeError, match="queue is full"):
         stream.write(block(1))
+
+
+def test_it_goes_ahead_at_twice_the_pace_and_a_command_takes_that_back(
+    stream: OutputStream, raw_streams: list
+) -> None:
+    (raw,) = raw_streams
+    prompt = stream.queued_blocks
+    assert not stream.wait_for_space(0, ahead=True), "only what is played opens room"
+    for played in range(1, 11):
+        raw.tick()
+        for value in (played, -played):
+            assert stream.wait_for_space(0, ahead=True)
+            stream.write(block(value))
+        assert not stream.wait_for_space(0, ahead=True)
+        assert stream.queued_blocks == prompt + played
+    assert not stream.wait_for_space(0)
+    queued = stream.frames_queued
+    assert stream.take_back() == 11
+    assert stream.frames_queued == queued - 11 * BLOCK_FRAMES
+    assert stream.wait_for_space(0)
+    stream.write(block(100))
+    assert not stream.wait_for_space(0, ahead=True), "it catches up anew"
+    heard = [raw.tick()[0, 0] for _ in range(prompt)]
+    assert heard[-1] == 100
+    assert 100 not in heard[:-1]
+    assert stream.underruns == 0
+
+
+def test_going_ahead_has_an_end(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    for _ in range(200):
+        raw.tick()
+        while stream.wait_for_space(0, ahead=True):
+            stream.write(block(0))
+    assert AHEAD_S <= stream.queued_blocks * BLOCK_FRAMES / stream.rate_hz < AHEAD_S + 0.04
 
 
 def test_an_empty_queue_gives_zeros_and_counts(stream: OutputStream, raw_streams: list) -> None:

@@ -21,3 +21,13 @@ def test_the_position_is_never_negative(frame: int) -> None:
     timeline = Timeline(0)
     timeline.note(64, 20, moving=True)
     assert timeline.position_at(frame) == 0
+
+
+def test_blocks_that_are_taken_back_were_never_heard() -> None:
+    timeline = Timeline(0)
+    timeline.note(100, 100, moving=True)
+    timeline.note(200, 200, moving=True)
+    timeline.note(300, 300, moving=True)
+    timeline.take_back(100)
+    timeline.note(200, 5100, moving=True)  # a jump to 5000 instead
+    assert [timeline.position_at(frame) for frame in (50, 101, 200, 300)] == [50, 5001, 5100, 5100]
