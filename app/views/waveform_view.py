@@ -14,17 +14,19 @@ from app.views.legend import Legend
 from app.views.time_plot import TimePlot
 
 
-def extremes(signal: NDArray[np.float32], columns: int) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """An upright stroke a column, from lowest to highest: (places in samples, values), pairs of ends.
+def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64]) -> NDArray[np.float32]:
+    """An upright stroke for each column of frames, from its lowest to its highest value, as pairs of ends.
 
     Each reaches as far as the next one's first sample, so that a steep flank has no gaps.
+
+    Args:
+        edges: Rising, one more than there are columns: where each begins, and where the last ends.
     """
-    edges = np.linspace(0, len(signal), columns, endpoint=False).astype(int)
-    meets = np.append(signal[edges[1:]], signal[-1])
-    values = np.empty(2 * columns, np.float32)
-    values[0::2] = np.minimum(np.minimum.reduceat(signal, edges), meets)
-    values[1::2] = np.maximum(np.maximum.reduceat(signal, edges), meets)
-    return np.repeat(edges.astype(np.float64), 2), values
+    starts, meets = edges[:-1], signal[np.minimum(edges[1:], len(signal) - 1)]
+    values = np.empty(2 * len(starts), np.float32)
+    values[0::2] = np.minimum(np.minimum.reduceat(signal[: edges[-1]], starts), meets)
+    values[1::2] = np.maximum(np.maximum.reduceat(signal[: edges[-1]], starts), meets)
+    return values
 
 
 class WaveformView(TimePlot):
@@ -71,21 +73,21 @@ class WaveformView(TimePlot):
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
         """What there is so far, from time 0, in the unit of the axis. What lies in view is drawn at full detail."""
         low_s, high_s = self.times_s
-        first = min(max(int(low_s * rate_hz), 0), len(signal))
-        last = min(max(int(high_s * rate_hz) + 2, first), len(signal))
-        in_view, columns = signal[first:last], round(self.columns * (last - first) / rate_hz / (high_s - low_s))
-        # A smoothed line that goes to and fro within a pixel takes ten times as long as strokes of whole pixels,
-        # and nothing else in this process runs meanwhile, not even what feeds the loudspeaker.
-        if len(in_view) > columns > 0:
-            places, values = extremes(in_view, columns)
-            dense = {"connect": "pairs", "antialias": False}
-        elif len(in_view):
-            places, values = np.arange(len(in_view), dtype=np.float64), in_view
-            dense = {"connect": "all", "antialias": True}
+        # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and
+        # nothing else in this process runs meanwhile, not even what feeds the loudspeaker.
+        if (high_s - low_s) * rate_hz > self.columns:
+            borders_s = np.linspace(low_s, high_s, self.columns + 1)
+            edges = np.ceil(borders_s * rate_hz).astype(np.int64).clip(0, len(signal))
+            there = np.flatnonzero(edges[1:] > edges[:-1])
+            middles_s = (borders_s[there] + borders_s[there + 1]) / 2
+            values = extremes(signal, edges[there[0] : there[-1] + 2]) if len(there) else signal[:0]
+            self._curves[source].setData(np.repeat(middles_s, 2), values, connect="pairs", antialias=False)
         else:
-            self.clear_signal(source)
-            return
-        self._curves[source].setData((places + first) / rate_hz, values, **dense)
+            first = min(max(int(low_s * rate_hz), 0), len(signal))
+            last = min(max(int(high_s * rate_hz) + 2, first), len(signal))
+            self._curves[source].setData(
+                np.arange(first, last) / rate_hz, signal[first:last], connect="all", antialias=True
+            )
 
     def clear_signal(self, source: str) -> None:
         self._curves[source].setData([], [])

@@ -31,17 +31,18 @@ def test_silence_lies_on_the_floor() -> None:
 def test_extremes_keep_every_peak() -> None:
     signal = np.zeros(100_000, np.float32)
     signal[12_345], signal[67_890] = 1, -1
-    places, values = extremes(signal, 1000)
-    assert len(places) == len(values) == 2000
-    assert (values.max(), values.min()) == (1, -1)
-    assert abs(places[values.argmax()] - 12_345) < 100
+    values = extremes(signal, np.linspace(0, 100_000, 1001).astype(int))
+    assert len(values) == 2000
+    assert (values[2 * 123 + 1], values[2 * 678]) == (1, -1)
+    assert np.count_nonzero(values) == 2
 
 
 def test_strokes_of_a_steep_flank_have_no_gaps_between_them() -> None:
-    _, values = extremes(np.linspace(0, 1, 10_000, dtype=np.float32), 100)
+    values = extremes(np.linspace(0, 1, 10_000, dtype=np.float32), np.linspace(0, 10_000, 101).astype(int))
     lowest, highest = values[0::2], values[1::2]
     assert (highest[:-1] >= lowest[1:]).all()
     assert (lowest[:-1] < highest[:-1]).all()
+    assert highest[-1] == 1
 
 
 def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_where_it_has_few(
@@ -58,7 +59,10 @@ def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_
     assert len(curve.getData()[0]) == 2 * view.columns
     assert (curve.opts["connect"], curve.opts["antialias"]) == ("pairs", False)
     view.show_signal("model", signal[:24_000], 48_000)  # rendered half-way: half of the columns
-    assert len(curve.getData()[0]) == pytest.approx(view.columns, abs=2)
+    time_s = curve.getData()[0]
+    assert len(time_s) == pytest.approx(view.columns, abs=2)
+    pixels = np.diff(time_s[0::2]) * view.columns
+    assert pixels == pytest.approx(1), "no stroke beside the next pixel"
     view.getPlotItem().setXRange(0.1, 0.102, padding=0)
     view.show_signal("model", signal, 48_000)
     assert (curve.opts["connect"], curve.opts["antialias"]) == ("all", True)
