@@ -68,7 +68,7 @@ class WaveformPanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._take, self._drawn, self._shown, self._full = take, {}, (), 0.0  # holds nothing of the last take
-        self.view.set_take(take.seconds, take.info.horizon_s)
+        self.view.set_take(take.seconds, take.info.horizon_s, 1 / take.fundamental_hz)
 
     def show_moment(self, moment: Moment) -> None:
         self.view.show_playhead(moment.position_s)

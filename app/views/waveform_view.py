@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
@@ -13,20 +15,32 @@ from app.views.curves import set_curves
 from app.views.legend import Legend
 from app.views.time_plot import TimePlot
 
+FEW_PIXELS = 4
 
-def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64]) -> NDArray[np.float32]:
+
+def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64], around: int = 1) -> NDArray[np.float32]:
     """An upright stroke for each column of frames, from its lowest to its highest value, as pairs of ends.
 
     Each reaches as far as the next one's first sample, so that a steep flank has no gaps.
 
     Args:
         edges: Rising, one more than there are columns: where each begins, and where the last ends.
+        around: Of how many columns, it among them, a stroke has the extremes.
     """
     starts, meets = edges[:-1], signal[np.minimum(edges[1:], len(signal) - 1)]
     values = np.empty(2 * len(starts), np.float32)
-    values[0::2] = np.minimum(np.minimum.reduceat(signal[: edges[-1]], starts), meets)
-    values[1::2] = np.maximum(np.maximum.reduceat(signal[: edges[-1]], starts), meets)
+    lowest = np.minimum(np.minimum.reduceat(signal[: edges[-1]], starts), meets)
+    highest = np.maximum(np.maximum.reduceat(signal[: edges[-1]], starts), meets)
+    values[0::2] = _neighbours(lowest, around).min(axis=-1)
+    values[1::2] = _neighbours(highest, around).max(axis=-1)
     return values
+
+
+def _neighbours(values: NDArray[np.float32], around: int) -> NDArray[np.float32]:
+    """Shape (values, around): each with those about it."""
+    before = (around - 1) // 2
+    padded = np.pad(values, (before, around - 1 - before), mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(padded, around)
 
 
 class WaveformView(TimePlot):
@@ -44,13 +58,15 @@ class WaveformView(TimePlot):
         item.getAxis("left").enableAutoSIPrefix(False)
         self._horizon.label.setPosition(0.1)  # the legend has the upper edge
         self._label = UprightLabel(item)
+        self._period_s = 0.0
         self._curves: dict[str, pg.PlotDataItem] = {}
         self.legend = Legend(self)
         self.set_sources(DEFAULT_SOURCES)
         self.set_scale(5.0, "displacement", "mm")
 
-    def set_take(self, seconds: float, horizon_s: float) -> None:
-        """A time axis for a take of `seconds` of a model that was trained for `horizon_s`."""
+    def set_take(self, seconds: float, horizon_s: float, period_s: float = 0.0) -> None:
+        """A time axis for a take of `seconds` of a model that was trained for `horizon_s`, of a string's period."""
+        self._period_s = period_s
         self.set_times(seconds, horizon_s)
         for source in self._curves:
             self.clear_signal(source)
@@ -80,7 +96,10 @@ class WaveformView(TimePlot):
             edges = np.ceil(borders_s * rate_hz).astype(np.int64).clip(0, len(signal))
             there = np.flatnonzero(edges[1:] > edges[:-1])
             middles_s = (borders_s[there] + borders_s[there + 1]) / 2
-            values = extremes(signal, edges[there[0] : there[-1] + 2]) if len(there) else signal[:0]
+            # Where a period has but a few pixels, each is given all of it: halves of periods would beat with them.
+            pixels = self._period_s * self.columns / (high_s - low_s)
+            around = math.ceil(pixels) if 0 < pixels < FEW_PIXELS else 1
+            values = extremes(signal, edges[there[0] : there[-1] + 2], around) if len(there) else signal[:0]
             self._curves[source].setData(np.repeat(middles_s, 2), values, connect="pairs", antialias=False)
         else:
             first = min(max(int(low_s * rate_hz), 0), len(signal))

@@ -45,6 +45,19 @@ def test_strokes_of_a_steep_flank_have_no_gaps_between_them() -> None:
     assert highest[-1] == 1
 
 
+def test_a_period_of_a_few_pixels_does_not_beat_with_them(qtbot: QtBot) -> None:
+    view = WaveformView()
+    qtbot.addWidget(view)
+    view.resize(600, 240)
+    view.show()
+    period_s = 2.1 / view.columns
+    view.set_take(1.0, 0.25, period_s)
+    view.show_signal("model", np.sin(np.arange(48_000) / (48_000 * period_s) * 2 * np.pi).astype(np.float32), 48_000)
+    values = view._curves["model"].getData()[1]
+    assert values[2:-2:2] == pytest.approx(-1, abs=0.01)
+    assert values[3:-2:2] == pytest.approx(1, abs=0.01)
+
+
 def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_where_it_has_few(
     qtbot: QtBot,
 ) -> None:
