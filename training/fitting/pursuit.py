@@ -73,7 +73,8 @@ class LatentFit:
     def polish(self, model: StringModel, recipe: Recipe) -> Tensor:
         """POLISH_ITERATIONS of L-BFGS on all trajectories at once; the mean square of the prediction's error before.
 
-        It knows nothing of the iterations before it, so that a run can be cut between any two calls.
+        It knows nothing of the iterations before it, so that a run can be cut between any two calls. The recipe's
+        weight_decay is a penalty here, on the squares of the weights.
         """
         assert isinstance(model, Koopman)
         initial, targets = self.initial, self.targets
@@ -81,6 +82,7 @@ class LatentFit:
             initial = torch.cat([initial, initial.flip(1)])
             targets = torch.cat([targets, targets * self.mirror])
             initial, targets = torch.cat([initial, -initial]), torch.cat([targets, -targets])
+        weights = [weight for weight in model.encoder.parameters() if weight.ndim > 1]
         optimiser = torch.optim.LBFGS(
             model.encoder.parameters(),
             max_iter=POLISH_ITERATIONS,
@@ -93,10 +95,15 @@ class LatentFit:
         def closure() -> Tensor:
             optimiser.zero_grad()
             error = (model.encoder(initial) - targets).square().mean()
-            error.backward()
-            return error
+            size = sum((weight.square().sum() for weight in weights), start=error.new_zeros(()))
+            loss = error + recipe.weight_decay / 2 * size
+            loss.backward()
+            errors.append(error.detach())
+            return loss
 
-        return self._of_prediction(optimiser.step(closure))
+        errors: list[Tensor] = []
+        optimiser.step(closure)
+        return self._of_prediction(errors[0])
 
     def _of_prediction(self, error: Tensor) -> Tensor:
         """From the coordinates' mean square error: a mode's over the string is half its amplitude's."""
