@@ -2,17 +2,20 @@
 
 Everything happens as by a user's hands, through session and controller, with a pretended device that asks for sound
 at its pace. What is random follows from the seed; how far the rendering of each pluck gets depends on the machine.
+
+After each minute the user rests on the same short pluck, and the process is weighed: in between, takes of up to
+hundreds of MiB come and go with what is chosen.
 """
 
 from __future__ import annotations
 
-import statistics
+import gc
 import sys
 import threading
 import time
 import traceback
 import warnings
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,6 +30,7 @@ from app.bench.pretended_device import PretendedCard
 from app.bench.random_changes import Repertoire, random_change
 from app.bench.stage import Stage, opened
 from app.panels.rack import LEFT, RIGHT
+from app.session import Choices
 from app.settings import Settings
 
 BLOCK_FRAMES = 512
@@ -34,8 +38,9 @@ SIZE = (1280, 800)
 EVERY_S = 0.5
 LOOK_EVERY_S = 0.02
 WEIGH_EVERY_S = 1.0
-MEDIAN_S = 30.0
-SETTLED_AFTER_S = 60.0  # by then every kind of thing was loaded once, and caches are full
+PART_S = 60.0  # between two rests; in the first, every kind of thing is loaded once, and caches are filled
+REST_S = 1.5  # in which the views finish
+REST_PLUCK_S = 1.0
 MOST_CHANGES = 3  # before a pluck
 MIB = 2**20
 
@@ -49,9 +54,8 @@ class Soak:
         late_callbacks: the device itself was held up by more than a block: not seen as underruns.
         waited_share: of the time in which rendering lagged behind what was to be heard.
         longest_stall_s: for which the window did nothing.
-        settled_mib, end_mib, drift_mib: resident memory after the first minute (or half of a shorter time) and at
-            the end, and how far it rose above the former meanwhile: without the take on stage, which may have more
-            than a hundred MiB or nearly none, and as medians of `MEDIAN_S`, for the last one goes a little later.
+        settled_mib, end_mib: resident memory at the first rest and at the last.
+        drift_mib: how far it was above the first at any other.
         peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
         faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
@@ -86,8 +90,13 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         user = _User(stage, Random(seed))
         watch = _Watch(stage, seconds, report)
         underruns, late = _underruns(card)
-        stage.run_for(seconds)
-        user.stop()
+        parts = max(2, round(seconds / PART_S))
+        at_rest_mib = []
+        for _ in range(parts):
+            user.go_on()
+            stage.run_for(seconds / parts)
+            user.stop()
+            at_rest_mib.append(_weighed_at_rest(stage))
         watch.stop()
         underruns_after, late_after = _underruns(card)
         notices, platform = stage.window.notices.notices, stage.platform
@@ -104,9 +113,9 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         late_after - late,
         watch.waiting / max(1, watch.looks),
         watch.longest_stall_s,
-        watch.settled_mib,
-        watch.typical_mib,
-        watch.highest_mib - watch.settled_mib,
+        at_rest_mib[0],
+        at_rest_mib[-1],
+        max(at_rest_mib) - at_rest_mib[0],
         watch.peak_mib,
         tuple(sorted(left)),
         tuple(faults.items()),
@@ -129,6 +138,8 @@ class _User(QObject):
         )
         self._timer = QTimer(self, interval=round(1000 * EVERY_S))
         self._timer.timeout.connect(self._act)
+
+    def go_on(self) -> None:
         self._timer.start()
 
     def stop(self) -> None:
@@ -156,10 +167,8 @@ class _Watch(QObject):
         super().__init__(stage.window)
         self.looks = self.waiting = 0
         self.longest_stall_s = 0.0
-        self.settled_mib = self.highest_mib = self.typical_mib = self.latest_mib = self.peak_mib = _resident_mib()
-        self._weights_mib: deque[tuple[float, float]] = deque()  # when and how much, of the last `MEDIAN_S`
+        self.peak_mib = 0.0
         self._stage, self._seconds, self._report = stage, seconds, report
-        self._settled_after_s = min(SETTLED_AFTER_S, seconds / 2)
         self._begun_s = self._looked_s = self._weighed_s = time.monotonic()
         self._timer = QTimer(self, interval=round(1000 * LOOK_EVERY_S))
         self._timer.timeout.connect(self._look)
@@ -167,7 +176,6 @@ class _Watch(QObject):
 
     def stop(self) -> None:
         self._timer.stop()
-        self._weigh(time.monotonic())
 
     def _look(self) -> None:
         now_s = time.monotonic()
@@ -176,21 +184,28 @@ class _Watch(QObject):
         self.looks += 1
         self.waiting += self._stage.controller.player.status().waiting
         if now_s - self._weighed_s >= min(WEIGH_EVERY_S, self._seconds / 10):
-            self._weigh(now_s)
-            self._report((now_s - self._begun_s) / self._seconds, f"{self.latest_mib:.0f} MiB")
+            self._weighed_s, weight_mib = now_s, _resident_mib()
+            self.peak_mib = max(self.peak_mib, weight_mib)
+            share = min(1.0, (now_s - self._begun_s) / self._seconds)
+            self._report(share, f"{weight_mib:.0f} MiB")
 
-    def _weigh(self, now_s: float) -> None:
-        self._weighed_s = now_s
-        self.latest_mib = _resident_mib()
-        self.peak_mib = max(self.peak_mib, self.latest_mib)
-        take = self._stage.controller.performance.take
-        self._weights_mib.append((now_s, self.latest_mib - (0 if take is None else take.ready_bytes / MIB)))
-        while self._weights_mib[0][0] < now_s - min(MEDIAN_S, self._settled_after_s / 2):
-            self._weights_mib.popleft()
-        self.typical_mib = statistics.median(mib for _, mib in self._weights_mib)
-        if now_s - self._begun_s <= self._settled_after_s:
-            self.settled_mib = self.highest_mib = self.typical_mib
-        self.highest_mib = max(self.highest_mib, self.typical_mib)
+
+def _weighed_at_rest(stage: Stage) -> float:
+    """Resident memory in MiB with one short pluck on stage, always the same; the user's choices come back."""
+    session = stage.controller.session
+    before = session.choices
+    rest = Choices(preset=stage.controller.library.entries[0].name, seconds=REST_PLUCK_S)
+    stage.controller.player.stop()
+    stage.window.error_label.clear()
+    session.update(**rest.model_dump())
+    stage.controller.pluck()
+    stage.wait_until_rendered()
+    stage.controller.player.stop()
+    stage.run_for(REST_S)
+    gc.collect()
+    weight_mib = _resident_mib()
+    session.update(**before.model_dump())
+    return weight_mib
 
 
 @contextmanager
