@@ -9,6 +9,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Signal
 
 from app.export import ExportCancelled, ExportError
+from app.precedence import Rank, step_back
 from app.recipe import RecipeError
 from engine.preset import PresetError
 from engine.sources import Runaway
@@ -53,6 +54,7 @@ class ExportJob(QObject):
         self.progressed.emit(share, text, left_s)
 
     def _run(self) -> None:
+        step_back(Rank.BACKGROUND)
         try:
             result = self._work(self._tell, self._stop.is_set)
         except ExportCancelled:

@@ -22,6 +22,7 @@ import torch
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from app.analysis.job import Cancelled, Job
+from app.precedence import Rank, step_back
 from app.rendering import Take
 from engine.preset import PresetError
 
@@ -143,6 +144,7 @@ class Background(QObject):
             self._said.emit(number, "progressed", (share, so_far))
 
     def _run(self) -> None:
+        step_back(Rank.BACKGROUND)
         while True:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._task is not None or self._closing)

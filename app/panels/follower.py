@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable
 
 from app.analysis.growing import Growing
+from app.precedence import Rank, step_back
 
 LOOK_AGAIN_S = 0.03  # while the take has nothing new
 
@@ -39,6 +40,7 @@ class Follower:
         self._thread.join(10)
 
     def _run(self) -> None:
+        step_back(Rank.BACKGROUND)
         while True:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._work is not None or self._closing)

@@ -13,6 +13,7 @@ import traceback
 from dataclasses import replace
 from pathlib import Path
 
+from app.precedence import Rank, step_back
 from app.rendering.job import Job
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
@@ -61,6 +62,7 @@ class RenderWorker:
     # All below runs in the worker's thread.
 
     def _run(self) -> None:
+        step_back(Rank.RENDERING)
         while True:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._waiting or self._closing or self._most_urgent() is not None)
