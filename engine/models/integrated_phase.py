@@ -192,9 +192,9 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
         self.energy_units: Tensor | None
         self.rate_units: Tensor | None
-        ones = torch.ones(n, dtype=torch.float64)
-        self.register_buffer("energy_units", ones if c.physical_units else None)  # 1/(normalised displacement)²
-        self.register_buffer("rate_units", c.rate_unit * ones if c.physical_units else None)  # 1/samples
+        units = [torch.full((n,), unit, dtype=torch.float64) for unit in (1.0, c.rate_unit)]
+        self.register_buffer("energy_units", units[0] if c.physical_units else None)  # 1/(normalised displacement)²
+        self.register_buffer("rate_units", units[1] if c.physical_units else None)  # 1/samples
         self.g = _mlp(n, c.eigenvalue_widths, 2 * n, last_bias=False)  # g(0) is subtracted: it would cancel
         self.multiplier = _mlp(n, c.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, c.grid_points)

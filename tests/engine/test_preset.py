@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -169,6 +171,18 @@ def test_shipped_presets_load_and_are_better_than_the_paper() -> None:
             found[info.rate_hz] = info.rel_mae
     for rate_hz, bar in bars.items():
         assert found[rate_hz] <= bar
+
+
+def test_loading_presets_does_not_load_torchs_compiler() -> None:
+    """It takes a second and more, and whoever starts the app would wait for it; an operation on a meta tensor may."""
+    script = (
+        "import sys; from engine.preset import load_preset, preset_files;"
+        "[load_preset(path) for path in preset_files()]; print(len(preset_files()), 'torch._dynamo' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    count, loaded = done.stdout.split()
+    assert int(count) > 0
+    assert loaded == "False"
 
 
 def test_plucks_outside_training_are_told(preset_file: Path) -> None:
