@@ -54,7 +54,8 @@ class Soak:
         late_callbacks: the device itself was held up by more than a block: not seen as underruns.
         waited_share: of the time in which rendering lagged behind what was to be heard.
         longest_stall_s: for which the window did nothing.
-        settled_mib, end_mib: resident memory at the first rest and at the last.
+        at_rest_mib: resident memory at each rest.
+        settled_mib, end_mib: at the first and at the last.
         drift_mib: how far it was above the first at any other.
         peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
@@ -73,6 +74,7 @@ class Soak:
     late_callbacks: int
     waited_share: float
     longest_stall_s: float
+    at_rest_mib: tuple[float, ...]
     settled_mib: float
     end_mib: float
     drift_mib: float
@@ -113,6 +115,7 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         late_after - late,
         watch.waiting / max(1, watch.looks),
         watch.longest_stall_s,
+        tuple(at_rest_mib),
         at_rest_mib[0],
         at_rest_mib[-1],
         max(at_rest_mib) - at_rest_mib[0],

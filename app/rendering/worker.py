@@ -13,6 +13,7 @@ import traceback
 from dataclasses import replace
 from pathlib import Path
 
+from app.memory import return_free_pages
 from app.precedence import Rank, step_back
 from app.rendering.job import Job
 from app.rendering.loaded import Loaded
@@ -20,6 +21,7 @@ from app.rendering.request import RenderListener, RenderRequest
 from engine.preset import PresetError, load_preset
 
 KEPT_PRESETS = 4  # loaded ones, the latest used
+TIDY_AFTER_S = 1.0  # without anything to render
 
 
 class RenderWorker:
@@ -33,6 +35,7 @@ class RenderWorker:
         self._stage: Job | None = None  # the latest; keeps its motion when it is done
         self._tails: list[Job] = []  # struck earlier, and not rendered to their ends
         self._presets: dict[Path, Loaded] = {}
+        self._untidy = False  # something was rendered since free memory was given back
         self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
         self._thread.start()
 
@@ -65,7 +68,10 @@ class RenderWorker:
         step_back(Rank.RENDERING)
         while True:
             with self._mailbox:
-                self._mailbox.wait_for(lambda: self._waiting or self._closing or self._most_urgent() is not None)
+                called = self._mailbox.wait_for(
+                    lambda: bool(self._waiting) or self._closing or self._most_urgent() is not None,
+                    TIDY_AFTER_S if self._untidy else None,
+                )
                 if self._closing:
                     self._stage, self._tails = None, []
                     return
@@ -73,6 +79,9 @@ class RenderWorker:
             job = self._most_urgent()
             if job is not None:
                 self._advance(job)
+            if not called:
+                return_free_pages()
+            self._untidy = called
 
     def _take_request(self) -> None:
         stage = self._stage

@@ -39,3 +39,36 @@ def test_large_blocks_are_returned() -> None:
     most_mib, left_mib = map(int, told.split())
     assert most_mib > 48
     assert left_mib < 8
+
+
+SMALL_BLOCKS = """
+import threading
+import numpy as np
+import psutil
+from app.memory import return_free_pages, return_large_blocks
+
+return_large_blocks()
+process = psutil.Process()
+
+def work():
+    before.append(process.memory_info().rss)
+    blocks = [np.ones(2**15) for _ in range(256)]  # of 256 KiB
+    pinned.extend(np.ones(2**10) for _ in range(8))
+    del blocks
+
+before, pinned = [], []
+thread = threading.Thread(target=work)
+thread.start()
+thread.join()
+kept = process.memory_info().rss
+return_free_pages()
+print((kept - before[0]) // 2**20, (process.memory_info().rss - before[0]) // 2**20)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's heap")
+def test_free_pages_of_a_threads_heap_are_returned() -> None:
+    told = subprocess.run([sys.executable, "-c", SMALL_BLOCKS], capture_output=True, text=True, check=True).stdout
+    kept_mib, left_mib = map(int, told.split())
+    assert kept_mib > 32
+    assert left_mib < 8

@@ -16,6 +16,7 @@ import torch
 from app.audio import Track
 from app.export import SoundRequest, render_sound
 from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering import worker as worker_module
 from app.rendering.velocity import Differentiator
 from app.sound_names import FULL_SCALE_M_S
 from engine.metrics import ErrorSums
@@ -128,6 +129,21 @@ def test_another_listening_point_while_rendering(small_preset: Path, worker: Ren
     wait_until(lambda: bool(heard.finished))
     assert heard.replaced[0][1].complete
     assert heard.finished[0][0] is heard.replaced[0][0]
+
+
+def test_when_all_is_rendered_free_memory_is_given_back_once(
+    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+    monkeypatch.setattr(worker_module, "return_free_pages", lambda: calls.append("returned"))
+    monkeypatch.setattr(worker_module, "TIDY_AFTER_S", 0.05)
+    time.sleep(0.2)
+    assert calls == [], "nothing was rendered yet"
+    worker.submit(request_of(small_preset))
+    wait_until(lambda: calls != [])
+    assert heard.finished
+    time.sleep(0.2)
+    assert calls == ["returned"]
 
 
 def test_a_broken_preset_is_told_and_the_worker_lives_on(
