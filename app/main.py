@@ -73,6 +73,7 @@ class _Start(QObject):
 
 def load_engine() -> None:
     """What the window does not need in order to be seen: two seconds and more, most of it for torch."""
+    import scipy.fft  # noqa: F401  the spectrum's; here it is loaded beside the window
     import torch
     from threadpoolctl import threadpool_limits
 

@@ -97,19 +97,17 @@ class OutputStream:
         return len(self._ready)
 
     def wait_for_space(self, timeout_s: float, ahead: bool = False) -> bool:
-        """Waits until a block can be written.
+        """Waits for the device to take a block, if there is no space; returns whether one can be written.
 
         Args:
             ahead: Up to `AHEAD_S` beyond what is always kept ready. That room opens with every block that is
                 played since `take_back`, so that the feeder catches up at twice the pace of the sound and a
                 knob that is turned costs little.
         """
-        while not self._has_space(ahead):
-            try:
+        if not self._has_space(ahead):
+            with contextlib.suppress(Empty):
                 self._taken.get(timeout=timeout_s)
-            except Empty:
-                return False
-        return True
+        return self._has_space(ahead)
 
     def write(self, block: NDArray[np.float32]) -> None:
         """Queues one block, shape (block_frames, 2), after `wait_for_space` has returned True."""

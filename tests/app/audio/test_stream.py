@@ -87,6 +87,21 @@ def test_it_goes_ahead_at_twice_the_pace_and_a_command_takes_that_back(
     assert stream.underruns == 0
 
 
+def test_waiting_for_a_deep_queue_to_drain_ends_with_each_block(stream: OutputStream, raw_streams: list) -> None:
+    """Its caller has commands to look after: a queue that may go no further ahead holds it up no longer."""
+    (raw,) = raw_streams
+    for _ in range(20):
+        raw.tick()
+        while stream.wait_for_space(0, ahead=True):
+            stream.write(block(0))
+    raw.tick()
+    raw.tick()
+    began_s = time.monotonic()
+    assert not stream.wait_for_space(5.0)
+    assert not stream.wait_for_space(5.0)
+    assert time.monotonic() - began_s < 1.0
+
+
 def test_going_ahead_has_an_end(stream: OutputStream, raw_streams: list) -> None:
     (raw,) = raw_streams
     for _ in range(200):
