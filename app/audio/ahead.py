@@ -6,6 +6,9 @@ import copy
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.audio.mixer import Mixer, MixerStatus
 from app.audio.tone import Tone
 
@@ -21,6 +24,19 @@ class Moment:
     def of(cls, mixer: Mixer, tone: Tone | None) -> Moment:
         return cls(mixer.copied(), copy.copy(tone))
 
+    def again(self) -> tuple[Mixer, Tone | None]:
+        """A mixer and a tone to go on with from here; the moment stays."""
+        return self.mixer.copied(), copy.copy(self.tone)
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """A block, what was before it, and the status after it."""
+
+    before: Moment
+    block: NDArray[np.float32]
+    after: MixerStatus
+
 
 class Ahead:
     """Moments and the status after them, one of each for a block in the queue."""
@@ -28,20 +44,21 @@ class Ahead:
     def __init__(self) -> None:
         self._blocks: deque[tuple[Moment, MixerStatus]] = deque()
 
-    def note(self, before: Moment, after: MixerStatus) -> None:
-        """The latest block: what was before it, and what is after it."""
-        self._blocks.append((before, after))
+    def note(self, mixed: Mixed) -> None:
+        """The latest block in the queue."""
+        self._blocks.append((mixed.before, mixed.after))
 
     def forget_played(self, queued_blocks: int) -> None:
         while len(self._blocks) > queued_blocks:
             self._blocks.popleft()
 
-    def go_back(self, blocks: int) -> Moment | None:
-        """The moment before the last so many, which are forgotten; None where they are none of ours."""
-        moment = None
+    def moment_before(self, blocks: int) -> Moment | None:
+        """What was before the last so many; None where they are none, or not all of them ours."""
+        return self._blocks[-blocks][0] if 0 < blocks <= len(self._blocks) else None
+
+    def forget_last(self, blocks: int) -> None:
         for _ in range(min(blocks, len(self._blocks))):
-            moment, _ = self._blocks.pop()
-        return moment
+            self._blocks.pop()
 
     def status_in(self, blocks: int) -> MixerStatus | None:
         """After the block that is `blocks` from the loudspeaker, or the last before it."""

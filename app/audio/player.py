@@ -5,7 +5,7 @@
 
 Only the feeder touches the mixer and the output. Public methods put a command into its queue and return at
 once; it obeys them right before it renders a block. It mixes further ahead than a command may wait, so for one
-it first goes back to the earliest block that can still be another.
+it goes back to the earliest block that can still be another, and replaces what it had mixed from there on.
 """
 
 from __future__ import annotations
@@ -15,14 +15,16 @@ import math
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import groupby
 from queue import Empty, SimpleQueue
 from types import TracebackType
+from typing import NamedTuple
 
 import numpy as np
 
-from app.audio.ahead import Ahead, Moment
+from app.audio.ahead import Ahead, Mixed, Moment
 from app.audio.devices import AudioDevice
 from app.audio.levels import Levels
 from app.audio.mixer import Mixer
@@ -40,6 +42,13 @@ TRY_AGAIN_S = 2.0  # between two looks for a device that vanished
 
 _WAIT_S = 0.05  # the longest time that the feeder looks at neither its commands nor the device's pulse
 _JOIN_TIMEOUT_S = 5.0
+
+
+class _Command(NamedTuple):
+    """What the feeder is to do; unless it is `of_output`, it changes mixer and tone alone, and may be done again."""
+
+    obey: Callable[[], None]
+    of_output: bool
 
 
 class Player:
@@ -77,7 +86,7 @@ class Player:
         self._lost: AudioDevice | None = None  # vanished while it was ours: tried again now and then
         self._try_again_s = 0.0
         self._stalled = False  # and told
-        self._commands: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._commands: SimpleQueue[_Command] = SimpleQueue()
         self._over = False  # nobody obeys any more
         self._closing = threading.Event()
         self._status = PlayerStatus(rate_hz=rate_hz)
@@ -104,7 +113,7 @@ class Player:
             rescan: Looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
         wanted = Wanted(device, buffer_s, rate_hz, buffer_frames)
-        self._send(lambda: self._change_output(wanted, rescan))
+        self._send(lambda: self._change_output(wanted, rescan), of_output=True)
 
     def sound_tone(self, side: Side) -> None:
         """A soft tone for a second on one side, whatever else is playing."""
@@ -168,9 +177,9 @@ class Player:
         if threading.current_thread() is not self._feeder:
             self._feeder.join(_JOIN_TIMEOUT_S)
 
-    def _send(self, command: Callable[[], None]) -> None:
+    def _send(self, obey: Callable[[], None], of_output: bool = False) -> None:
         if not self._over:
-            self._commands.put(command)
+            self._commands.put(_Command(obey, of_output))
 
     def __enter__(self) -> Player:
         return self
@@ -209,22 +218,45 @@ class Player:
         finally:
             self._over = True
             self._output.close()
-            with contextlib.suppress(Empty):
-                while True:  # they may hold tracks
-                    self._commands.get_nowait()
+            _emptied(self._commands)  # they may hold tracks
 
     def _wait_for_space(self, timeout_s: float) -> bool:
         return self._output.wait_for_space(timeout_s, self._mixer.steady(self._output.block_frames))
 
     def _obey_commands(self) -> None:
-        if not self._commands.empty():
-            self._rewind()
+        for of_output, commands in groupby(_emptied(self._commands), lambda command: command.of_output):
+            if of_output:
+                for command in commands:
+                    command.obey()
+            else:
+                self._remix(list(commands))
+
+    def _remix(self, commands: Sequence[_Command]) -> None:
+        """Obeys in the earliest block that can still be another.
+
+        What was mixed stays in the queue until its place is taken, so that no gap depends on how long that takes. If
+        the device comes so far meanwhile, all is done again from a later block.
+        """
+        output, latest = self._output, Moment(self._mixer, self._tone)
         while True:
-            try:
-                command = self._commands.get_nowait()
-            except Empty:
+            count = output.changeable_blocks
+            self._ahead.forget_played(output.queued_blocks)
+            moment = self._ahead.moment_before(count)
+            self._mixer, self._tone = (moment or latest).again()
+            for command in commands:
+                command.obey()
+            if moment is None:  # nothing of ours lies there: the next block obeys
                 return
-            command()
+            mixed = [self._mixed_block()]
+            while len(mixed) < output.replaced_blocks and self._mixer.steady(output.block_frames):
+                mixed.append(self._mixed_block())
+            if output.replace(count, [each.block for each in mixed]):
+                break
+        self._ahead.forget_last(count)
+        first_end = output.frames_queued - (len(mixed) - 1) * output.block_frames
+        self._timeline.take_back(first_end - output.block_frames)
+        for number, each in enumerate(mixed):
+            self._note(each, first_end + number * output.block_frames)
 
     def _load(self, track: Track, keep_position: bool, ring: bool) -> None:
         # If the device has changed meanwhile, the caller will see the new rate in status() and load again.
@@ -236,24 +268,33 @@ class Player:
         with contextlib.suppress(ValueError):
             self._mixer.select(source)
 
-    def _rewind(self) -> None:
-        """Goes back to the first block that can still be another."""
+    def _take_back(self) -> None:
+        """Leaves in the queue only what must be ready, and goes on from there."""
+        count = self._output.changeable_blocks
         self._ahead.forget_played(self._output.queued_blocks)
-        moment = self._ahead.go_back(self._output.take_back())
-        if moment is not None:
-            self._mixer, self._tone = moment.mixer, moment.tone
-        self._timeline.take_back(self._output.frames_queued)
+        moment = self._ahead.moment_before(count)
+        if moment is not None and self._output.replace(count):
+            self._mixer, self._tone = moment.again()
+            self._ahead.forget_last(count)
+            self._timeline.take_back(self._output.frames_queued)
 
-    def _write_block(self) -> None:
+    def _mixed_block(self) -> Mixed:
         before = Moment.of(self._mixer, self._tone)
         block = self._mixer.next_block(self._output.block_frames)
         if self._tone is not None:
             block = np.clip(block + self._tone.next_block(len(block)), -1, 1)
             self._tone = None if self._tone.over else self._tone
-        self._output.write(block)
-        state = self._mixer.status()
-        self._ahead.note(before, state)
-        self._timeline.note(self._output.frames_queued, state.position_frames, state.playing and not state.waiting)
+        return Mixed(before, block, self._mixer.status())
+
+    def _write_block(self) -> None:
+        mixed = self._mixed_block()
+        self._output.write(mixed.block)
+        self._note(mixed, self._output.frames_queued)
+
+    def _note(self, mixed: Mixed, end_frame: int) -> None:
+        self._ahead.note(mixed)
+        state = mixed.after
+        self._timeline.note(end_frame, state.position_frames, state.playing and not state.waiting)
 
     def _start_tone(self, side: Side) -> None:
         device = self._output.device
@@ -263,6 +304,7 @@ class Player:
     def _change_output(self, wanted: Wanted, rescan: bool) -> None:
         present, present_buffer_s = self._output.device, self._buffer_s
         was_playing = self._mixer.status().playing
+        self._take_back()
         self._lost = self._tone = None
         self._fade_to_silence()  # opening takes a while, in which nobody feeds the present device
         released = False
@@ -282,7 +324,7 @@ class Player:
             self._problem = None
         except AudioUnavailable as error:
             if released and present is not None:
-                self._take_back(present, present_buffer_s)
+                self._reopen(present, present_buffer_s)
             elif present is None and error.kind is ProblemKind.VANISHED:  # it may still be plugged in
                 self._lost, self._wanted = wanted.device, wanted
                 self._try_again_s = time.monotonic() + TRY_AGAIN_S
@@ -291,7 +333,7 @@ class Player:
         if was_playing:
             self._mixer.play()
 
-    def _take_back(self, device: AudioDevice, buffer_s: float) -> None:
+    def _reopen(self, device: AudioDevice, buffer_s: float) -> None:
         """The device as it was before a change that was refused; if it is gone too, it is looked for."""
         try:
             self._adopt_output(self._open_output(device, buffer_s))
@@ -372,3 +414,12 @@ class Player:
             changes_done=self._changes_done,
             problem=self._problem,
         )
+
+
+def _emptied(commands: SimpleQueue[_Command]) -> list[_Command]:
+    """All that lies in the queue, which is empty then."""
+    found = []
+    with contextlib.suppress(Empty):
+        while True:
+            found.append(commands.get_nowait())
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ class SilentOutput:
         self.rate_hz = rate_hz
         self.block_frames = block_frames
         self.latency_s = 0.0
-        self.prompt_blocks = 0
+        self.prompt_blocks = self.queued_blocks = self.changeable_blocks = self.replaced_blocks = 0  # nothing waits
         self.underruns = 0
         self.frames_queued = 0
         self._next_block_s = time.monotonic()
@@ -30,12 +31,8 @@ class SilentOutput:
     def frames_written(self) -> int:
         return self.frames_queued
 
-    @property
-    def queued_blocks(self) -> int:
-        return 0
-
-    def take_back(self) -> int:
-        return 0
+    def replace(self, count: int, blocks: Sequence[NDArray[np.float32]] = ()) -> bool:
+        return not count
 
     def wait_for_space(self, timeout_s: float, ahead: bool = False) -> bool:
         wait_s = self._next_block_s - time.monotonic()

@@ -5,7 +5,8 @@ does nothing else. The feeder renders the next block whenever the queue has room
 
 The queue is prompt and patient at once. A command must be heard soon, so that only a few blocks may lie before it;
 yet Python, or the computer, is busy elsewhere for a tenth of a second now and then. So the feeder goes on far beyond
-those few blocks as long as nothing can change them but a command; and for a command it takes them back.
+those few blocks as long as nothing can change them but a command; and for a command it replaces them. The old ones
+stay until the new ones are ready: nobody hears how long that takes.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import contextlib
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -28,7 +29,8 @@ from app.audio.problems import refused
 BLOCK_FRAMES = 256
 SHORTEST_BLOCK = 64
 BUFFER_S = 0.025  # of ready sound that a command waits for
-AHEAD_S = 0.25  # and of more, which it takes back: outlasts a busy moment of Python
+AHEAD_S = 0.25  # and of more, which it replaces: outlasts a busy moment of Python
+REPLACED_S = 0.02  # of new sound that takes the old one's place in one go, where it is rendered
 STALLED_AFTER_S = 1.5  # without a callback
 LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
 SETTLING_S = 0.1
@@ -70,7 +72,7 @@ class OutputStream:
         self._free: deque[NDArray[np.float32]] = deque()
         self._ready: deque[NDArray[np.float32]] = deque()
         self._taken: SimpleQueue[None] = SimpleQueue()  # a token for each block that the device has asked for
-        self._taken_back_at = 0  # the callback_count then
+        self._replaced_at = 0  # the callback_count then
         self._raw = open_device(device, buffer_s, block_frames, self._callback)
         self.latency_s = float(self._raw.latency)
         # A device that starts fills its own buffer, some twice, faster than the queue follows: inaudibly.
@@ -78,8 +80,9 @@ class OutputStream:
         # Devices with a long buffer ask for many blocks at a time; half of that buffer is a safe guess.
         blocks = max(2, int(max(buffer_s, self.latency_s / 2) * self.rate_hz / block_frames))
         self.prompt_blocks = blocks  # always kept ready; a command is heard after them
+        self.replaced_blocks = math.ceil(REPLACED_S * self.rate_hz / block_frames)
         self._most_blocks = blocks + math.ceil(AHEAD_S * self.rate_hz / block_frames)
-        for _ in range(self._most_blocks + 1):  # one is with the callback
+        for _ in range(self._most_blocks + self.replaced_blocks + 1):  # one is with the callback
             self._free.append(np.zeros((block_frames, min(device.channels, 2)), np.float32))
         for _ in range(blocks):  # the queue starts full, of silence
             self._ready.append(self._free.pop())
@@ -101,7 +104,7 @@ class OutputStream:
 
         Args:
             ahead: Up to `AHEAD_S` beyond what is always kept ready. That room opens with every block that is
-                played since `take_back`, so that the feeder catches up at twice the pace of the sound and a
+                played since `replace`, so that the feeder catches up at twice the pace of the sound and a
                 knob that is turned costs little.
         """
         if not self._has_space(ahead):
@@ -113,20 +116,30 @@ class OutputStream:
         """Queues one block, shape (block_frames, 2), after `wait_for_space` has returned True."""
         if not self._free:
             raise RuntimeError("The queue is full: wait_for_space comes first.")
-        buffer = self._free.popleft()
-        _copy(buffer, block[:, : buffer.shape[1]])
-        self._ready.append(buffer)
+        self._ready.append(self._filled(block))
         self.frames_queued += self.block_frames
 
-    def take_back(self) -> int:
-        """Takes the latest blocks out of the queue that need not be ready yet; returns how many, the last first."""
-        taken = 0
-        while len(self._ready) > max(1, self.prompt_blocks - 1):  # the callback is never left without a next one
+    @property
+    def changeable_blocks(self) -> int:
+        """The last so many may be replaced: enough is ready before them, so that there is time for it."""
+        return max(0, len(self._ready) - max(1, self.prompt_blocks - 1))
+
+    def replace(self, count: int, blocks: Sequence[NDArray[np.float32]] = ()) -> bool:
+        """Puts `blocks`, at most `replaced_blocks`, in the place of the last `count` of the queue.
+
+        Returns:
+            Whether the device had not come so far yet. Otherwise the queue is as it was.
+        """
+        buffers = [self._filled(block) for block in blocks]
+        if len(self._ready) <= count:  # one more: it may be taken just now
+            self._free.extend(buffers)
+            return False
+        for _ in range(count):
             self._free.append(self._ready.pop())
-            taken += 1
-        self.frames_queued -= taken * self.block_frames
-        self._taken_back_at = self.callback_count
-        return taken
+        self._ready.extend(buffers)
+        self.frames_queued += (len(buffers) - count) * self.block_frames
+        self._replaced_at = self.callback_count
+        return True
 
     def stalled(self) -> bool:
         """Whether the device takes nothing at the moment. To be asked again and again, by one thread."""
@@ -167,8 +180,13 @@ class OutputStream:
         self._free.append(block)
         self._taken.put(None)
 
+    def _filled(self, block: NDArray[np.float32]) -> NDArray[np.float32]:
+        buffer = self._free.popleft()
+        _copy(buffer, block[:, : buffer.shape[1]])
+        return buffer
+
     def _has_space(self, ahead: bool) -> bool:
-        earned = self.callback_count - self._taken_back_at if ahead else 0
+        earned = self.replaced_blocks + self.callback_count - self._replaced_at if ahead else 0
         return len(self._ready) < min(self.prompt_blocks + earned, self._most_blocks)
 
     def _count_underrun(self) -> None:

@@ -12,11 +12,11 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from app.audio import AudioProblem, Mixer, Player, Track
+from app.audio import AudioProblem, Player, Track
 from app.audio.stream import OutputStream
 
 
@@ -27,20 +27,22 @@ def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
 
 
 def kept_blocks() -> list[np.ndarray]:
-    """All blocks that any mixer gives from now on, without those that were taken back unheard."""
+    """All blocks that go to any device from now on, without those that were replaced unheard."""
     blocks: list[np.ndarray] = []
-    next_block, take_back = Mixer.next_block, OutputStream.take_back
+    write, replace = OutputStream.write, OutputStream.replace
 
-    def keep(mixer: Mixer, frames: int) -> np.ndarray:
-        blocks.append(next_block(mixer, frames))
-        return blocks[-1]
+    def keep(stream: OutputStream, block: np.ndarray) -> None:
+        write(stream, block)
+        blocks.append(block)
 
-    def drop(stream: OutputStream) -> int:
-        taken = take_back(stream)
-        del blocks[len(blocks) - taken :]
-        return taken
+    def change(stream: OutputStream, count: int, others: Sequence[np.ndarray] = ()) -> bool:
+        done = replace(stream, count, others)
+        if done:
+            del blocks[len(blocks) - count :]
+            blocks.extend(others)
+        return done
 
-    Mixer.next_block, OutputStream.take_back = keep, drop  # type: ignore[method-assign]
+    OutputStream.write, OutputStream.replace = keep, change  # type: ignore[method-assign]
     return blocks
 
 

@@ -59,8 +59,10 @@ class Bench:
         """Lets the device play, never faster than the player feeds it; shape (frames,)."""
         heard = []
         output = raw.callback.__self__
+        obeyed = threading.Event()
+        self.player._send(obeyed.set, of_output=True)
+        wait_until(obeyed.is_set)  # a device that took its time would see to that
         for _ in range(blocks):
-            wait_until(lambda: self.player._commands.empty())  # a device that took its time would see to that
             wait_until(lambda: output.frames_queued - output.frames_written >= 4 * BLOCK_FRAMES)
             heard.append(raw.tick()[:, 0])
         return np.concatenate(heard)
@@ -155,6 +157,49 @@ def test_a_switch_changes_what_was_mixed_ahead_and_loses_no_sample(bench: Bench)
     soonest = 80 * BLOCK_FRAMES
     errors = [np.abs(sound[start:] - expected(soonest + k * BLOCK_FRAMES)).max() for k in range(6)]
     assert min(errors) < 1e-6
+
+
+def test_the_old_sound_goes_on_until_a_command_is_mixed(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long that takes: the device plays what was there, and the command is heard later."""
+    bench.add("Headphones")
+    raw = bench.open(None)
+    track = make_track()
+    bench.player.load(track)
+    bench.player.play()
+    heard = [bench.hear(raw, 100)]
+    output = raw.callback.__self__
+    wait_until(lambda: output.queued_blocks * BLOCK_FRAMES >= AHEAD_S * RATE_HZ)
+    goes_on, began = threading.Event(), threading.Event()
+    next_block = Mixer.next_block
+
+    def slow(mixer: Mixer, frames: int) -> np.ndarray:
+        began.set()
+        goes_on.wait(10)
+        return next_block(mixer, frames)
+
+    monkeypatch.setattr(Mixer, "next_block", slow)
+    bench.player.select("truth")
+    began.wait(10)
+    for _ in range(output.prompt_blocks + 5):  # further than the command wanted to begin
+        heard.append(raw.tick()[:, 0])
+    goes_on.set()
+    wait_until(lambda: bench.player.status().source == "truth")
+    heard.append(bench.hear(raw, 40))
+    sound = np.concatenate(heard)
+    start = int(np.argmax(sound != 0)) // BLOCK_FRAMES * BLOCK_FRAMES
+
+    def expected(switched_at: int) -> np.ndarray:
+        mixer = Mixer(RATE_HZ)
+        mixer.load(track)
+        mixer.play()
+        before = next_block(mixer, switched_at - start)
+        mixer.select("truth")
+        return np.concatenate([before, next_block(mixer, len(sound) - switched_at)])[:, 0]
+
+    errors = [np.abs(sound[start:] - expected(k * BLOCK_FRAMES)).max() for k in range(100, 130)]
+    assert min(errors) < 1e-6
+    assert np.argmin(errors) >= output.prompt_blocks + 5
+    assert bench.player.status().underruns == 0
 
 
 def test_a_busy_moment_of_the_interpreter_is_not_heard(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

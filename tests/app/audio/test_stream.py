@@ -61,29 +61,55 @@ def test_the_queue_is_bounded(stream: OutputStream) -> None:
         stream.write(block(1))
 
 
-def test_it_goes_ahead_at_twice_the_pace_and_a_command_takes_that_back(
-    stream: OutputStream, raw_streams: list
-) -> None:
+def go_ahead(stream: OutputStream, value: float) -> int:
+    """Fills the room that is open; returns with how many blocks."""
+    written = 0
+    while stream.wait_for_space(0, ahead=True):
+        stream.write(block(value))
+        written += 1
+    return written
+
+
+def test_it_goes_ahead_at_twice_the_pace(stream: OutputStream, raw_streams: list) -> None:
     (raw,) = raw_streams
     prompt = stream.queued_blocks
-    assert not stream.wait_for_space(0, ahead=True), "only what is played opens room"
+    assert go_ahead(stream, 0) == stream.replaced_blocks
     for played in range(1, 11):
         raw.tick()
-        for value in (played, -played):
-            assert stream.wait_for_space(0, ahead=True)
-            stream.write(block(value))
-        assert not stream.wait_for_space(0, ahead=True)
-        assert stream.queued_blocks == prompt + played
+        assert go_ahead(stream, played) == 2
+        assert stream.queued_blocks == prompt + stream.replaced_blocks + played
     assert not stream.wait_for_space(0)
-    queued = stream.frames_queued
-    assert stream.take_back() == 11
-    assert stream.frames_queued == queued - 11 * BLOCK_FRAMES
-    assert stream.wait_for_space(0)
-    stream.write(block(100))
-    assert not stream.wait_for_space(0, ahead=True), "it catches up anew"
-    heard = [raw.tick()[0, 0] for _ in range(prompt)]
-    assert heard[-1] == 100
-    assert 100 not in heard[:-1]
+
+
+def test_what_was_mixed_ahead_stays_until_it_is_replaced(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    prompt = stream.prompt_blocks
+    for _ in range(10):
+        raw.tick()
+        go_ahead(stream, 1)
+    count, queued, frames = stream.changeable_blocks, stream.queued_blocks, stream.frames_queued
+    assert count == queued - (prompt - 1)
+    assert stream.replace(count, [block(2), block(3)])
+    assert stream.frames_queued == frames + (2 - count) * BLOCK_FRAMES
+    assert go_ahead(stream, 4) == stream.replaced_blocks - 1, "it catches up anew, in small steps"
+    heard = [raw.tick()[0, 0] for _ in range(stream.queued_blocks)]
+    assert heard == [1] * (prompt - 1) + [2, 3] + [4] * (stream.replaced_blocks - 1)
+    assert stream.underruns == 0
+
+
+def test_nothing_is_replaced_that_the_device_has_come_to(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    for _ in range(10):
+        raw.tick()
+        go_ahead(stream, 1)
+    count = stream.changeable_blocks
+    for _ in range(stream.prompt_blocks - 1):
+        raw.tick()
+    for _ in range(50):  # and no buffer is lost
+        queued = stream.queued_blocks
+        assert not stream.replace(count, [block(2)])
+        assert stream.queued_blocks == queued
+    assert {raw.tick()[0, 0] for _ in range(queued)} == {1}
     assert stream.underruns == 0
 
 
