@@ -7,6 +7,7 @@ any part of them can be read without the parts before.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +72,7 @@ class HeardMotion:
     def _parts(self) -> tuple[str, ...]:
         return SOURCES if self.source == DIFFERENCE else (self.source,)
 
-    @property
+    @cached_property
     def _motions(self) -> list[Motion]:
         return [self.take.motion(name) for name in self._parts]
 

@@ -12,7 +12,7 @@ from app.panels.base import Moment, Panel
 from app.rendering import Take
 from app.session import Session
 from app.shown import LEGEND_FIELDS, ear, full_scale_words, part_words, shown_sources
-from app.views.spectrum_view import Analyser, SpectrumView
+from app.views.spectrum_view import SpectrumView, analyser_at
 
 EVERY = 4  # moments
 
@@ -69,7 +69,7 @@ class SpectrumPanel(Panel):
             self._tell()
 
     def _draw(self, heard: HeardSignal, position_s: float) -> None:
-        analyser = Analyser(heard.motion.rate_hz)
+        analyser = analyser_at(heard.motion.rate_hz)
         last_window = heard.ready - analyser.window_frames  # at the end of what there is it stays
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
         signal = heard.read(first, first + analyser.window_frames) / heard.listening.full_scale

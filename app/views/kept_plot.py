@@ -24,6 +24,7 @@ class KeptPlot(pg.PlotWidget):
         self._moved = QRegion()  # where the line has come and gone since the last painting
         self._line_at = 0.0
         self._strip = QRect()  # where it was drawn last
+        self._next_strip = QRect()  # and where it is to be
         super().__init__(parent)
 
     @property
@@ -32,7 +33,7 @@ class KeptPlot(pg.PlotWidget):
 
     def move_line(self, at: float) -> None:
         self._line_at = at
-        strip = self._line_strip()
+        self._next_strip = strip = self._line_strip()
         if strip == self._strip:
             return
         for changed in (strip, self._strip):
@@ -43,6 +44,7 @@ class KeptPlot(pg.PlotWidget):
         moved, self._moved = self._moved, QRegion()
         if not event.region().subtracted(moved).isEmpty():
             self._picture = None
+            self._next_strip = self._line_strip()
             super().paintEvent(event)
             painter = QPainter(self.viewport())
         else:
@@ -51,7 +53,7 @@ class KeptPlot(pg.PlotWidget):
             painter = QPainter(self.viewport())
             painter.setClipRegion(event.region())
             painter.drawPixmap(QPoint(), self._picture)
-        self._strip = strip = self._line_strip()
+        self._strip = strip = self._next_strip
         if not strip.isEmpty():
             painter.fillRect(strip.adjusted(STRIP, 0, -STRIP, 0), QColor(theme.TEXT))
         painter.end()

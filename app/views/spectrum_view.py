@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pyqtgraph as pg
@@ -80,6 +80,12 @@ class Analyser:
         return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
 
 
+@lru_cache(maxsize=4)
+def analyser_at(rate_hz: int) -> Analyser:
+    """The same one each time: it keeps its window and its columns."""
+    return Analyser(rate_hz)
+
+
 class SpectrumView(QWidget):
     """What the slots hold, on one locked pair of axes; the heard source is on top. The mouse reads a frequency."""
 
@@ -101,6 +107,8 @@ class SpectrumView(QWidget):
         item.setLabel("bottom", "frequency (Hz)")
         self._label = UprightLabel(item)
         item.showGrid(x=True, y=True, alpha=0.18)
+        for side in ("left", "bottom"):  # numbers and grid stay while the curves move: a third of a painting
+            item.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
         item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)
@@ -119,7 +127,7 @@ class SpectrumView(QWidget):
         item.addItem(self._partial, ignoreBounds=True)
         self._levels_db: dict[str, NDArray[np.float64]] = {}
         self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
-        self._analyser = Analyser(16_000)
+        self._analyser = analyser_at(16_000)
         self.set_sources(DEFAULT_SOURCES)
         self.set_full_scale("10 mm")
         self._fit()
@@ -133,7 +141,7 @@ class SpectrumView(QWidget):
     def set_rate(self, rate_hz: int) -> None:
         """Fits the frequency axis to a rate: the highest of what is drawn."""
         if rate_hz != self._analyser.rate_hz:
-            self._analyser = Analyser(rate_hz)
+            self._analyser = analyser_at(rate_hz)
             self._fit()
 
     def set_full_scale(self, words: str) -> None:

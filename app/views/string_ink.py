@@ -148,12 +148,17 @@ def paint_ends(painter: QPainter, axes: StringAxes) -> None:
         painter.drawRoundedRect(QRectF(x - 3, axes.middle - 22, 6, 44), 3, 3)
 
 
-def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, label: str, grabbed: bool) -> None:
+def paint_listening_line(painter: QPainter, axes: StringAxes, position: float, grabbed: bool) -> None:
     x = axes.x(position)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if grabbed else 120), 1))
     painter.drawLines(_dashes(round(x), round(axes.top), round(axes.bottom)))
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+
+
+def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, label: str, grabbed: bool) -> None:
+    """The foot of its line, below the string."""
+    x = axes.x(position)
     painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.GOOD))
     y = axes.bottom

@@ -6,6 +6,8 @@ Drag a marker beneath it: where it is heard. A double-click on either goes back 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import (
@@ -33,6 +35,7 @@ from app.views.string_ink import (
     paint_ends,
     paint_envelopes,
     paint_handle,
+    paint_listening_line,
     paint_listening_point,
     paint_motion,
     paint_pluck,
@@ -152,8 +155,8 @@ class StringView(QWidget):
         if frame is None or before is None:
             if frame is not before:
                 self.update()
-        else:  # all that moves lies in one rectangle, which is cheaper to clip than the holes of the buttons
-            self.update(0, WORDS_HEIGHT, self.width(), self.height() - WORDS_HEIGHT)
+        else:  # all that moves lies in one rectangle, between the words above and those below
+            self.update(0, WORDS_HEIGHT, self.width(), math.ceil(self._axes().bottom) - WORDS_HEIGHT)
 
     @property
     def is_dragging_pluck(self) -> bool:
@@ -344,7 +347,10 @@ class StringView(QWidget):
         paint_ends(painter, axes)
         labels = {"left": "listen"} if len(self._listening) == 1 else {"left": "left", "right": "right"}
         for side, label in labels.items():
-            paint_listening_point(painter, axes, self._listening[side], label, side in (self._drag, self._hovered))
+            grabbed = side in (self._drag, self._hovered)
+            paint_listening_line(painter, axes, self._listening[side], grabbed)
+            if event.rect().bottom() > axes.bottom:
+                paint_listening_point(painter, axes, self._listening[side], label, grabbed)
         grabbed = "pluck" in (self._drag, self._hovered)
         paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
         if self._frame is not None and not self._shows_pluck:
