@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import threading
@@ -16,7 +17,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.main_window import MainWindow
-from app.memory import return_large_blocks, spare_the_collector
+from app.memory import collect_between_events, return_large_blocks
 from app.settings import Settings, load_settings, settings_file
 from app.views.theme import apply_theme
 
@@ -62,7 +63,7 @@ class _Start(QObject):
 
             dress_plots()
             self._controller = Controller(self._window, self._settings, self._path)
-            spare_the_collector()
+            self._collector = collect_between_events()
         except Exception as error:
             self.failure = error
             QApplication.quit()
@@ -85,6 +86,7 @@ def load_engine() -> None:
 def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
     """Opens the app and returns its exit status when it is closed. `watch` is given the window before it is shown."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    gc.disable()  # until `collect_between_events`: nothing is thrown away before
     return_large_blocks()
     path = settings_file()
     settings, notice = load_settings(path)

@@ -6,17 +6,33 @@ import contextlib
 import ctypes
 import gc
 import sys
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from pyqtgraph.util.garbage_collector import GarbageCollector
+
+COLLECT_EVERY_S = 0.5
 LARGE_BYTES = 2**20
 _M_MMAP_THRESHOLD = -3  # of glibc's mallopt
 
 
-def spare_the_collector() -> None:
-    """What is loaded by now stays, and garbage is not looked for in it again.
+def collect_between_events() -> GarbageCollector:
+    """From now on garbage is looked for by this thread alone, the window's, as long as the result is kept.
 
-    A look at all of torch holds the interpreter for a quarter of a second, many times what a callback can wait.
+    Python would look in whatever thread has just made some, and delete parts of closed views there: Qt ends the
+    process for it. What is loaded by now stays, and garbage is not looked for in it again: a look at all of torch
+    holds the interpreter for a quarter of a second, many times what a callback can wait.
     """
+    from pyqtgraph.util.garbage_collector import GarbageCollector  # with all of pyqtgraph
+
     gc.freeze()
+    return GarbageCollector(COLLECT_EVERY_S)
+
+
+def collect_anywhere() -> None:
+    """As Python does by itself."""
+    gc.unfreeze()
+    gc.enable()
 
 
 def return_large_blocks() -> None:

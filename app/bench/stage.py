@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 import tempfile
 import time
@@ -20,7 +19,7 @@ from app.bench.pretended_device import PretendedCard
 from app.controller import Controller
 from app.main import SWITCH_INTERVAL_S, load_engine
 from app.main_window import MainWindow
-from app.memory import return_large_blocks, spare_the_collector
+from app.memory import collect_anywhere, collect_between_events, return_large_blocks
 from app.settings import Settings
 from app.views.plots import dress_plots
 from app.views.theme import apply_theme
@@ -75,15 +74,16 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
         try:
             window.show()
             controller = Controller(window, settings, Path(folder) / "settings.json", card.player)
-            spare_the_collector()
+            collector = collect_between_events()
             stage = Stage(window, controller, card, application.platformName())
             stage.wait_for(lambda: card.stream is not None, "the pretended device")
             stage.wait_until_rendered()
             yield stage
+            collector.timer.stop()
         finally:
             window.close()
             window.deleteLater()
             QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-            gc.unfreeze()
+            collect_anywhere()
             sys.setswitchinterval(interval_s)
             torch.set_num_threads(threads)

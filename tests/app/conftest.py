@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -13,6 +14,18 @@ from pytestqt.qtbot import QtBot
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, ProblemKind
 
 OWN_THREADS = ("render-worker", "audio-feeder", "eigenvalues", "partials", "error-map", "compare")
+
+
+COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
+
+
+@pytest.fixture(autouse=True)
+def collected_here() -> Iterator[None]:
+    """Garbage is deleted in this thread alone, as in the app (`app.memory.collect_between_events`)."""
+    gc.disable()
+    yield
+    gc.collect(2 if gc.get_count()[2] >= COLLECT_ALL_EVERY else 1)
+    gc.enable()
 
 
 def no_device(*_: object) -> AudioDevice:
