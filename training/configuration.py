@@ -77,6 +77,7 @@ class Recipe:
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
+    batch_statistics_until: float = 1.0  # share of the run in which batch norm takes a batch's own; then those stored
     average_decay: float = 0.0  # of a running mean of the weights, an iteration; above 0 that mean is the result
 
     def __post_init__(self) -> None:
@@ -91,6 +92,8 @@ class Recipe:
         for name in ("warm_up", "grow_until", "average_decay"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must lie in 0 … 1, not {getattr(self, name)}")
+        if not 0 < self.batch_statistics_until <= 1:
+            raise ValueError(f"batch_statistics_until must lie in 0 … 1, not {self.batch_statistics_until}")
 
 
 @dataclass(frozen=True)

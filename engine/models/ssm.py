@@ -357,8 +357,8 @@ class SSMString(StringModel[SSMState], ABC):
 
         paper: as the source draws every layer.
         physics: the first layer is the linear string, released from rest or with what else the model is given, on its
-            first `modes` states; its other states are not yet heard, and the blocks start as small corrections. Prior
-            knowledge that the paper's models do not have: say so in a table.
+            first `modes` states; its other states are not yet heard, and the blocks, which correct it, start at
+            zero. Prior knowledge that the paper's models do not have: say so in a table.
         """
         check_initialisation(self, how)
         with torch.no_grad():
@@ -389,7 +389,7 @@ class SSMString(StringModel[SSMState], ABC):
         first.C[:, :modes, 0] = (synthesis_matrix(points, modes).T / first.conjugates).to(first.C)
         for block in self.layers:
             assert isinstance(block, Block)
-            block.gate.weight[:points].mul_(0.01)
+            block.gate.weight[:points].zero_()
 
     def _ssms(self) -> list[DiagonalSSM]:
         return [module for module in self.modules() if isinstance(module, DiagonalSSM)]  # the first layer's first

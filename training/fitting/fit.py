@@ -16,6 +16,7 @@ from typing import Any, cast
 
 import torch
 from torch import Tensor
+from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from engine.metrics import RelativeError
@@ -237,6 +238,8 @@ class _Run:
         for group in self._optimiser.param_groups:
             group["lr"] = learning_rate * group["share"]
         model.train()
+        if self.step >= recipe.batch_statistics_until * recipe.epochs * self._per_epoch:
+            _keep_statistics(model)
         if self._latents is not None and self.step < self._latent_steps:
             if self.step >= self._latent_steps - recipe.latent_polish:
                 self._total += self._latents.polish(model, recipe)
@@ -358,6 +361,13 @@ def _optimiser(model: torch.nn.Module, recipe: Recipe) -> torch.optim.Optimizer:
         },
     ]
     return torch.optim.AdamW(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
+
+
+def _keep_statistics(model: torch.nn.Module) -> None:
+    """Batch norm divides by what it has stored: a batch of loud strings is then told from one of soft ones."""
+    for module in model.modules():
+        if isinstance(module, BatchNorm1d):
+            module.eval()
 
 
 def _is_eigenvalue(name: str) -> bool:

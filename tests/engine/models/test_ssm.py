@@ -158,7 +158,7 @@ def test_an_excitation_adds_to_the_motion(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("kind", ["displacement", "displacement_velocity", "two_frames"])
 @torch.no_grad()
-def test_physics_initialisation_is_nearly_the_linear_string(name: str, kind: str) -> None:
+def test_physics_initialisation_is_the_linear_string(name: str, kind: str) -> None:
     model = small_model(name, how="physics", kind=kind)
     amplitudes = torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
     start = 0 if kind == "displacement" else 7  # later, the string has a velocity
@@ -173,12 +173,7 @@ def test_physics_initialisation_is_nearly_the_linear_string(name: str, kind: str
     elif kind == "two_frames":
         second = truth[:, 0]
     found, _ = model.advance(model.encode(truth[:, 1], second), 200)
-    assert float((found - truth[:, 2:]).norm() / truth[:, 2:].norm()) < 0.1
-    linear, _ = evolve(
-        model.first_layer.log_eigenvalues(), model.encode(truth[:, 1], second).latents[0], 200, torch.complex64
-    )
-    heard = model.first_layer.read(linear).transpose(0, 1)
-    torch.testing.assert_close(heard, truth[:, 2:], rtol=0, atol=2e-3 * float(truth.abs().max()))
+    torch.testing.assert_close(found, truth[:, 2:], rtol=0, atol=2e-3 * float(truth.abs().max()))
 
 
 @pytest.mark.parametrize("name", NAMES)

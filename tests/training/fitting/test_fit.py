@@ -76,6 +76,15 @@ def test_a_run_that_is_cut_anywhere_is_the_whole_run(
     check_cuts(small(model, **changes), small_dataset, runs)
 
 
+def test_batch_norm_keeps_its_statistics_from_a_share_of_the_run_on(small_dataset: Dataset, runs: Path) -> None:
+    configuration = small("lru", batch_statistics_until=0.5)  # two batches an epoch
+    check_cuts(configuration, small_dataset, runs)
+    kept = weights(runs / "whole")["layers.0.normalization.num_batches_tracked"]
+    assert int(kept) == 4
+    with pytest.raises(ValueError, match="batch_statistics_until"):
+        small("lru", batch_statistics_until=0.0)
+
+
 def test_latents_that_are_learned_first_are_too(small_dataset: Dataset, runs: Path) -> None:
     check_cuts(small("koopman", latent_epochs=2), small_dataset, runs)
 
