@@ -65,6 +65,7 @@ class Recipe:
     clip_norm: float = 1.0
     loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
     latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of a matching pursuit
+    blind: bool = False  # that pursuit finds the modes in the displacement, instead of knowing the string's
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
     random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
@@ -89,6 +90,8 @@ class Recipe:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
         if self.latent_polish and not self.latent_epochs:
             raise ValueError("latent_polish needs latent_epochs: it is the last of their steps")
+        if self.blind and not self.latent_epochs:
+            raise ValueError("blind needs latent_epochs: it is how their pursuit finds the modes")
         for name in ("warm_up", "grow_until", "average_decay"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must lie in 0 … 1, not {getattr(self, name)}")

@@ -105,4 +105,4 @@ def test_a_case_matches_what_it_names() -> None:
     assert not Case(tension_modulated=False).matches(cell)
     with pytest.raises(ValueError, match="model 'koop' is not one of"):
         Case(model=("koop",))
-    assert recipe_names() == ["ours", "paper"]
+    assert recipe_names() == ["blind", "ours", "paper"]

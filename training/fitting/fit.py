@@ -35,6 +35,7 @@ from training.fitting.pursuit import LatentFit, pursue
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
 PURSUIT = "matching pursuit"  # see `pursuit`
+BLIND_PURSUIT = "blind matching pursuit"
 TELL_EVERY_S = 5.0  # within an epoch
 EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
 COUPLING = "K"  # of an integrated phase: too
@@ -132,7 +133,9 @@ def initialisation_of(configuration: TrainingConfiguration) -> str:
     """How a run's model starts: the recipe's choice, or its source's own."""
     if configuration.model == "dmd":
         return LEAST_SQUARES
-    return PURSUIT if configuration.recipe.latent_epochs else _start(configuration)
+    if configuration.recipe.latent_epochs:
+        return BLIND_PURSUIT if configuration.recipe.blind else PURSUIT
+    return _start(configuration)
 
 
 def _start(configuration: TrainingConfiguration) -> str:
@@ -179,7 +182,8 @@ class _Run:
         self._latents: LatentFit | None = None
         if recipe.latent_epochs:
             generator = torch.Generator().manual_seed(recipe.seed)
-            self._latents = pursue(self._model, dataset, configuration.steps, generator).to(device)
+            latents = pursue(self._model, dataset, configuration.steps, generator, recipe.blind)
+            self._latents = latents.to(device)
         self._model.to(device)
         kind = self._model.configuration.input
         if recipe.random_start and kind != "displacement_velocity":

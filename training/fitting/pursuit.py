@@ -1,13 +1,13 @@
 """A start for Koopman from the training data: eigenvalues by matching pursuit, and what its encoder shall yield.
 
 With a linear decoder and given eigenvalues the best latents of a trajectory are a least-squares fit. So the
-eigenvalues are chosen first: for each mode of the string the exponentials that explain most of all its motions, one
-after the other, from a grid of frequencies that its rising tension reaches and of decay rates (simultaneous
+eigenvalues are chosen first: for each mode the exponentials that explain most of all its motions, one
+after the other, from a grid of frequencies that it may have and of decay rates (simultaneous
 orthogonal matching pursuit; Tropp, Gilbert, Strauss 2006). The decoder sums them, each in its mode's shape. Then
 the encoder learns the fitted latents, in orthonormal coordinates: the distance there *is* the error of the prediction
 over every frame of the horizon, at the cost of no rollout.
 
-It uses the string's modes and linear frequencies: prior knowledge that the paper's models do not have.
+The modes are those of the string, which the paper's models do not know, or found in the data (`modes`).
 """
 
 from __future__ import annotations
@@ -20,14 +20,12 @@ from torch import Tensor, nn
 
 from engine.models import StringModel
 from engine.models.koopman import Koopman
-from engine.sine_transform import synthesis_matrix
 from training.configuration import Recipe
 from training.data.batches import flips
 from training.data.dataset import Dataset
+from training.fitting.modes import found_modes, known_modes
 
 TRAJECTORIES = 400  # of the training split that choose the eigenvalues
-FREQUENCIES = 80  # of a mode's grid, between the linear one and the highest that the tension reaches
-DECAYS = (0.0, 1.0, 3.0, 8.0)  # nepers over the horizon, beside the mode's own
 POLISH_ITERATIONS = 100
 APART = 1e-3  # share of an exponential that no chosen one explains, at least
 
@@ -119,11 +117,14 @@ class LatentFit:
         last.weight.copy_(self.mixing @ last.weight.double())
 
 
-def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator) -> LatentFit:
+def pursue(
+    model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator, blind: bool = False
+) -> LatentFit:
     """Gives a Koopman its eigenvalues and its decoder, and tells what its encoder shall learn.
 
     Args:
         steps: frames of the horizon.
+        blind: nothing is known of the string but its displacement.
 
     Raises:
         ValueError: the model is no Koopman with a mixing layer, or its data are strided.
@@ -133,35 +134,35 @@ def pursue(model: StringModel, dataset: Dataset, steps: int, generator: torch.Ge
         raise ValueError("latent_epochs needs the model 'koopman' with its mixing layer; set it to 0")
     if c.stride != 1:
         raise ValueError(f"latent_epochs needs every frame: the data's stride must be 1, not {c.stride}")
-    amplitudes = dataset.split("train").double() / dataset.scale_m
-    n = model.configuration.state_size
-    most = min(n, 3 * (-(-n // c.modes)))
-    chains = [_chain(dataset, amplitudes, mode, steps, most) for mode in range(c.modes)]
+    modes = found_modes(dataset, steps) if blind else known_modes(dataset, steps)
+    n, count = model.configuration.state_size, len(modes.grids)
+    most = min(n, 3 * (-(-n // count)))
+    heard = modes.motions[:, 1:]
+    chains = [_pursuit(grid, heard[:TRAJECTORIES, :, mode], most) for mode, grid in enumerate(modes.grids)]
     lengths = _share_out([chain.gains for chain in chains], n)
 
     log_eigenvalues = torch.full((n,), complex(-1.0 / steps, math.pi / 2), dtype=torch.complex128)
     shapes = torch.zeros(n, c.grid_points, dtype=torch.float64)
     mixing = torch.zeros(2 * n, 2 * n, dtype=torch.float64)
-    targets = torch.zeros(len(amplitudes), 2 * n, dtype=torch.float64)
+    targets = torch.zeros(len(heard), 2 * n, dtype=torch.float64)
     mirror = torch.ones(2 * n)
-    sines = synthesis_matrix(c.grid_points, c.modes)
     first = 0
     for mode, (chain, length) in enumerate(zip(chains, lengths, strict=True)):
         here = torch.arange(first, first + length)
         log_eigenvalues[here] = chain.log_eigenvalues[:length]
-        shapes[here] = sines[mode]
+        shapes[here] = modes.shapes[mode]
         basis = chain.basis[:, : 2 * length]
         exponentials = torch.exp(chain.log_eigenvalues[:length] * _frames(steps)[:, None])
         columns = torch.cat([exponentials.real, -exponentials.imag], dim=1)
         places = torch.cat([here, n + here])
         coordinates = torch.arange(2 * first, 2 * (first + length))
         mixing[places[:, None], coordinates] = math.sqrt(steps) * torch.linalg.inv(basis.T @ columns)
-        targets[:, coordinates] = amplitudes[:, 1 : steps + 1, mode] @ basis / math.sqrt(steps)
-        mirror[coordinates] = (-1.0) ** mode
+        targets[:, coordinates] = heard[:, :, mode] @ basis / math.sqrt(steps)
+        mirror[coordinates] = modes.mirror[mode]
         first += length
     unit = float(targets.square().mean().sqrt())
     model.store_basis(log_eigenvalues, shapes, generator)
-    initial = (amplitudes[:, 0] @ sines).float()
+    initial = (modes.motions[:, 0] @ modes.shapes).float()
     return LatentFit(initial, (targets / unit).float(), unit, mirror, unit * mixing)
 
 
@@ -178,22 +179,6 @@ class _Chain:
     log_eigenvalues: Tensor
     gains: list[float]
     basis: Tensor
-
-
-def _chain(dataset: Dataset, amplitudes: Tensor, mode: int, steps: int, most: int) -> _Chain:
-    c = dataset.configuration
-    linear = c.string.eigenvalues(c.modes)[mode] / c.rate_hz
-    rise = 0.0
-    if c.tension_modulated:  # at most half of the tension's, at the start of the strongest motion
-        rise = 0.5 * float(c.string.relative_tension_rise(amplitudes[:, 0] * dataset.scale_m).max())
-    lowest = float(linear.imag) - 4 * math.pi / steps
-    highest = float(linear.imag) * (1 + rise) + math.pi / steps
-    spacing = max(math.pi / 2 / steps, float(linear.imag) * rise / FREQUENCIES)
-    frequencies = torch.arange(lowest, highest, spacing, dtype=torch.float64)
-    frequencies = torch.cat([linear.imag[None], frequencies[frequencies > 0]])
-    decays = torch.tensor(DECAYS, dtype=torch.float64) / steps - linear.real
-    grid = torch.complex(-decays.expand(len(frequencies), -1), frequencies[:, None].expand(-1, len(decays))).flatten()
-    return _pursuit(grid, amplitudes[:TRAJECTORIES, 1 : steps + 1, mode], most)
 
 
 def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:

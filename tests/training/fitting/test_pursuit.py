@@ -11,6 +11,7 @@ from engine.models import Koopman, KoopmanConfiguration, KoopmanVar, KoopmanVarC
 from engine.sine_transform import synthesis_matrix
 from training.configuration import Recipe
 from training.data.dataset import Dataset
+from training.fitting.modes import found_modes, known_modes
 from training.fitting.pursuit import pursue
 
 STEPS = 400
@@ -58,6 +59,35 @@ def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> N
     mirrored = (amplitudes * signs) @ synthesis_matrix(101, 5).float()
     assert torch.allclose(latents.initial.flip(1), mirrored, atol=1e-5)
     assert set(latents.mirror.tolist()) == {1.0, -1.0}
+
+
+@pytest.mark.parametrize("blind", [False, True])
+@torch.no_grad()
+def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Dataset, blind: bool) -> None:
+    modes = (found_modes if blind else known_modes)(small_dataset, STEPS)
+    sines = synthesis_matrix(101, 5)
+    alike = modes.shapes @ sines.T / 50
+    torch.testing.assert_close(alike.abs(), torch.eye(5, dtype=torch.float64), rtol=0, atol=2e-3)
+    truth = small_dataset.split("train")[:, : STEPS + 1].double() / small_dataset.scale_m @ sines
+    torch.testing.assert_close(modes.motions @ modes.shapes, truth, rtol=0, atol=1e-5)
+    assert modes.mirror == (1, -1, 1, -1, 1)
+    linear = small_dataset.configuration.string.eigenvalues(5) / small_dataset.configuration.rate_hz
+    for grid, eigenvalue in zip(modes.grids, linear, strict=True):
+        assert grid.imag.min() <= eigenvalue.imag < grid.imag.max()
+        assert -float(grid.real.max()) == pytest.approx(-float(eigenvalue.real), rel=0.5, abs=3e-5)
+
+
+@torch.no_grad()
+def test_a_blind_pursuit_predicts_every_frame_too(small_dataset: Dataset) -> None:
+    model = koopman()
+    latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0), blind=True)
+    parts = latents.targets.double() @ latents.mixing.T
+    origin = torch.complex(*parts.chunk(2, dim=1)).to(torch.complex64)
+    found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
+    truth = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m @ synthesis_matrix(101, 5).float()
+    assert float((found - truth).square().sum() / truth.square().sum()) < 3e-3
+    with pytest.raises(ValueError, match="blind needs latent_epochs"):
+        Recipe(epochs=1, blind=True)
 
 
 def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> None:
