@@ -32,7 +32,9 @@ LISTEN_RANGE = (0.01, 0.99)
 
 def table(
     results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
-    recipe: Annotated[Literal["ours", "paper", "all"], typer.Option(help="Whose recipe the runs followed.")] = "all",
+    recipe: Annotated[
+        Literal["ours", "blind", "paper", "all"], typer.Option(help="Whose recipe the runs followed.")
+    ] = "all",
     format: Annotated[Literal["markdown", "csv"], typer.Option(help="csv is tidy: a line a cell.")] = "markdown",
     rows: Annotated[
         bool, typer.Option("--rows", help="List the runs behind the figures, with the command that repeats each.")

@@ -151,8 +151,9 @@ class StringView(QWidget):
 
     def show_frame(self, frame: StringFrame | None) -> None:
         """A moment of the motion; None goes back to the pluck."""
-        before, self._frame = self._frame, frame
-        if frame is None or before is None:
+        before, self._frame, span_mm = self._frame, frame, self._span_mm
+        self._fit_span()
+        if frame is None or before is None or self._span_mm != span_mm:
             if frame is not before:
                 self.update()
         else:  # all that moves lies in one rectangle, between the words above and those below

@@ -27,7 +27,7 @@ from training.tables.paper import (
 
 NOT_RUN = "not run"  # what is said in place of a figure
 
-RecipeChoice = Literal["ours", "paper", "all"]
+RecipeChoice = Literal["ours", "blind", "paper", "all"]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, Qt
+from PySide6.QtGui import QImage, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -50,6 +50,31 @@ def recorded(signal: object) -> list[tuple[object, ...]]:
     seen: list[tuple[object, ...]] = []
     signal.connect(lambda *values: seen.append(values))  # type: ignore[attr-defined]
     return seen
+
+
+def test_a_moment_paints_the_string_alone_and_another_scale_all(qtbot: QtBot, view: StringView) -> None:
+    """The numbers of the scale reach beyond the string: halves of old ones would be left."""
+    painted: list[QRect] = []
+
+    class Painted(QObject):
+        def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+            if isinstance(event, QPaintEvent):
+                painted.append(event.rect())
+            return False
+
+    def show(mm: float) -> QRect:
+        shape = {"model": np.full(101, mm, np.float32)}
+        painted.clear()
+        view.show_frame(StringFrame(shape, shape, shape))
+        qtbot.waitUntil(lambda: bool(painted))
+        return painted[-1]
+
+    watch = Painted(view)
+    view.installEventFilter(watch)
+    show(4.0)
+    assert show(3.9).bottom() <= view._axes().bottom
+    assert show(0.3) == view.rect()
+    assert show(0.29).bottom() <= view._axes().bottom
 
 
 def test_axes_go_to_pixels_and_back() -> None:

@@ -93,7 +93,7 @@ def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> No
         ("4000, 400]", "400_000]", "horizon must lie in 1 … 4000"),
         ("[0, 1]", "[-1]", "block[0]: seed must be at least 0"),
         ("[0, 1]", "[]", "block[0]: seeds is empty"),
-        ('recipe = "ours"', 'recipe = "theirs"', "block[1]: recipe 'theirs' is not one of ours, paper"),
+        ('recipe = "ours"', 'recipe = "theirs"', "block[1]: recipe 'theirs' is not one of blind, ours, paper"),
         ("seeds", "seed", "block[0]: unknown field 'seed'; known are models"),
         ("models =", "model =", "block[0]: unknown field 'model'"),
         ("[[block]]", "[data]\ncuont = 1\n[[block]]", "data: unknown field 'cuont'"),
@@ -135,7 +135,9 @@ def test_committed_plans_are_whole() -> None:
     ours = paper | {"dmd": 8 * 2, "koopman_integrated": 8 * 2 * 5}
     assert ours.keys() == MODELS.keys()
     assert counts == Counter(
-        {(model, "ours"): n for model, n in ours.items()} | {(model, "paper"): n for model, n in paper.items()}
+        {(model, "ours"): n for model, n in ours.items()}
+        | {(model, "paper"): n for model, n in paper.items()}
+        | {("koopman", "blind"): 4}
     )
     # one seed of ours everywhere before two anywhere
     seeds = [run.cell.seed for run in tables.runs if run.cell.recipe == "ours"]
