@@ -80,7 +80,8 @@ class OutputStream:
         # Devices with a long buffer ask for many blocks at a time; half of that buffer is a safe guess.
         blocks = max(2, int(max(buffer_s, self.latency_s / 2) * self.rate_hz / block_frames))
         self.prompt_blocks = blocks  # always kept ready; a command is heard after them
-        self.replaced_blocks = math.ceil(REPLACED_S * self.rate_hz / block_frames)
+        # no more than what is kept ready meanwhile: the device must not be there first
+        self.replaced_blocks = min(math.ceil(REPLACED_S * self.rate_hz / block_frames), blocks - 1)
         self._most_blocks = blocks + math.ceil(AHEAD_S * self.rate_hz / block_frames)
         for _ in range(self._most_blocks + self.replaced_blocks + 1):  # one is with the callback
             self._free.append(np.zeros((block_frames, min(device.channels, 2)), np.float32))
