@@ -134,6 +134,21 @@ def test_a_command_is_heard_within_30_ms_of_device_time(bench: Bench) -> None:
     assert 0 < np.argmax(heard != 0) <= 0.03 * RATE_HZ
 
 
+def switched_in(sound: np.ndarray, track: Track) -> int:
+    """The block in which a sound of `track` goes over to the truth, without a sample lost on either side."""
+    start = int(np.argmax(sound != 0)) // BLOCK_FRAMES
+    for block in range(start, len(sound) // BLOCK_FRAMES):
+        mixer = Mixer(RATE_HZ)
+        mixer.load(track)
+        mixer.play()
+        before = mixer.next_block((block - start) * BLOCK_FRAMES)
+        mixer.select("truth")
+        after = mixer.next_block(len(sound) - block * BLOCK_FRAMES)
+        if np.abs(sound[start * BLOCK_FRAMES :] - np.concatenate([before, after])[:, 0]).max() < 1e-6:
+            return block
+    raise AssertionError("it is no such sound")
+
+
 def test_a_switch_changes_what_was_mixed_ahead_and_loses_no_sample(bench: Bench) -> None:
     bench.add("Headphones")
     raw = bench.open(None)
@@ -143,20 +158,7 @@ def test_a_switch_changes_what_was_mixed_ahead_and_loses_no_sample(bench: Bench)
     heard = [bench.hear(raw, 80)]
     bench.player.select("truth")
     heard.append(bench.hear(raw, 80))
-    sound = np.concatenate(heard)
-    start = int(np.argmax(sound != 0)) // BLOCK_FRAMES * BLOCK_FRAMES
-
-    def expected(switched_at: int) -> np.ndarray:
-        mixer = Mixer(RATE_HZ)
-        mixer.load(track)
-        mixer.play()
-        before = mixer.next_block(switched_at - start)
-        mixer.select("truth")
-        return np.concatenate([before, mixer.next_block(len(sound) - switched_at)])[:, 0]
-
-    soonest = 80 * BLOCK_FRAMES
-    errors = [np.abs(sound[start:] - expected(soonest + k * BLOCK_FRAMES)).max() for k in range(6)]
-    assert min(errors) < 1e-6
+    assert 80 <= switched_in(np.concatenate(heard), track) < 86
 
 
 def test_the_old_sound_goes_on_until_a_command_is_mixed(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,20 +187,7 @@ def test_the_old_sound_goes_on_until_a_command_is_mixed(bench: Bench, monkeypatc
     goes_on.set()
     wait_until(lambda: bench.player.status().source == "truth")
     heard.append(bench.hear(raw, 40))
-    sound = np.concatenate(heard)
-    start = int(np.argmax(sound != 0)) // BLOCK_FRAMES * BLOCK_FRAMES
-
-    def expected(switched_at: int) -> np.ndarray:
-        mixer = Mixer(RATE_HZ)
-        mixer.load(track)
-        mixer.play()
-        before = next_block(mixer, switched_at - start)
-        mixer.select("truth")
-        return np.concatenate([before, next_block(mixer, len(sound) - switched_at)])[:, 0]
-
-    errors = [np.abs(sound[start:] - expected(k * BLOCK_FRAMES)).max() for k in range(100, 130)]
-    assert min(errors) < 1e-6
-    assert np.argmin(errors) >= output.prompt_blocks + 5
+    assert 100 + output.prompt_blocks + 5 <= switched_in(np.concatenate(heard), track) < 130
     assert bench.player.status().underruns == 0
 
 
