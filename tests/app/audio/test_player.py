@@ -295,9 +295,9 @@ def test_a_device_that_fails_to_open_leaves_the_present_one(bench: Bench) -> Non
     bench.player.open(bench.add("Headphones"))
     wait_until(lambda: bench.problems != [])
     assert bench.hear(raw, 20)[-BLOCK_FRAMES:].any()
+    wait_until(lambda: bench.player.status().playing)
     status = bench.player.status()
     assert status.device == speakers
-    assert status.playing
     assert status.problem == "In use. Close the other program."
     bench.player.open(speakers)  # already open: it would be busy with ourselves
     wait_until(lambda: bench.player.status().problem is None)
