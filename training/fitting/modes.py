@@ -21,6 +21,7 @@ from training.data.dataset import Dataset
 
 FREQUENCIES = 80  # of a mode's grid, between the lowest and the highest
 DECAYS = (0.0, 1.0, 3.0, 8.0)  # nepers over the horizon, beside the mode's own
+SLOWEST = 0.01  # nepers over the horizon: what beats may seem to grow, and no eigenvalue lies on the circle
 SILENT = 1e-9  # share of the strongest direction's energy below which there is no motion
 OUTSIDE = 1e-4  # share of a motion's energy that may lie below its lowest frequency, and above its highest
 AT_ONCE = 50  # trajectories
@@ -107,7 +108,7 @@ def _seen_grid(motions: Tensor, steps: int) -> Tensor:
     first, last = (share < OUTSIDE).sum(), (share < 1 - OUTSIDE).sum()
     reach = float(first - 2) * bin_width, float(last + 2) * bin_width
     halves = [float(half.square().mean()) for half in motions.tensor_split(2, dim=1)]
-    decay = max(0.0, math.log(halves[0] / halves[1])) / steps
+    decay = max(SLOWEST, math.log(halves[0] / halves[1])) / steps
     spacing = max(math.pi / 2 / steps, (reach[1] - reach[0]) / FREQUENCIES)
     return _grid(float(power.argmax()) * bin_width, reach, spacing, decay, steps)
 

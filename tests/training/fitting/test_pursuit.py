@@ -78,6 +78,14 @@ def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Datas
 
 
 @torch.no_grad()
+def test_a_mode_that_seems_to_grow_decays_all_the_same(small_dataset: Dataset) -> None:
+    """Koopman keeps the logarithm of the decay."""
+    swelling = torch.linspace(0.5, 1.5, small_dataset.amplitudes.shape[1])[:, None]
+    grown = replace(small_dataset, amplitudes=small_dataset.amplitudes * swelling)
+    assert all(float(grid.real.max()) < 0 for grid in found_modes(grown, STEPS).grids)
+
+
+@torch.no_grad()
 def test_a_blind_pursuit_predicts_every_frame_too(small_dataset: Dataset) -> None:
     model = koopman()
     latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0), blind=True)
