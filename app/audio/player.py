@@ -303,8 +303,8 @@ class Player:
 
     def _change_output(self, wanted: Wanted, rescan: bool) -> None:
         present, present_buffer_s = self._output.device, self._buffer_s
+        self._take_back()  # what is heard may still play where what was mixed ahead is over
         was_playing = self._mixer.status().playing
-        self._take_back()
         self._lost = self._tone = None
         self._fade_to_silence()  # opening takes a while, in which nobody feeds the present device
         released = False
