@@ -38,7 +38,7 @@ def kept_blocks() -> list[np.ndarray]:
     def change(stream: OutputStream, count: int, others: Sequence[np.ndarray] = ()) -> bool:
         done = replace(stream, count, others)
         if done:
-            del blocks[len(blocks) - count :]
+            del blocks[max(0, len(blocks) - count) :]  # more, where some came before this began
             blocks.extend(others)
         return done
 
@@ -52,9 +52,9 @@ def play_live(player: Player, track: Track, out_file: str) -> None:
     for source in ("truth", "model", "truth"):
         player.load(track, ring=True)
         player.play()
-        wait_until(lambda: player.status().position_s > 0.25)
+        time.sleep(0.4)
         player.select(source)
-        wait_until(lambda: player.status().position_s > 0.45)
+        time.sleep(0.4)
     wait_until(lambda: player.status().position_s > 1.8)
     wait_until(lambda: player.status().position_s < 0.5)  # the loop
     player.stop()
