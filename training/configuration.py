@@ -65,7 +65,8 @@ class Recipe:
     clip_norm: float = 1.0
     loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
     latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of a matching pursuit
-    blind: bool = False  # that pursuit finds the modes in the displacement, instead of knowing the string's
+    # Koopman's pursuit, or an integrated phase, starts from what the displacement shows and knows no string
+    blind: bool = False
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
     random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
@@ -90,8 +91,6 @@ class Recipe:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
         if self.latent_polish and not self.latent_epochs:
             raise ValueError("latent_polish needs latent_epochs: it is the last of their steps")
-        if self.blind and not self.latent_epochs:
-            raise ValueError("blind needs latent_epochs: it is how their pursuit finds the modes")
         for name in ("warm_up", "grow_until", "average_decay"):
             if not 0 <= getattr(self, name) < 1:
                 raise ValueError(f"{name} must lie in 0 … 1, not {getattr(self, name)}")
@@ -114,6 +113,8 @@ class TrainingConfiguration:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        if self.recipe.blind and not self.recipe.latent_epochs and self.model != "koopman_integrated":
+            raise ValueError(f"blind needs latent_epochs, or the model 'koopman_integrated', not {self.model!r}")
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:

@@ -522,6 +522,41 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             if how == "averaging" and physics.tension_modulated:
                 self._initialise_averaging(physics)
 
+    @torch.no_grad()
+    def store_modes(self, shapes: Tensor, log_eigenvalues: Tensor, starts: Tensor, coupling: Tensor) -> None:
+        """A latent for each of some modes, at first all that is heard; spare latents stay silent.
+
+        z_n(0) = s_n q_n of a displacement Σ_n q_n shape_n, and û = Σ_n Re z_n shape_n.
+
+        Args:
+            shapes: (modes, grid_points), linearly independent.
+            log_eigenvalues: -σ + iω, complex (modes,).
+            starts: s, complex (modes,).
+            coupling: rad/sample that the square of each mode's q at the start adds to each ω, (modes, modes).
+
+        Raises:
+            ValueError: more modes than latents.
+        """
+        n, modes = self.configuration.state_size, len(shapes)
+        if modes > n:
+            raise ValueError(f"state_size must be at least {modes}, the modes that the data show, not {n}")
+        analysis = torch.linalg.pinv(shapes).T
+        self.nu_log[:modes] = (-log_eigenvalues.real).log()
+        self.theta_log[:modes] = log_eigenvalues.imag.log()
+        for linear in (self.encoder, self.decoder):
+            nn.init.zeros_(linear.weight)
+        self.encoder.weight[:modes, : self.grid_points] = (starts.real[:, None] * analysis).to(self.K.dtype)
+        self.encoder.weight[n : n + modes, : self.grid_points] = (starts.imag[:, None] * analysis).to(self.K.dtype)
+        self.decoder.weight[:, :modes] = shapes.T.to(self.K.dtype)
+        coupling = coupling / starts.abs().square()
+        if self.energy_units is not None and self.rate_units is not None:
+            omega = log_eigenvalues.imag
+            self.rate_units[:modes] = omega
+            self.energy_units[:modes] = (coupling / omega[:, None]).abs().median(0).values
+            coupling = coupling / self.energy_units[:modes]
+        rate_units = self._rate_units[:modes, None] if isinstance(self._rate_units, Tensor) else self._rate_units
+        self.K[n : n + modes, :modes] = (coupling / rate_units).to(self.K.dtype)
+
     def _initialise_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes
         mode = torch.arange(n) % modes

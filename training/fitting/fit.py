@@ -30,12 +30,14 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import training_loss
+from training.fitting.phases import start_from_phases
 from training.fitting.pursuit import LatentFit, pursue
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
 PURSUIT = "matching pursuit"  # see `pursuit`
 BLIND_PURSUIT = "blind matching pursuit"
+PHASES = "phases of the displacement"  # see `phases`
 TELL_EVERY_S = 5.0  # within an epoch
 EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
 COUPLING = "K"  # of an integrated phase: too
@@ -135,7 +137,7 @@ def initialisation_of(configuration: TrainingConfiguration) -> str:
         return LEAST_SQUARES
     if configuration.recipe.latent_epochs:
         return BLIND_PURSUIT if configuration.recipe.blind else PURSUIT
-    return _start(configuration)
+    return PHASES if configuration.recipe.blind else _start(configuration)
 
 
 def _start(configuration: TrainingConfiguration) -> str:
@@ -184,6 +186,8 @@ class _Run:
             generator = torch.Generator().manual_seed(recipe.seed)
             latents = pursue(self._model, dataset, configuration.steps, generator, recipe.blind)
             self._latents = latents.to(device)
+        elif recipe.blind:
+            start_from_phases(self._model, dataset, configuration.steps, recipe.seed)
         self._model.to(device)
         kind = self._model.configuration.input
         if recipe.random_start and kind != "displacement_velocity":

@@ -94,8 +94,6 @@ def test_a_blind_pursuit_predicts_every_frame_too(small_dataset: Dataset) -> Non
     found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
     truth = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m @ synthesis_matrix(101, 5).float()
     assert float((found - truth).square().sum() / truth.square().sum()) < 3e-3
-    with pytest.raises(ValueError, match="blind needs latent_epochs"):
-        Recipe(epochs=1, blind=True)
 
 
 def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> None:

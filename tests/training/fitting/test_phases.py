@@ -1,0 +1,86 @@
+"""An integrated phase's start from the displacement alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.models import Koopman, KoopmanConfiguration, KoopmanIntegrated
+from engine.models.integrated_phase import IntegratedPhaseConfiguration
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.data.dataset import Dataset
+from training.evaluate import evaluate_model
+from training.fitting.fit import PHASES, fit, initialisation_of
+from training.fitting.modes import Modes
+from training.fitting.phases import fit_phases, start_from_phases
+
+STEPS = 450
+
+
+def integrated_phase(state_size: int = 5, physical_units: bool = True) -> KoopmanIntegrated:
+    model = KoopmanIntegrated(
+        IntegratedPhaseConfiguration(state_size=state_size, modulation=True, physical_units=physical_units)
+    )
+    model.initialise("random", None, torch.Generator().manual_seed(0))  # type: ignore[arg-type]
+    return model
+
+
+@torch.no_grad()
+def motions_of(omega: torch.Tensor, sigma: torch.Tensor, coupling: torch.Tensor, steps: int) -> Modes:
+    """Of 40 strings that are what the fit takes them for."""
+    generator = torch.Generator().manual_seed(1)
+    starts = torch.rand(40, len(omega), generator=generator, dtype=torch.float64) * 2 - 1
+    times = torch.arange(steps + 1)[:, None]
+    integrals = starts.square()[:, None] * (1 - torch.exp(-2 * sigma * times)) / (2 * sigma)
+    phases = omega * times + integrals @ coupling.T
+    motions = starts[:, None] * torch.exp(-sigma * times) * torch.cos(phases)
+    return Modes(torch.eye(len(omega), dtype=torch.float64), motions, (), ())
+
+
+def test_what_follows_its_equation_is_found_exactly() -> None:
+    omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
+    coupling = torch.tensor([[0.003, 0.01, 0.02], [0.01, 0.04, 0.05], [-0.02, -0.06, -0.1]]).double()
+    found = fit_phases(motions_of(omega, sigma, coupling, 2000), seed=0)
+    torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
+    torch.testing.assert_close(found.coupling, coupling, rtol=1e-4, atol=1e-7)
+    torch.testing.assert_close(found.starts, torch.ones(3, dtype=torch.complex128), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("state_size", "physical_units"), [(5, True), (7, False)])
+def test_it_predicts_strings_that_the_fit_has_not_seen(
+    small_dataset: Dataset, state_size: int, physical_units: bool
+) -> None:
+    model = integrated_phase(state_size, physical_units)
+    start_from_phases(model, small_dataset, STEPS, seed=0)
+    assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
+    linear = small_dataset.configuration.string.eigenvalues(5) / small_dataset.configuration.rate_hz
+    torch.testing.assert_close(model.theta_log[:5].exp(), linear.imag, rtol=2e-3, atol=0)
+
+
+def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
+    recipe = Recipe(epochs=1, blind=True, peak_learning_rate=1e-9, first_horizon=STEPS, consistency_weight=0.0)
+    sizes = {"state_size": 5, "modulation": True, "physical_units": True}
+    configuration = TrainingConfiguration(
+        "A test", "koopman_integrated", small_dataset.configuration, recipe, model_configuration=sizes
+    )
+    assert initialisation_of(configuration) == PHASES
+    untrained = integrated_phase()
+    start_from_phases(untrained, small_dataset, STEPS, recipe.seed)
+    expected = evaluate_model(untrained, small_dataset, "validation", STEPS).total()
+    assert fit(configuration, small_dataset, runs).validation.rel_mae == pytest.approx(expected.rel_mae, rel=1e-2)
+
+
+def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
+    with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
+        start_from_phases(integrated_phase(4), small_dataset, STEPS, seed=0)
+    with pytest.raises(ValueError, match="needs the model 'koopman_integrated'"):
+        start_from_phases(Koopman(KoopmanConfiguration()), small_dataset, STEPS, seed=0)
+    strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
+    with pytest.raises(ValueError, match="stride must be 1, not 2"):
+        start_from_phases(integrated_phase(), strided, STEPS, seed=0)
+    data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
+    with pytest.raises(ValueError, match="blind needs latent_epochs, or the model 'koopman_integrated', not 's5'"):
+        TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, blind=True))

@@ -1,0 +1,128 @@
+"""A start for an integrated phase from the displacement alone: shapes, eigenvalues, how energies shift frequencies.
+
+The shapes that the motions show (`modes`) keep theirs while their frequencies move, so that the motion of a mode n
+in a string that starts at rest is, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t},
+
+    q_n(t) = q_n Re s_n exp[(-σ_n + iω_n) t + i Σ_m κ_nm ∫₀ᵗ E_m(s) ds],     s_n ≈ 1,
+
+where σ_n, ω_n, s_n and the row κ_n are found by least squares, one mode after another. A phase can only be followed
+while it is known to less than half a turn, so the first fit sees a dozen frames, and each further one more of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from torch import Tensor
+
+from engine.models import StringModel
+from engine.models.integrated_phase import KoopmanIntegrated
+from training.data.dataset import Dataset
+from training.fitting.modes import SLOWEST, Modes, found_modes
+
+FIRST_FRAMES = 12
+MORE_FRAMES = 1.4  # times as many in each further fit
+SAMPLES = 10_000  # of all motions' frames, which a fit sees
+EVALUATIONS = 12  # of a fit, at most: the next one goes on from there
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Phases:
+    """What was found; see the module. In samples, radians and normalised displacement.
+
+    Attributes:
+        log_eigenvalues: -σ + iω, complex128 (modes,).
+        starts: s, complex128 (modes,).
+        coupling: κ, float64 (modes, modes).
+    """
+
+    log_eigenvalues: Tensor
+    starts: Tensor
+    coupling: Tensor
+
+
+def start_from_phases(model: StringModel, dataset: Dataset, steps: int, seed: int) -> None:
+    """Gives an integrated phase what the first `steps` frames of the training split show.
+
+    Raises:
+        ValueError: the model is another, its data are strided, or have more modes than it has latents.
+    """
+    if not isinstance(model, KoopmanIntegrated):
+        raise ValueError("blind without latent_epochs needs the model 'koopman_integrated'")
+    if dataset.configuration.stride != 1:
+        raise ValueError(f"blind needs every frame: the data's stride must be 1, not {dataset.configuration.stride}")
+    modes = found_modes(dataset, steps)
+    found = fit_phases(modes, seed)
+    model.store_modes(modes.shapes, found.log_eigenvalues, found.starts, found.coupling)
+
+
+def fit_phases(modes: Modes, seed: int) -> Phases:
+    """The least-squares fits of the module to all frames of `modes.motions`."""
+    motions = modes.motions.numpy()
+    trajectories, frames, count = motions.shape
+    generator = np.random.default_rng(seed)
+    energies = motions[:, 0] ** 2
+    found = [_first_guess(motions[..., mode], count) for mode in range(count)]
+    last = min(FIRST_FRAMES, frames - 1)
+    while True:
+        rows, times = generator.integers(trajectories, size=SAMPLES), generator.integers(1, last + 1, size=SAMPLES)
+        slowest = SLOWEST / (frames - 1)  # of energies: a fit to a few frames may find them growing
+        sigma = np.array([max(guess[1], slowest) for guess in found])
+        integrals = energies[rows] * -np.expm1(-2 * sigma * times[:, None]) / (2 * sigma)
+        for mode, guess in enumerate(found):
+            motion = _Motion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
+            found[mode] = motion.fitted(guess)
+        if last == frames - 1:
+            break
+        last = min(frames - 1, int(MORE_FRAMES * last) + 1)
+    omega, sigma, real, imag = np.array(found)[:, :4].T
+    return Phases(
+        torch.from_numpy(-np.maximum(sigma, slowest) + 1j * omega),
+        torch.from_numpy(real + 1j * imag),
+        torch.from_numpy(np.array(found)[:, 4:]),
+    )
+
+
+def _first_guess(motions: Floats, count: int) -> Floats:
+    """ω, σ, Re s, Im s and κ (count,) of the first frames: the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t)."""
+    first = motions[:, : 4 * FIRST_FRAMES]
+    now = first[:, 1:-1]
+    cosine = np.sum(now * (first[:, 2:] + first[:, :-2])) / (2 * np.sum(now**2))
+    return np.array([np.arccos(np.clip(cosine, -1, 1)), 0.0, 1.0, 0.0, *np.zeros(count)])
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """A mode's samples: start and displacement there, time, and the energies' integrals, (samples, modes)."""
+
+    start: Floats
+    displacement: Floats
+    times: Floats
+    integrals: Floats
+
+    def fitted(self, guess: Floats) -> Floats:
+        fit = least_squares(
+            self._error, guess, self._slopes, method="lm", x_scale="jac", ftol=1e-4, max_nfev=EVALUATIONS
+        )
+        return np.asarray(fit.x)
+
+    def _error(self, guess: Floats) -> Floats:
+        return self._latent(guess).real - self.displacement
+
+    def _slopes(self, guess: Floats) -> Floats:
+        """(samples, unknowns)."""
+        latent = self._latent(guess)
+        turn = latent / complex(guess[2], guess[3])
+        along = np.stack([-latent.imag * self.times, -latent.real * self.times, turn.real, -turn.imag], axis=1)
+        return np.concatenate([along, -latent.imag[:, None] * self.integrals], axis=1)
+
+    def _latent(self, guess: Floats) -> NDArray[np.complex128]:
+        omega, sigma, real, imag = guess[:4]
+        phase = omega * self.times + self.integrals @ guess[4:]
+        return self.start * complex(real, imag) * np.exp(-sigma * self.times + 1j * phase)
