@@ -270,7 +270,8 @@ class Controller(QObject):
         for panel in self.panels:
             panel.choices_changed(names)
         window.show_solo(choices.solo)
-        self.performance.select()
+        if names & {"a", "b", "heard"}:
+            self.performance.select()
         if names & {"level_match", "difference_gain_db"}:
             self.player.set_levels(levels(choices))
         if "loop" in names:

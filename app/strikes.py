@@ -59,10 +59,7 @@ class Strikes:
                 return False
             self._awaited.remove(motion_key(take))
             try:
-                self._player.load(track, ring=True)
+                self._player.strike(track, self._source_heard())
             except ValueError:  # the device has changed its rate: the sound is then made again
                 return False
-            if (source := self._source_heard()) in track.sources:
-                self._player.select(source)
-            self._player.play()
             return True

@@ -121,11 +121,22 @@ class Player:
 
     def load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
         """Takes another track: from its beginning, at the same position, or beside the last; see `Mixer.load`."""
-        rate_hz = self.rate_hz
-        if track.rate_hz != rate_hz:
-            raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
-        self._track = track
+        self._take(track)
         self._send(lambda: self._load(track, keep_position, ring))
+
+    def strike(self, track: Track, source: str) -> None:
+        """Another pluck, beside those that ring: `load`, `select` where the track has the source, and `play` at once.
+
+        One command, because each is mixed for.
+        """
+        self._take(track)
+
+        def obey() -> None:
+            self._load(track, ring=True)
+            self._select(source)
+            self._mixer.play()
+
+        self._send(obey)
 
     def play(self) -> None:
         self._send(lambda: self._mixer.play())
@@ -177,9 +188,16 @@ class Player:
         if threading.current_thread() is not self._feeder:
             self._feeder.join(_JOIN_TIMEOUT_S)
 
+    def _take(self, track: Track) -> None:
+        rate_hz = self.rate_hz
+        if track.rate_hz != rate_hz:
+            raise ValueError(f"The track has {track.rate_hz} Hz, the player {rate_hz} Hz: resample it first.")
+        self._track = track
+
     def _send(self, obey: Callable[[], None], of_output: bool = False) -> None:
         if not self._over:
             self._commands.put(_Command(obey, of_output))
+            self._output.stop_waiting()
 
     def __enter__(self) -> Player:
         return self
@@ -258,7 +276,7 @@ class Player:
         for number, each in enumerate(mixed):
             self._note(each, first_end + number * output.block_frames)
 
-    def _load(self, track: Track, keep_position: bool, ring: bool) -> None:
+    def _load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
         # If the device has changed meanwhile, the caller will see the new rate in status() and load again.
         if track.rate_hz == self._mixer.rate_hz:
             self._mixer.load(track, keep_position, ring)

@@ -40,6 +40,9 @@ class SilentOutput:
             time.sleep(min(wait_s, timeout_s))
         return time.monotonic() >= self._next_block_s
 
+    def stop_waiting(self) -> None:
+        pass  # it is a block at most
+
     def write(self, block: NDArray[np.float32]) -> None:
         self.frames_queued += len(block)
         now_s = time.monotonic()

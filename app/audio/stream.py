@@ -113,6 +113,10 @@ class OutputStream:
                 self._taken.get(timeout=timeout_s)
         return self._has_space(ahead)
 
+    def stop_waiting(self) -> None:
+        """Ends a `wait_for_space`, or the next one, before there is space. From any thread."""
+        self._taken.put(None)
+
     def write(self, block: NDArray[np.float32]) -> None:
         """Queues one block, shape (block_frames, 2), after `wait_for_space` has returned True."""
         if not self._free:

@@ -220,6 +220,7 @@ def test_pictures_wait_for_a_struck_pluck_and_no_longer(qtbot: QtBot, controller
     assert not any(view.updatesEnabled() for view in views)
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
     qtbot.waitUntil(lambda: all(view.updatesEnabled() for view in views), timeout=5_000)
+    qtbot.waitUntil(lambda: controller.performance.ready, timeout=5_000)  # it sounds before it is shown
     controller.pluck()  # is on stage: nothing to wait for
     assert all(view.updatesEnabled() for view in views)
 
@@ -332,6 +333,19 @@ def test_a_pluck_that_is_overtaken_sounds_all_the_same(qtbot: QtBot, controller:
         controller.pluck()
     qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=20_000)
     assert not controller.performance.strikes.awaited
+
+
+def test_only_what_concerns_the_sound_is_told_to_the_player(
+    qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each command is mixed for, and right then a new pluck is rendered."""
+    wait_for_take(qtbot, controller)
+    chosen: list[str] = []
+    monkeypatch.setattr(controller.player, "select", chosen.append)
+    controller.session.update(listen_right=0.4)
+    assert chosen == []
+    controller.session.update(heard="b")
+    assert chosen == [controller.session.source_heard]
 
 
 def test_the_picture_gives_way_to_a_struck_pluck_but_not_for_long(

@@ -124,6 +124,28 @@ def test_the_device_plays_what_the_mixer_renders(bench: Bench) -> None:
     assert bench.problems == []
 
 
+def test_a_strike_loads_chooses_and_plays_beside_what_rings(bench: Bench) -> None:
+    bench.add("Headphones")
+    raw, track, player = bench.open(None), make_track(), bench.player
+    player.strike(track, "truth")
+    heard = bench.hear(raw, 250)
+    mixer = Mixer(RATE_HZ)
+    mixer.load(track)
+    mixer.select("truth")
+    mixer.play()
+    expected = mixer.next_block(RATE_HZ)[:, 0]
+    start = int(np.argmax(heard != 0)) - int(np.argmax(expected != 0))
+    np.testing.assert_allclose(heard[start : start + RATE_HZ], expected, atol=1e-6)
+    player.strike(track, "truth")
+    bench.hear(raw, 20)
+    player.strike(track, "a source that it has not")
+    bench.hear(raw, 20)
+    wait_until(lambda: player.status().ringing == 1)
+    assert (player.track, player.status().source, player.status().playing) == (track, "truth", True)
+    with pytest.raises(ValueError, match="8000 Hz, the player 48000 Hz"):
+        player.strike(make_track(8_000), "truth")
+
+
 def test_a_command_is_heard_within_30_ms_of_device_time(bench: Bench) -> None:
     bench.add("Headphones")
     raw = bench.open(None)

@@ -1,5 +1,6 @@
 """The callback, called directly: one ready block or zeros, and nothing that could go wrong."""
 
+import threading
 import time
 from types import SimpleNamespace
 from typing import Any
@@ -126,6 +127,14 @@ def test_waiting_for_a_deep_queue_to_drain_ends_with_each_block(stream: OutputSt
     assert not stream.wait_for_space(5.0)
     assert not stream.wait_for_space(5.0)
     assert time.monotonic() - began_s < 1.0
+
+
+def test_waiting_ends_when_it_is_told_to(stream: OutputStream, raw_streams: list) -> None:
+    """A command need not wait for the device's next block to be looked at."""
+    began_s = time.monotonic()
+    threading.Timer(0.05, stream.stop_waiting).start()
+    assert not stream.wait_for_space(5.0)
+    assert 0.04 < time.monotonic() - began_s < 2.0
 
 
 def test_going_ahead_has_an_end(stream: OutputStream, raw_streams: list) -> None:
