@@ -55,6 +55,15 @@ class Bench:
         wait_until(lambda: self.player.status().device is not None)
         return self.raw_streams[-1]
 
+    def play(self, track: Track) -> Any:
+        """Plays on the first device, which is added where there is none; returns its raw stream."""
+        if not self.devices:
+            self.add("Headphones")
+        raw = self.open(None)
+        self.player.load(track)
+        self.player.play()
+        return raw
+
     def hear(self, raw: Any, blocks: int) -> np.ndarray:
         """Lets the device play, never faster than the player feeds it; shape (frames,)."""
         heard = []
@@ -76,6 +85,14 @@ class Bench:
         if self.refusal is not None and device.default_rate_hz != self.accepted_hz:
             raise self.refusal
         return OutputStream(device, buffer_s, BLOCK_FRAMES, self._open_fake)
+
+
+def assert_heard(heard: np.ndarray, mixer: Mixer) -> None:
+    """A second of what the mixer plays is in what was heard, from the first sample that is not zero."""
+    expected = mixer.next_block(RATE_HZ)[:, 0]
+    start = int(np.argmax(heard != 0)) - int(np.argmax(expected != 0))
+    assert start % BLOCK_FRAMES == 0
+    np.testing.assert_allclose(heard[start : start + RATE_HZ], expected, atol=1e-6)
 
 
 @pytest.fixture
@@ -107,19 +124,13 @@ def test_without_a_device_the_playhead_moves_all_the_same(bench: Bench) -> None:
 
 
 def test_the_device_plays_what_the_mixer_renders(bench: Bench) -> None:
-    bench.add("Headphones")
-    raw = bench.open(None)
     track = make_track()
-    bench.player.load(track)
-    bench.player.play()
+    raw = bench.play(track)
     heard = bench.hear(raw, 250)
     mixer = Mixer(RATE_HZ)
     mixer.load(track)
     mixer.play()
-    expected = mixer.next_block(RATE_HZ)[:, 0]
-    start = int(np.argmax(heard != 0)) - int(np.argmax(expected != 0))
-    assert start % BLOCK_FRAMES == 0
-    np.testing.assert_allclose(heard[start : start + RATE_HZ], expected, atol=1e-6)
+    assert_heard(heard, mixer)
     assert bench.player.status().underruns == 0
     assert bench.problems == []
 
@@ -133,9 +144,7 @@ def test_a_strike_loads_chooses_and_plays_beside_what_rings(bench: Bench) -> Non
     mixer.load(track)
     mixer.select("truth")
     mixer.play()
-    expected = mixer.next_block(RATE_HZ)[:, 0]
-    start = int(np.argmax(heard != 0)) - int(np.argmax(expected != 0))
-    np.testing.assert_allclose(heard[start : start + RATE_HZ], expected, atol=1e-6)
+    assert_heard(heard, mixer)
     player.strike(track, "truth")
     bench.hear(raw, 20)
     player.strike(track, "a source that it has not")
@@ -172,11 +181,8 @@ def switched_in(sound: np.ndarray, track: Track) -> int:
 
 
 def test_a_switch_changes_what_was_mixed_ahead_and_loses_no_sample(bench: Bench) -> None:
-    bench.add("Headphones")
-    raw = bench.open(None)
     track = make_track()
-    bench.player.load(track)
-    bench.player.play()
+    raw = bench.play(track)
     heard = [bench.hear(raw, 80)]
     bench.player.select("truth")
     heard.append(bench.hear(raw, 80))
@@ -185,11 +191,8 @@ def test_a_switch_changes_what_was_mixed_ahead_and_loses_no_sample(bench: Bench)
 
 def test_the_old_sound_goes_on_until_a_command_is_mixed(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """However long that takes: the device plays what was there, and the command is heard later."""
-    bench.add("Headphones")
-    raw = bench.open(None)
     track = make_track()
-    bench.player.load(track)
-    bench.player.play()
+    raw = bench.play(track)
     heard = [bench.hear(raw, 100)]
     output = raw.callback.__self__
     wait_until(lambda: output.queued_blocks * BLOCK_FRAMES >= AHEAD_S * RATE_HZ)
@@ -214,11 +217,8 @@ def test_the_old_sound_goes_on_until_a_command_is_mixed(bench: Bench, monkeypatc
 
 
 def test_a_busy_moment_of_the_interpreter_is_not_heard(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench.add("Headphones")
-    raw = bench.open(None)
     track = make_track()
-    bench.player.load(track)
-    bench.player.play()
+    raw = bench.play(track)
     heard = [bench.hear(raw, 100)]
     wait_until(lambda: raw.callback.__self__.queued_blocks * BLOCK_FRAMES >= AHEAD_S * RATE_HZ)
     goes_on = threading.Event()
@@ -236,11 +236,8 @@ def test_a_busy_moment_of_the_interpreter_is_not_heard(bench: Bench, monkeypatch
 
 
 def test_nothing_is_mixed_ahead_that_rendering_may_still_change(bench: Bench) -> None:
-    bench.add("Headphones")
-    raw = bench.open(None)
     track = Track(RATE_HZ, RATE_HZ, ("model", "truth"))
-    bench.player.load(track)
-    bench.player.play()
+    raw = bench.play(track)
     bench.hear(raw, 100)  # of silence: the render worker has not begun
     output = raw.callback.__self__
     assert output.queued_blocks <= output.prompt_blocks
@@ -252,10 +249,7 @@ def test_nothing_is_mixed_ahead_that_rendering_may_still_change(bench: Bench) ->
 
 
 def test_the_position_is_that_of_what_is_heard(bench: Bench) -> None:
-    bench.add("Headphones")
-    raw = bench.open(None)
-    bench.player.load(make_track())
-    bench.player.play()
+    raw = bench.play(make_track())
     start = int(np.argmax(bench.hear(raw, 100) != 0)) // BLOCK_FRAMES * BLOCK_FRAMES
     expected_s = (100 * BLOCK_FRAMES - start) / RATE_HZ - raw.latency
     wait_until(lambda: bench.player.status().position_s == pytest.approx(expected_s, abs=1e-3))
@@ -293,9 +287,7 @@ def test_wrong_calls_fail_in_the_callers_thread(bench: Bench) -> None:
 def test_changing_the_device_keeps_the_sound_going(bench: Bench) -> None:
     bench.add("Speakers")
     headphones = bench.add("Headphones")
-    old = bench.open(None)
-    bench.player.load(make_track())
-    bench.player.play()
+    old = bench.play(make_track())
     bench.hear(old, 50)
     bench.player.open(headphones)
     wait_until(lambda: bench.player.status().device == headphones)
@@ -309,9 +301,7 @@ def test_changing_the_device_keeps_the_sound_going(bench: Bench) -> None:
 
 def test_a_device_that_fails_to_open_leaves_the_present_one(bench: Bench) -> None:
     speakers = bench.add("Speakers")
-    raw = bench.open(None)
-    bench.player.load(make_track())
-    bench.player.play()
+    raw = bench.play(make_track())
     bench.hear(raw, 20)
     bench.refusal = AudioUnavailable(AudioProblem(ProblemKind.BUSY, "In use.", "Close the other program."))
     bench.player.open(bench.add("Headphones"))
@@ -328,10 +318,7 @@ def test_a_device_that_fails_to_open_leaves_the_present_one(bench: Bench) -> Non
 
 
 def test_another_buffer_opens_the_device_again(bench: Bench) -> None:
-    bench.add("Speakers")
-    old = bench.open(None)
-    bench.player.load(make_track())
-    bench.player.play()
+    old = bench.play(make_track())
     bench.hear(old, 20)
     bench.player.open(None, buffer_s=0.1)
     wait_until(lambda: len(bench.raw_streams) == 2 and bench.raw_streams[1].active)
@@ -352,9 +339,7 @@ def test_a_chosen_rate_and_buffer_open_the_device_again(bench: Bench) -> None:
 
 def test_a_refused_rate_leaves_the_device_as_it_was(bench: Bench) -> None:
     speakers = bench.add("Speakers")
-    bench.open(None)
-    bench.player.load(make_track())
-    bench.player.play()
+    bench.play(make_track())
     bench.refusal = AudioUnavailable(AudioProblem(ProblemKind.RATE_REFUSED, "No 96 kHz.", "Choose another."))
     bench.accepted_hz = RATE_HZ
     bench.player.open(None, rate_hz=96_000)
@@ -367,9 +352,7 @@ def test_a_refused_rate_leaves_the_device_as_it_was(bench: Bench) -> None:
 
 def test_looking_for_new_devices_finds_one_and_keeps_the_present(bench: Bench) -> None:
     bench.add("Speakers")
-    bench.open(None)
-    bench.player.load(make_track())
-    bench.player.play()
+    bench.play(make_track())
     bench.player.open(None, rescan=True)
     wait_until(lambda: len(bench.raw_streams) == 2 and bench.player.status().changes_done == 2)
     assert bench.hear(bench.raw_streams[-1], 20).any()

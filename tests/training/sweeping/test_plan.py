@@ -137,7 +137,7 @@ def test_committed_plans_are_whole() -> None:
     assert counts == Counter(
         {(model, "ours"): n for model, n in ours.items()}
         | {(model, "paper"): n for model, n in paper.items()}
-        | {("koopman", "blind"): 4}
+        | {("koopman", "blind"): 8, ("koopman_integrated", "blind"): 8}
     )
     # one seed of ours everywhere before two anywhere
     seeds = [run.cell.seed for run in tables.runs if run.cell.recipe == "ours"]
