@@ -11,6 +11,7 @@ while it is known to less than half a turn, so the first fit sees a dozen frames
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +82,7 @@ def fit_phases(modes: Modes, seed: int) -> Phases:
         if last == frames - 1:
             break
         last = min(frames - 1, int(MORE_FRAMES * last) + 1)
+    found = [_upright(guess) for guess in found]
     omega, sigma, real, imag = np.array(found)[:, :4].T
     return Phases(
         torch.from_numpy(-np.maximum(sigma, slowest) + 1j * omega),
@@ -95,6 +97,13 @@ def _first_guess(motions: Floats, count: int) -> Floats:
     now = first[:, 1:-1]
     cosine = np.sum(now * (first[:, 2:] + first[:, :-2])) / (2 * np.sum(now**2))
     return np.array([np.arccos(np.clip(cosine, -1, 1)), 0.0, 1.0, 0.0, *np.zeros(count)])
+
+
+def _upright(guess: Floats) -> Floats:
+    """The same motion with ω ≥ 0: its cosine does not tell a phase from the negative one."""
+    omega, sigma, real, imag = guess[:4]
+    sign = math.copysign(1.0, omega)
+    return np.array([sign * omega, sigma, real, sign * imag, *sign * guess[4:]])
 
 
 @dataclass(frozen=True)

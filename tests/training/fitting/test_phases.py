@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -15,7 +16,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import PHASES, fit, initialisation_of
 from training.fitting.modes import Modes
-from training.fitting.phases import fit_phases, start_from_phases
+from training.fitting.phases import _Motion, _upright, fit_phases, start_from_phases
 
 STEPS = 450
 
@@ -47,6 +48,16 @@ def test_what_follows_its_equation_is_found_exactly() -> None:
     torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
     torch.testing.assert_close(found.coupling, coupling, rtol=1e-4, atol=1e-7)
     torch.testing.assert_close(found.starts, torch.ones(3, dtype=torch.complex128), rtol=0, atol=1e-6)
+
+
+def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
+    times, starts = np.arange(1.0, 50.0), np.linspace(0.1, 1, 49)
+    motion = _Motion(starts, starts, times, np.outer(times, [1.0, 0.5]))
+    found = np.array([-0.01, 0.002, 0.9, 0.2, 0.03, -0.05])
+    upright = _upright(found)
+    assert upright[0] == 0.01
+    np.testing.assert_allclose(motion._latent(upright).real, motion._latent(found).real, rtol=1e-12)
+    np.testing.assert_array_equal(_upright(upright), upright)
 
 
 @pytest.mark.parametrize(("state_size", "physical_units"), [(5, True), (7, False)])
