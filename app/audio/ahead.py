@@ -1,10 +1,14 @@
-"""What the feeder knew before each block in the queue: a command goes back to the first that it can change."""
+"""What the feeder knew before each block in the queue.
+
+A command goes back to the first that it can change, and rendering to the first that lacked what it brings.
+"""
 
 from __future__ import annotations
 
 import copy
 from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +35,21 @@ class Moment:
 
 @dataclass(frozen=True)
 class Mixed:
-    """A block, what was before it, and the status after it."""
+    """A block, what was before it, and the status after it.
+
+    Attributes:
+        steady: whether only a command can make another block of it; otherwise rendering can, too.
+    """
 
     before: Moment
+    steady: bool
     block: NDArray[np.float32]
+    after: MixerStatus
+
+
+class _Noted(NamedTuple):
+    before: Moment
+    steady: bool
     after: MixerStatus
 
 
@@ -42,11 +57,11 @@ class Ahead:
     """Moments and the status after them, one of each for a block in the queue."""
 
     def __init__(self) -> None:
-        self._blocks: deque[tuple[Moment, MixerStatus]] = deque()
+        self._blocks: deque[_Noted] = deque()
 
     def note(self, mixed: Mixed) -> None:
         """The latest block in the queue."""
-        self._blocks.append((mixed.before, mixed.after))
+        self._blocks.append(_Noted(mixed.before, mixed.steady, mixed.after))
 
     def forget_played(self, queued_blocks: int) -> None:
         while len(self._blocks) > queued_blocks:
@@ -54,7 +69,18 @@ class Ahead:
 
     def moment_before(self, blocks: int) -> Moment | None:
         """What was before the last so many; None where they are none, or not all of them ours."""
-        return self._blocks[-blocks][0] if 0 < blocks <= len(self._blocks) else None
+        return self._blocks[-blocks].before if 0 < blocks <= len(self._blocks) else None
+
+    def settled(self, blocks: int, frames: int) -> int:
+        """How many of the last `blocks`, of so many frames each, follow from the first that is now steady and was not.
+
+        They were mixed before rendering had come so far, and can be mixed better.
+        """
+        for number in range(min(blocks, len(self._blocks)), 0, -1):
+            noted = self._blocks[-number]
+            if not noted.steady and noted.before.mixer.steady(frames):
+                return number
+        return 0
 
     def forget_last(self, blocks: int) -> None:
         for _ in range(min(blocks, len(self._blocks))):
@@ -62,4 +88,4 @@ class Ahead:
 
     def status_in(self, blocks: int) -> MixerStatus | None:
         """After the block that is `blocks` from the loudspeaker, or the last before it."""
-        return self._blocks[min(blocks, len(self._blocks)) - 1][1] if self._blocks else None
+        return self._blocks[min(blocks, len(self._blocks)) - 1].after if self._blocks else None

@@ -214,6 +214,7 @@ class Player:
             while not self._closing.is_set():
                 self._wait_for_space(_WAIT_S)
                 self._obey_commands()  # after the wait, so that the block to come knows the latest of them
+                self._mend()
                 if self._wait_for_space(0):  # again: a command may have used it, or changed the output
                     self._write_block()
                     self._end_stall()
@@ -249,15 +250,22 @@ class Player:
             else:
                 self._remix(list(commands))
 
-    def _remix(self, commands: Sequence[_Command]) -> None:
-        """Obeys in the earliest block that can still be another.
+    def _mend(self) -> None:
+        """Mixes anew what was mixed before rendering had come so far."""
+        output = self._output
+        self._ahead.forget_played(output.queued_blocks)
+        if late := self._ahead.settled(output.changeable_blocks, output.block_frames):
+            self._remix([], late)
+
+    def _remix(self, commands: Sequence[_Command], last: int | None = None) -> None:
+        """Obeys in the earliest block that can still be another, or the earliest of the last so many.
 
         What was mixed stays in the queue until its place is taken, so that no gap depends on how long that takes. If
         the device comes so far meanwhile, all is done again from a later block.
         """
         output, latest = self._output, Moment(self._mixer, self._tone)
         while True:
-            count = output.changeable_blocks
+            count = output.changeable_blocks if last is None else min(last, output.changeable_blocks)
             self._ahead.forget_played(output.queued_blocks)
             moment = self._ahead.moment_before(count)
             self._mixer, self._tone = (moment or latest).again()
@@ -298,11 +306,12 @@ class Player:
 
     def _mixed_block(self) -> Mixed:
         before = Moment.of(self._mixer, self._tone)
+        steady = self._mixer.steady(self._output.block_frames)
         block = self._mixer.next_block(self._output.block_frames)
         if self._tone is not None:
             block = np.clip(block + self._tone.next_block(len(block)), -1, 1)
             self._tone = None if self._tone.over else self._tone
-        return Mixed(before, block, self._mixer.status())
+        return Mixed(before, steady, block, self._mixer.status())
 
     def _write_block(self) -> None:
         mixed = self._mixed_block()

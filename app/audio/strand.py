@@ -79,12 +79,13 @@ class Strand:
         """Whether the next frames will be the same whatever is rendered meanwhile."""
         if not self.running:
             return True
-        if self.incoming is not None:
-            return False
-        ready_frames = self.track.ready_frames - self._frames(DECLICK_S)
-        return self.track.complete or (
-            self._voice is not None and not self._voice.fading_out and self.position_frames + frames <= ready_frames
-        )
+        track, voice = self.incoming or self.track, self._voice
+        if voice is not None and voice.fading_out and not track.complete:
+            return False  # it runs dry: who knows for how long
+        ahead = frames + self._frames(DECLICK_S)
+        if self.incoming is not None or voice is None:
+            ahead = max(ahead, self._reserve_frames)
+        return _reaches(track, self.position_frames + ahead)
 
     def place(self, position_frames: int, fade_in_s: float) -> None:
         """Puts the playhead down where the next voice is to begin; a present voice must have been retired."""
@@ -138,10 +139,9 @@ class Strand:
         while self.running:
             track, voice = self.track, self._voice
             if voice is None:
-                reserve_s = START_RESERVE_S if self._position_frames == 0 else RESUME_RESERVE_S
                 if self.at_end:
                     self._turn_back_or_stop()
-                elif _reaches(track, self._position_frames + self._frames(reserve_s)):
+                elif _reaches(track, self._position_frames + self._reserve_frames):
                     self._voice = self._voice_at(self._position_frames, self._fade_in_s)
                 else:
                     return most  # waiting for the render worker
@@ -169,6 +169,11 @@ class Strand:
         for voice in self._leaving if self._voice is None else [*self._leaving, self._voice]:
             voice.add_to(out, levels)
         self._leaving = [voice for voice in self._leaving if voice.frames_left > 0]
+
+    @property
+    def _reserve_frames(self) -> int:
+        """So many must be ready from the playhead on before a voice begins there."""
+        return self._frames(START_RESERVE_S if self.position_frames == 0 else RESUME_RESERVE_S)
 
     def _turn_back_or_stop(self) -> None:
         if self.loop and self.track.ready_frames > 0:

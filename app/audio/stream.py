@@ -30,6 +30,7 @@ BLOCK_FRAMES = 256
 SHORTEST_BLOCK = 64
 BUFFER_S = 0.025  # of ready sound that a command waits for
 AHEAD_S = 0.25  # and of more, which it replaces: outlasts a busy moment of Python
+SOON_S = 0.05  # of that in any case: right after a command, and where rendering may still change it
 REPLACED_S = 0.02  # of new sound that takes the old one's place in one go, where it is rendered
 STALLED_AFTER_S = 1.5  # without a callback
 LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
@@ -82,6 +83,7 @@ class OutputStream:
         self.prompt_blocks = blocks  # always kept ready; a command is heard after them
         # no more than what is kept ready meanwhile: the device must not be there first
         self.replaced_blocks = min(math.ceil(REPLACED_S * self.rate_hz / block_frames), blocks - 1)
+        self._soon_blocks = blocks + math.ceil(SOON_S * self.rate_hz / block_frames)
         self._most_blocks = blocks + math.ceil(AHEAD_S * self.rate_hz / block_frames)
         for _ in range(self._most_blocks + self.replaced_blocks + 1):  # one is with the callback
             self._free.append(np.zeros((block_frames, min(device.channels, 2)), np.float32))
@@ -104,9 +106,9 @@ class OutputStream:
         """Waits for the device to take a block, if there is no space; returns whether one can be written.
 
         Args:
-            ahead: Up to `AHEAD_S` beyond what is always kept ready. That room opens with every block that is
-                played since `replace`, so that the feeder catches up at twice the pace of the sound and a
-                knob that is turned costs little.
+            ahead: Up to `AHEAD_S` beyond what is always kept ready, otherwise up to `SOON_S`. What is beyond that
+                opens with every block that is played since `replace`, so that the feeder catches up at twice the
+                pace of the sound and a knob that is turned costs little.
         """
         if not self._has_space(ahead):
             with contextlib.suppress(Empty):
@@ -191,8 +193,8 @@ class OutputStream:
         return buffer
 
     def _has_space(self, ahead: bool) -> bool:
-        earned = self.replaced_blocks + self.callback_count - self._replaced_at if ahead else 0
-        return len(self._ready) < min(self.prompt_blocks + earned, self._most_blocks)
+        earned = self.callback_count - self._replaced_at if ahead else 0
+        return len(self._ready) < min(self._soon_blocks + earned, self._most_blocks)
 
     def _count_underrun(self) -> None:
         if self.callback_count > self._settled_count:

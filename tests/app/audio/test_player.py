@@ -12,7 +12,7 @@ from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Mixer, Player
 from app.audio import player as player_module
 from app.audio import stream as stream_module
 from app.audio.problems import no_device, vanished
-from app.audio.stream import AHEAD_S, OutputStream
+from app.audio.stream import AHEAD_S, BUFFER_S, SOON_S, OutputStream
 
 RATE_HZ = 48_000
 BLOCK_FRAMES = 256
@@ -68,13 +68,18 @@ class Bench:
         """Lets the device play, never faster than the player feeds it; shape (frames,)."""
         heard = []
         output = raw.callback.__self__
-        obeyed = threading.Event()
-        self.player._send(obeyed.set, of_output=True)
-        wait_until(obeyed.is_set)  # a device that took its time would see to that
+        self.let_it_see()  # a device that took its time would see to that
         for _ in range(blocks):
             wait_until(lambda: output.frames_queued - output.frames_written >= 4 * BLOCK_FRAMES)
             heard.append(raw.tick()[:, 0])
         return np.concatenate(heard)
+
+    def let_it_see(self) -> None:
+        """Until the feeder has obeyed what it was told, and taken what is rendered."""
+        for _ in range(2):  # it looks after rendering when it has obeyed
+            seen = threading.Event()
+            self.player._send(seen.set, of_output=True)
+            wait_until(seen.is_set)
 
     def _look_up(self, device: AudioDevice | None, rescan: bool) -> AudioDevice:
         if not self.devices:
@@ -235,17 +240,60 @@ def test_a_busy_moment_of_the_interpreter_is_not_heard(bench: Bench, monkeypatch
     assert bench.player.status().underruns == 0
 
 
-def test_nothing_is_mixed_ahead_that_rendering_may_still_change(bench: Bench) -> None:
+def test_a_busy_moment_after_a_command_is_not_heard(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as a few blocks of sound; what is further ahead has been taken back for the command."""
+    raw = bench.play(make_track())
+    bench.hear(raw, 100)
+    bench.player.select("truth")
+    bench.let_it_see()
+    output = raw.callback.__self__
+    wait_until(lambda: output.queued_blocks * BLOCK_FRAMES >= (BUFFER_S + SOON_S - 0.01) * RATE_HZ)
+    goes_on = threading.Event()
+    next_block = Mixer.next_block
+    monkeypatch.setattr(Mixer, "next_block", lambda *these: goes_on.wait(10) and next_block(*these))
+    for _ in range(round(0.06 * RATE_HZ / BLOCK_FRAMES)):
+        raw.tick()
+    goes_on.set()
+    assert bench.player.status().underruns == 0
+
+
+def test_what_rendering_may_change_is_mixed_a_little_ahead_and_changed(bench: Bench) -> None:
     track = Track(RATE_HZ, RATE_HZ, ("model", "truth"))
     raw = bench.play(track)
     bench.hear(raw, 100)  # of silence: the render worker has not begun
     output = raw.callback.__self__
-    assert output.queued_blocks <= output.prompt_blocks
+    assert output.queued_blocks * BLOCK_FRAMES <= (BUFFER_S + SOON_S + 0.01) * RATE_HZ
     samples = np.full(RATE_HZ // 2, 0.5)
     track.append({"model": samples, "truth": samples})
     assert np.argmax(bench.hear(raw, 20) != 0) <= 0.03 * RATE_HZ
     bench.hear(raw, 50)
-    wait_until(lambda: output.queued_blocks > 2 * output.prompt_blocks)
+    wait_until(lambda: output.queued_blocks > 4 * output.prompt_blocks)
+
+
+def test_rendering_that_is_only_just_ahead_is_heard_whole(bench: Bench) -> None:
+    """The queue goes further than what is rendered: there it fades out, until more comes."""
+    whole = make_track()
+    track = Track(RATE_HZ, RATE_HZ, whole.sources)
+
+    def render(frames: int) -> None:
+        done = track.ready_frames
+        track.append({source: whole.read(source, done, done + frames) for source in whole.sources})
+
+    render(round(0.05 * RATE_HZ))
+    bench.add("Headphones")
+    raw = bench.open(None)
+    heard = [bench.hear(raw, 20)]
+    bench.player.strike(track, "model")
+    while track.ready_frames < RATE_HZ:
+        bench.let_it_see()
+        heard.append(bench.hear(raw, 1))
+        render(min(BLOCK_FRAMES, RATE_HZ - track.ready_frames))
+    track.finish()
+    heard.append(bench.hear(raw, 40))
+    mixer = Mixer(RATE_HZ)
+    mixer.load(whole)
+    mixer.play()
+    assert_heard(np.concatenate(heard), mixer)
 
 
 def test_the_position_is_that_of_what_is_heard(bench: Bench) -> None:
