@@ -22,25 +22,43 @@ def advance(
     kicks: Array,
     coupling: Array,
     eta_squared: Array,
-    substeps: int,
+    substeps: NDArray[np.int64],
+    levels: NDArray[np.int64],
+    inverse_omega_squared: Array,
+    silence: float,
 ) -> None:
     """Advances amplitudes q and velocities v (batch, modes) in place; writes out (batch, steps, modes).
 
-    flows (stages, 4, modes): exact rotations; kicks (stages - 1,): lengths in s of the kicks between them.
+    flows (levels, stages, 4, modes): exact rotations; kicks (levels, stages - 1): lengths in s of the kicks between
+    them; substeps (levels,) per sample. As long as the lowest n modes move, all is done at levels[n - 1]. Before each
+    sample the highest that moves is laid to rest where its amplitude is below `silence` of that of all together.
     """
     batch, steps, modes = out.shape
-    stages = flows.shape[0]
+    stages = flows.shape[1]
     for b in range(batch):
         qb, vb = q[b], v[b]
+        moving = modes
         for step in range(steps):
-            for _ in range(substeps):
+            if silence > 0:
+                total = 0.0
+                for n in range(moving):
+                    total += qb[n] * qb[n] + inverse_omega_squared[n] * vb[n] * vb[n]
+                while moving > 1:
+                    n = moving - 1
+                    own = qb[n] * qb[n] + inverse_omega_squared[n] * vb[n] * vb[n]
+                    if not own < silence * silence * total:  # so that NaN is kept
+                        break
+                    qb[n] = vb[n] = 0.0
+                    moving = n
+            level = levels[moving - 1]
+            for _ in range(substeps[level]):
                 stretch = 0.0
                 for stage in range(stages):
-                    kick = kicks[stage - 1] * stretch if stage > 0 else 0.0
-                    flow = flows[stage]
+                    kick = kicks[level, stage - 1] * stretch if stage > 0 else 0.0
+                    flow = flows[level, stage]
                     qq, qv, vq, vv = flow[0], flow[1], flow[2], flow[3]
                     stretch = 0.0
-                    for n in range(modes):
+                    for n in range(moving):
                         amplitude = qb[n]
                         velocity = vb[n] - kick * coupling[n] * amplitude
                         rotated = qq[n] * amplitude + qv[n] * velocity

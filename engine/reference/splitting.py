@@ -46,6 +46,9 @@ class SplittingSolver:
     Args:
         modes: number of modes kept.
         substeps: integration steps per sample; None takes `default_substeps`. The linear string needs one.
+        silence: where above 0, the highest modes are left out from when their amplitudes fall below this share of all
+            modes' together (no mode moves another that rests), and the sub-steps follow the highest that is left: a
+            string that rings on costs a fraction of one that was just let go. Only on the CPU.
         device: where to compute; a state is moved there.
     """
 
@@ -57,23 +60,33 @@ class SplittingSolver:
         *,
         tension_modulated: bool,
         substeps: int | None = None,
+        silence: float = 0.0,
         device: torch.device | str = "cpu",
     ) -> None:
         if not rate_hz > 0:
             raise ValueError(f"sample rate must be above 0 Hz, not {rate_hz}")
         if substeps is not None and substeps < 1:
             raise ValueError(f"substeps must be at least 1, not {substeps}")
+        if not 0 <= silence < 1:
+            raise ValueError(f"silence must be a share from 0 to below 1, not {silence}")
         self.modes = modes
         self.rate_hz = rate_hz
         self.tension_modulated = tension_modulated
         self.substeps = (substeps or default_substeps(string, modes, rate_hz)) if tension_modulated else 1
         self.device = torch.device(device)
-        step_s = 1 / (rate_hz * self.substeps)
+        self._silence = silence
+        omega = string.undamped_frequencies(modes)
+        self._inverse_omega_squared = omega.pow(-2)
+        # sub-steps by how many modes move, and what depends on them, once for each number that there is
+        wanted = torch.ceil(self.substeps * omega / omega[-1]) if silence else torch.full_like(omega, self.substeps)
+        self._substeps, self._levels = wanted.long().unique(return_inverse=True)
+        steps_s = 1 / (rate_hz * self._substeps.double())[:, None]
         rotations = ROTATIONS if tension_modulated else (1.0,)
-        times_s = torch.tensor(rotations, dtype=torch.float64) * step_s
-        self._flows = damped_rotation(string, modes, times_s).reshape(-1, 4, modes).to(self.device)
+        times_s = torch.tensor(rotations, dtype=torch.float64) * steps_s
+        flows = damped_rotation(string, modes, times_s.flatten())
+        self._flows = flows.reshape(*times_s.shape, 4, modes).to(self.device)
         kicks = KICKS if tension_modulated else ()
-        self._kicks = torch.tensor(kicks, dtype=torch.float64) * step_s
+        self._kicks = torch.tensor(kicks, dtype=torch.float64) * steps_s
         self._coupling = string.tension_coupling(modes).to(self.device)
         self._eta_squared = string.wavenumbers(modes).square().to(self.device)
 
@@ -99,10 +112,12 @@ class SplittingSolver:
         # compiles, or loads what it compiled earlier: only when it is needed
         from engine.reference._splitting_kernel import advance
 
-        constants = [t.numpy() for t in (self._flows, self._kicks, self._coupling, self._eta_squared)]
+        of_flow = (self._flows, self._kicks, self._coupling, self._eta_squared)
+        of_level = (self._substeps, self._levels, self._inverse_omega_squared)
+        constants = [t.numpy() for t in (*of_flow, *of_level)]
 
         def run(rows: slice) -> None:
-            advance(q[rows].numpy(), v[rows].numpy(), out[rows].numpy(), *constants, self.substeps)
+            advance(q[rows].numpy(), v[rows].numpy(), out[rows].numpy(), *constants, self._silence)
 
         workers = min(torch.get_num_threads(), os.cpu_count() or 1, q.shape[0])
         if workers <= 1:
@@ -113,10 +128,10 @@ class SplittingSolver:
             list(pool.map(run, (slice(i, i + share) for i in range(0, q.shape[0], share))))
 
     def _advance_tensors(self, q: Tensor, v: Tensor, out: Tensor) -> None:
-        kicks = self._kicks.tolist()
+        kicks = self._kicks[-1].tolist()
         for step in range(out.shape[1]):
             for _ in range(self.substeps):
-                for stage, (qq, qv, vq, vv) in enumerate(self._flows):
+                for stage, (qq, qv, vq, vv) in enumerate(self._flows[-1]):
                     if stage:
                         stretch = (self._eta_squared * q * q).sum(-1, keepdim=True)
                         v -= kicks[stage - 1] * stretch * self._coupling * q

@@ -43,6 +43,38 @@ def test_default_accuracy_on_the_worst_of_the_protocol(initial: str, rate_hz: in
     assert relative_l2(found, truth) < 1e-7
 
 
+@pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
+def test_modes_that_have_died_away_may_be_left_out(initial: str, rate_hz: int, modes: int) -> None:
+    state = worst_of_protocol(initial, modes)
+    full, ended = SplittingSolver(STRING, modes, rate_hz, tension_modulated=True).advance(state, 2 * rate_hz)
+    solver = SplittingSolver(STRING, modes, rate_hz, tension_modulated=True, silence=1e-9)
+    found, rests = solver.advance(state, 2 * rate_hz)
+    assert relative_l2(found, full) < 1e-7
+    moving = rests.amplitude != 0
+    assert 0 < moving.sum() < modes
+    assert (ended.amplitude[~moving].abs() < 1e-8 * ended.amplitude.norm()).all()
+    assert (rests.velocity[~moving] == 0).all()
+
+
+def test_what_is_left_out_does_not_depend_on_the_blocks() -> None:
+    solver = SplittingSolver(STRING, 25, 16_000, tension_modulated=True, silence=1e-9)
+    state = worst_of_protocol("gaussian", 25)
+    whole, _ = solver.advance(state, 4000)
+    blocks = []
+    for steps in (1, 7, 992, 3000):
+        block, state = solver.advance(state, steps)
+        blocks.append(block)
+    torch.testing.assert_close(torch.cat(blocks, dim=1), whole, rtol=0, atol=0)
+
+
+def test_a_string_at_rest_or_beyond_numbers_stays_so() -> None:
+    solver = SplittingSolver(STRING, 5, 16_000, tension_modulated=True, silence=1e-9)
+    state = ModalState.at_rest(torch.stack([torch.zeros(5), torch.full((5,), torch.nan)]).double())
+    rest, nan = solver.advance(state, 10)[0]
+    assert (rest == 0).all()
+    assert nan.isnan().all()
+
+
 def test_order_of_convergence() -> None:
     """Order 4 in the perturbation at least: halving the step divides the error by 16 or more."""
     state = worst_of_protocol("noise", 25)
@@ -142,6 +174,8 @@ def test_default_substeps_follow_the_highest_mode() -> None:
 def test_bad_requests_are_named() -> None:
     with pytest.raises(ValueError, match="sample rate must be above 0"):
         SplittingSolver(STRING, 5, 0, tension_modulated=True)
+    with pytest.raises(ValueError, match="silence"):
+        SplittingSolver(STRING, 5, 16_000, tension_modulated=True, silence=1.0)
     with pytest.raises(ValueError, match="substeps must be at least 1"):
         SplittingSolver(STRING, 5, 4_000, tension_modulated=True, substeps=0)
     solver = SplittingSolver(STRING, 5, 4_000, tension_modulated=True)
