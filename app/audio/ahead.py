@@ -72,7 +72,7 @@ class Ahead:
         return self._blocks[-blocks].before if 0 < blocks <= len(self._blocks) else None
 
     def settled(self, blocks: int, frames: int) -> int:
-        """How many of the last `blocks`, of so many frames each, follow from the first that is now steady and was not.
+        """How many of the last `blocks`, of `frames` each, follow from the first that is steady now and was not.
 
         They were mixed before rendering had come so far, and can be mixed better.
         """

@@ -4,42 +4,61 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
 
 from app.audio.strand import START_RESERVE_S
 from app.rendering.converter import GUARD_FRAMES
 from app.rendering.line import Line
+from app.rendering.listening import Listening
 from app.rendering.loaded import Loaded
 from app.rendering.request import OTHER, RenderListener, RenderRequest
 from app.rendering.sound import Read, Sound
 from app.rendering.take import SOURCES, Motion, Take
 from app.rendering.velocity import REACH_FRAMES
+from engine.metrics import ErrorSums
 from engine.preset import PresetError
 
+Block = NDArray[np.float32]
+
 FIRST_STEPS = 256  # small, so that a pluck sounds at once; more where that is not enough for it to begin
-BLOCK_FRAMES = 512  # what a processor's cache holds: four times as much takes six times as long
+BLOCK_FRAMES = 512  # another pluck waits for no more
+LARGE_BLOCK_FRAMES = 1024  # cost less each, once the sound is
+COMFORTABLE_S = 0.1  # ahead
 TAIL_BLOCK_FRAMES = 1024  # without the motion more fit
 
 
 class Job:
     """Renders a request; `advance` does the next piece of it.
 
+    Args:
+        load: the model and the truth of a preset's file.
+        helper: another thread, so that two sources are rendered at the same time.
+
     Attributes:
         struck: it is to sound to its end, even when it is no longer on stage.
     """
 
-    def __init__(self, request: RenderRequest, load: Callable[[Path], Loaded], listener: RenderListener) -> None:
+    def __init__(
+        self, request: RenderRequest, load: Callable[[Path], Loaded], listener: RenderListener, helper: Executor
+    ) -> None:
         self.request = request
         self.struck = request.struck
         self._started_s: float | None = None
         self._load = load
         self._listener = listener
+        self._helper = helper
         self._lines: dict[str, Line] = {}
         self._take: Take | None = None  # while it is on stage
+        self._errors = ErrorSums(0)
         self._sound: Sound | None = None
         self._on_stage = True
-        self._measured = False
+        self._finished = False  # and told
 
     def ask_again(self, request: RenderRequest) -> None:
         """The same motion is to be heard otherwise: the next `advance` makes its sound anew."""
@@ -62,17 +81,21 @@ class Job:
         if self._sound is None:
             return not self._on_stage
         if self._on_stage:
-            return self._measured and not self._sound.unfinished
+            return self._finished and not self._sound.unfinished
         return not self._sound.unfinished or self._sound.track is None
 
     def ahead_s(self, now_s: float) -> float:
-        """How far the rendering is ahead of a playhead that has moved since the start."""
-        return 0.0 if self._started_s is None else self._rendered_s - (now_s - self._started_s)
+        """How far the rendering is ahead of a playhead that has moved since the start; no job is behind a new one."""
+        return -math.inf if self._started_s is None else self._rendered_s - (now_s - self._started_s)
 
     @property
     def started(self) -> bool:
         """Whether its first block was told."""
         return self._started_s is not None
+
+    @property
+    def _block_frames(self) -> int:
+        return LARGE_BLOCK_FRAMES if self.ahead_s(time.monotonic()) > COMFORTABLE_S else BLOCK_FRAMES
 
     @property
     def _rendered_s(self) -> float:
@@ -90,17 +113,11 @@ class Job:
             return
         take = self._take = self._take or self._begin()
         self._find_others(take)
-        if not take.complete:
-            model, truth = self._lines["model"], self._lines["truth"]
-            wanted = BLOCK_FRAMES if truth.done else _first_frames(truth.rate_hz)
-            frames = min(wanted, take.frames - truth.done)
-            take.append(model.advance(frames), truth.advance(frames))
-            take.model_ends_s = model.ends_s
-        if self._advance_others(take):
+        if self._advance_motions(take):
             self._make_sound(take)
-            if take.complete and not self._measured:
-                self._measured = True
-                self._listener.take_finished(take, take.error_sums())
+            if take.complete and not self._finished:
+                self._finished = True
+                self._listener.take_finished(take, self._errors)
 
     def _begin(self) -> Take:
         pluck, seconds = self.request.pluck, self.request.seconds
@@ -108,6 +125,7 @@ class Job:
         info = loaded.preset.info
         self._lines["model"] = Line(loaded.model, info, pluck, seconds)
         self._lines["truth"] = Line(loaded.truth, info, pluck, seconds)
+        self._errors = ErrorSums(self._lines["truth"].frames - 1)
         return Take(loaded.preset.name, info, pluck, seconds)
 
     def _find_others(self, take: Take) -> None:
@@ -125,19 +143,42 @@ class Job:
             self._lines[name] = line
             take.others[name] = Motion(line.rate_hz, line.grid_points, take.seconds)
 
+    def _advance_motions(self, take: Take) -> bool:
+        """Renders a block of both sources, and others up to there; whether they have come so far."""
+        model, truth = (self._lines[name] for name in SOURCES)
+        first = truth.done
+        frames = min(self._block_frames if first else _first_frames(truth.rate_hz), take.frames - first)
+        end_s = (first + frames) / truth.rate_hz if first + frames < take.frames else take.seconds + 1.0
+        others = {name: self._lines[name] for name in self._wanted()[len(SOURCES) :]}
+        behind = {name: min(LARGE_BLOCK_FRAMES, line.until(end_s)) for name, line in others.items()}
+        blocks = self._advance_lines({**dict.fromkeys(SOURCES, frames), **behind})
+        for name in others:
+            take.others[name].append(blocks[name])
+        if frames:
+            take.append(blocks["model"], blocks["truth"])
+            take.model_ends_s = model.ends_s
+            self._measure(first, blocks)
+        return not any(line.until(end_s) for line in others.values())
+
     def _wanted(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
-    def _advance_others(self, take: Take) -> bool:
-        """Renders a block of those that are behind; whether all have caught up."""
-        end_s = take.seconds + 1.0 if take.complete else take.ready_frames / take.info.rate_hz
-        left = 0
-        for name in self._wanted()[len(SOURCES) :]:
+    def _advance_lines(self, frames: Mapping[str, int], listening: Listening | None = None) -> dict[str, Block]:
+        """The next frames of each source, or what is heard of them; the first here, the helper does the others."""
+
+        def advance(name: str) -> Block:
             line = self._lines[name]
-            if frames := min(BLOCK_FRAMES, line.until(end_s)):
-                take.others[name].append(line.advance(frames))
-            left += line.until(end_s)
-        return left == 0
+            return line.advance(frames[name], None if listening is None else listening.weights(line.grid_points))
+
+        own, *others = frames
+        pending = {name: self._helper.submit(advance, name) for name in others}
+        return {own: advance(own)} | {name: block.result() for name, block in pending.items()}
+
+    def _measure(self, first: int, blocks: Mapping[str, Block]) -> None:
+        """Adds the error of new frames, the earliest of which is `first`; frame 0 is no prediction."""
+        skipped = int(first == 0)
+        model, truth = (torch.from_numpy(blocks[name][None, skipped:]) for name in SOURCES)
+        self._errors.add(model, truth, first + skipped - 1, row=0)
 
     def _make_sound(self, take: Take) -> None:
         """Feeds the track with what is new; one that is made anew is told when it is as long as the motion."""
@@ -172,12 +213,9 @@ class Job:
             take, self._take = self._take, None
             self._feed_motion(take, sound)
         end_s = self._rendered_s + TAIL_BLOCK_FRAMES / self._lines["truth"].rate_hz
-        reads = {}
-        for name in sound.frames_read:
-            line = self._lines[name]
-            signal = line.advance(line.until(end_s), sound.listening.weights(line.grid_points))
-            reads[name] = Read(signal, line.done == line.frames)
-        sound.feed(reads)
+        behind = {name: self._lines[name].until(end_s) for name in sound.frames_read}
+        heard = self._advance_lines(behind, sound.listening)
+        sound.feed({name: Read(heard[name], self._lines[name].complete) for name in heard})
 
 
 def _first_frames(rate_hz: int) -> int:

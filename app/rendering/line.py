@@ -38,6 +38,10 @@ class Line:
         self._initial = initial if source is not None else torch.zeros_like(initial)
         self._state = None if source is None else source.start(initial)
 
+    @property
+    def complete(self) -> bool:
+        return self.done == self.frames
+
     def until(self, time_s: float) -> int:
         """How many more frames there are before a time."""
         return max(0, min(self.frames, math.ceil(time_s * self.rate_hz)) - self.done)

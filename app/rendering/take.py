@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 from engine.preset import PresetInfo
 from engine.sine_transform import listening_weights
@@ -112,13 +111,6 @@ class Take:
     def signal_m(self, source: str, listen: float, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
         """Displacement at the listening point for frames start … stop so far, in m."""
         return self.motion_m(source)[start:stop] @ _weights(listen, self.info.grid_points)
-
-    def error_sums(self) -> ErrorSums:
-        """Model against truth in every frame so far after the initial one, over all of the string."""
-        sums = ErrorSums(self.ready_frames - 1)
-        model, truth = (torch.from_numpy(self.motion_m(name)[None, 1:]) for name in SOURCES)
-        sums.add(model, truth)
-        return sums
 
 
 @lru_cache(maxsize=8)  # asked for many times a second

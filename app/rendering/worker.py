@@ -1,8 +1,8 @@
 """The render worker: the one thread that owns models and states while plucks are rendered.
 
 It takes the latest request: a newer one abandons the older, unless that was struck; then it sounds to its end,
-and the worker goes on with its sound beside the new one. A request that differs only in how the motion is listened
-to keeps the motion and makes its sound anew.
+and the worker goes on with its sound beside the new one, as far as the computer keeps up. A request that differs only
+in how the motion is listened to keeps the motion and makes its sound anew.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from engine.preset import PresetError, load_preset
 
 KEPT_PRESETS = 4  # loaded ones, the latest used
 TIDY_AFTER_S = 1.0  # without anything to render
+LOST_S = 0.5  # an earlier pluck that is rendered so much too late ends, so that the latest is heard whole
 
 
 class RenderWorker:
@@ -36,6 +38,7 @@ class RenderWorker:
         self._tails: list[Job] = []  # struck earlier, and not rendered to their ends
         self._presets: dict[Path, Loaded] = {}
         self._untidy = False  # something was rendered since free memory was given back
+        self._helper = ThreadPoolExecutor(1, "render-helper", step_back, (Rank.RENDERING,))
         self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
         self._thread.start()
 
@@ -61,6 +64,7 @@ class RenderWorker:
             self._closing = True
             self._mailbox.notify()
         self._thread.join(10)
+        self._helper.shutdown(wait=False)
 
     # All below runs in the worker's thread.
 
@@ -96,13 +100,18 @@ class RenderWorker:
             self._tails.append(stage)
         elif stage is not None:
             stage.give_up()
-        self._stage = Job(request, self._loaded, self._listener)
+        self._stage = Job(request, self._loaded, self._listener, self._helper)
 
     def _most_urgent(self) -> Job | None:
         """The job whose rendering is least ahead of its sound."""
-        self._tails = [job for job in self._tails if not job.idle]
-        jobs = [*self._tails, self._stage] if self._stage is not None and not self._stage.idle else self._tails
         now_s = time.monotonic()
+        tails, self._tails = self._tails, []
+        for job in tails:
+            if job.ahead_s(now_s) < -LOST_S:
+                job.give_up()
+            elif not job.idle:
+                self._tails.append(job)
+        jobs = [*self._tails, self._stage] if self._stage is not None and not self._stage.idle else self._tails
         return min(jobs, key=lambda job: job.ahead_s(now_s), default=None)
 
     def _advance(self, job: Job) -> None:

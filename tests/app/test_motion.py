@@ -105,12 +105,6 @@ def test_listening_at_a_grid_point_hears_that_point() -> None:
     assert take.signal_m("model", 0.37) == pytest.approx(take.motion_m("model")[:, 37], abs=1e-9)
 
 
-def test_errors_of_a_take() -> None:
-    total = sine_take().error_sums().total()
-    assert total.rel_mse == pytest.approx(0.25, rel=1e-3)
-    assert total.rel_mae == pytest.approx(0.5, rel=1e-3)
-
-
 def test_an_empty_take_has_a_picture() -> None:
     take = Take("t", INFO, Pluck(), 1.0)
     take.append(np.zeros((1, 101), np.float32), np.zeros((1, 101), np.float32))

@@ -17,6 +17,7 @@ from app.audio import Track
 from app.export import SoundRequest, render_sound
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
+from app.rendering.line import Line
 from app.rendering.velocity import Differentiator
 from app.sound_names import FULL_SCALE_M_S
 from engine.metrics import ErrorSums
@@ -72,7 +73,7 @@ def worker(heard: Heard) -> Iterator[RenderWorker]:
     made = RenderWorker(heard)
     yield made
     made.close()
-    assert "render-worker" not in [t.name for t in threading.enumerate()]
+    wait_until(lambda: not any(thread.name.startswith("render") for thread in threading.enumerate()))
 
 
 def request_of(preset: Path, **changes: object) -> RenderRequest:
@@ -193,6 +194,59 @@ def test_struck_plucks_sound_to_their_ends(small_preset: Path, worker: RenderWor
         found = track.read("truth", 0, 2 * len(expected))[::2]
         late = slice(8_000, 11_900)  # rendered off stage
         assert found[late] == pytest.approx(expected[late], abs=3e-3 * np.abs(expected).max())
+
+
+def slow_down(monkeypatch: pytest.MonkeyPatch, pause_s: float) -> None:
+    advance = Line.advance
+
+    def slow(line: Line, frames: int, readout: torch.Tensor | None = None) -> np.ndarray:
+        time.sleep(pause_s * bool(frames))
+        return advance(line, frames, readout)
+
+    monkeypatch.setattr(Line, "advance", slow)
+
+
+def test_a_new_pluck_does_not_wait_for_a_late_one(
+    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_module, "LOST_S", 1e9)
+    slow_down(monkeypatch, 0.3)  # a block lasts 0.13 s at most
+    worker.submit(request_of(small_preset))
+    worker.strike()
+    wait_until(lambda: bool(heard.started))
+    worker.submit(request_of(small_preset, pluck=Pluck(0.6, 3.0)))
+    worker.strike()
+    wait_until(lambda: len(heard.started) == 2)
+    assert not heard.started[0][1].complete
+    monkeypatch.undo()
+    wait_until(lambda: all(track.complete for _, track in heard.started))
+    assert heard.started[0][1].ready_frames == pytest.approx(8_000, abs=8), "it goes on once there is time"
+
+
+def test_an_earlier_pluck_that_comes_too_late_ends(
+    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow_down(monkeypatch, 0.3)
+    worker.submit(request_of(small_preset))
+    worker.strike()
+    wait_until(lambda: bool(heard.started))
+    worker.submit(request_of(small_preset, pluck=Pluck(0.6, 3.0)))
+    wait_until(lambda: heard.started[0][1].complete)
+    assert heard.started[0][1].ready_frames < 7_000
+    assert not worker._tails
+    monkeypatch.undo()
+    wait_until(lambda: bool(heard.finished))
+    assert heard.started[1][1].ready_frames == pytest.approx(8_000, abs=8)
+
+
+def test_the_error_that_is_told_is_that_of_the_take(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
+    worker.submit(request_of(small_preset))
+    wait_until(lambda: bool(heard.finished))
+    take, errors = heard.finished[0]
+    expected = ErrorSums(take.frames - 1)
+    expected.add(*(torch.from_numpy(take.motion_m(name)[None, 1:].copy()) for name in ("model", "truth")))
+    assert errors.total() == expected.total()
+    assert errors.per_frame()[0] == pytest.approx(expected.per_frame()[0])
 
 
 def test_a_tail_that_nobody_plays_is_given_up(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
