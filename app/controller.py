@@ -43,7 +43,8 @@ from app.views.string_view import StringView
 from engine.preset import SHIPPED
 
 FRAME_MS = 16
-GIVE_WAY_TICKS = 3  # at most so many pictures are left out for the first block of a struck pluck
+GIVE_WAY_TICKS = 3  # at most so many pictures are left out at a time for a pluck whose rendering is not ahead
+COMFORTABLE_S = 0.3  # ahead of what is heard
 ProblemListener = Callable[[AudioProblem], None]
 
 
@@ -289,13 +290,14 @@ class Controller(QObject):
     # Sixty times a second
 
     def _tick(self) -> None:
-        self._ticks_given = self._ticks_given + 1 if self.performance.strikes.awaited else 0
-        if 0 < self._ticks_given <= GIVE_WAY_TICKS:
+        status = self.player.status()
+        if self._ticks_given < GIVE_WAY_TICKS and self.performance.hurried(status, COMFORTABLE_S):
+            self._ticks_given += 1
             return  # whoever renders it needs the interpreter more
+        self._ticks_given = 0
         self._hold_pictures(False)
         now_s = time.monotonic()
         elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        status = self.player.status()
         window = self.window
         window.transport.show_playing(status.playing)
         hidden = self._abx is not None  # a level would give away what is heard

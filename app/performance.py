@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QObject
 
-from app.audio import Player, Track
+from app.audio import Player, PlayerStatus, Track
 from app.library import Library, PresetEntry
 from app.main_window import MainWindow
 from app.panels import Panel, StringPanel
@@ -63,6 +63,15 @@ class Performance(QObject):
     def ready(self) -> bool:
         """Whether what is on stage is what was chosen."""
         return self.take is not None and motion_key(self.take) == self._wanted_key()
+
+    def hurried(self, status: PlayerStatus, comfortable_s: float) -> bool:
+        """Whether a pluck waits for its first sound, or is heard while little more of it is rendered."""
+        track = self.track
+        if self.strikes.awaited:
+            return True
+        if track is None or track.complete or not status.playing:
+            return False
+        return track.ready_frames / track.rate_hz < status.position_s + comfortable_s
 
     # Intents
 

@@ -27,6 +27,7 @@ SIZE = (1920, 1080)
 PLUCKS = 8
 PLUCK_S = 0.5  # how long they are: a new one waits for the last to be rendered
 PICTURE_S = 4.0
+LONG_PLUCKS = 3  # of that length, heard while they are rendered
 QUIET_S = 0.3  # lets what rings fade before the next pluck
 SETTLING_S = 1.0
 BUFFERS: tuple[Buffer, ...] = ("low", "medium")
@@ -76,7 +77,9 @@ def measure(starts: int, seconds: float, report: Callable[[float, str], None]) -
         for number, buffer in enumerate(BUFFERS):
             report(0.5 + 0.15 * number, f"plucks, {buffer} buffer")
             figures += _plucks(stage, buffer)
-        report(0.8, "picture")
+        report(0.75, "long plucks")
+        figures += _gaps(stage)
+        report(0.85, "picture")
         figures += _picture(stage, seconds)
         size, choices = stage.window.size(), stage.controller.session.choices
         views = choices.left_view, choices.right_view
@@ -142,6 +145,19 @@ def _pluck_s(stage: Stage, **changes: float) -> float:
     assert stream.sounded_s is not None
     stage.wait_until_rendered()
     return stream.sounded_s - plucked_s
+
+
+def _gaps(stage: Stage) -> list[Figure]:
+    """Of new plucks that are heard, and drawn, while they are rendered."""
+    _choose_seconds(stage, PICTURE_S)
+    gaps_s = []
+    for number in range(LONG_PLUCKS):
+        _pluck_s(stage, position=0.55 + 0.01 * number)
+        stream = stage.card.stream
+        assert stream is not None
+        stage.wait_for(lambda: not stage.controller.player.status().playing, "the end of a pluck")
+        gaps_s.append(stream.gap_s)
+    return [_median(f"gaps in a new pluck of {PICTURE_S:g} s", "s", gaps_s, 0.0)]
 
 
 def _picture(stage: Stage, seconds: float) -> list[Figure]:

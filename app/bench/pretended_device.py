@@ -20,6 +20,7 @@ class PretendedStream:
 
     Attributes:
         sounded_s: when the callback first gave a sample that is not zero (`time.perf_counter`), since `listen_anew`.
+        gap_s: of silence between then and the last such sample, of whole blocks.
         late: how often a callback came more than a block late: the interpreter was busy, or the machine.
     """
 
@@ -28,6 +29,7 @@ class PretendedStream:
     def __init__(self, rate_hz: int, block_frames: int, callback: Callback) -> None:
         self.active = False
         self.sounded_s: float | None = None
+        self.gap_s = 0.0
         self.late = 0
         self._rate_hz = rate_hz
         self._block = np.zeros((block_frames, 2), np.float32)
@@ -35,7 +37,7 @@ class PretendedStream:
         self._thread = threading.Thread(target=self._run, name="pretended-device", daemon=True)
 
     def listen_anew(self) -> None:
-        self.sounded_s = None
+        self.sounded_s, self.gap_s = None, 0.0
 
     def start(self) -> None:
         self.active = True
@@ -51,12 +53,18 @@ class PretendedStream:
 
     def _run(self) -> None:
         block_s = len(self._block) / self._rate_hz
-        due_s = time.perf_counter()
+        due_s, silent_s = time.perf_counter(), 0.0
         while self.active:
             asked_s = time.perf_counter()
             self._callback(self._block, len(self._block), None, None)
-            if self.sounded_s is None and self._block.any():
-                self.sounded_s = asked_s
+            if not self._block.any():
+                silent_s += block_s
+            else:
+                if self.sounded_s is None:
+                    self.sounded_s = asked_s
+                else:
+                    self.gap_s += silent_s
+                silent_s = 0.0
             due_s += block_s
             wait_s = due_s - time.perf_counter()
             if wait_s > 0:

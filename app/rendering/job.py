@@ -27,10 +27,9 @@ from engine.preset import PresetError
 Block = NDArray[np.float32]
 
 FIRST_STEPS = 256  # small, so that a pluck sounds at once; more where that is not enough for it to begin
-BLOCK_FRAMES = 512  # another pluck waits for no more
-LARGE_BLOCK_FRAMES = 1024  # cost less each, once the sound is
-COMFORTABLE_S = 0.1  # ahead
-TAIL_BLOCK_FRAMES = 1024  # without the motion more fit
+# Each block is twice as long as the last, up to this. Another pluck waits for no more; but each block is some hundred
+# calls, and each of them waits for the interpreter, which the window has most of the time.
+BLOCK_FRAMES = 2048
 
 
 class Job:
@@ -94,10 +93,6 @@ class Job:
         return self._started_s is not None
 
     @property
-    def _block_frames(self) -> int:
-        return LARGE_BLOCK_FRAMES if self.ahead_s(time.monotonic()) > COMFORTABLE_S else BLOCK_FRAMES
-
-    @property
     def _rendered_s(self) -> float:
         truth = self._lines["truth"]
         return truth.done / truth.rate_hz
@@ -147,10 +142,11 @@ class Job:
         """Renders a block of both sources, and others up to there; whether they have come so far."""
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
-        frames = min(self._block_frames if first else _first_frames(truth.rate_hz), take.frames - first)
+        wanted = min(2 * first, BLOCK_FRAMES) if first else _first_frames(truth.rate_hz)
+        frames = min(wanted, take.frames - first)
         end_s = (first + frames) / truth.rate_hz if first + frames < take.frames else take.seconds + 1.0
         others = {name: self._lines[name] for name in self._wanted()[len(SOURCES) :]}
-        behind = {name: min(LARGE_BLOCK_FRAMES, line.until(end_s)) for name, line in others.items()}
+        behind = {name: min(BLOCK_FRAMES, line.until(end_s)) for name, line in others.items()}
         blocks = self._advance_lines({**dict.fromkeys(SOURCES, frames), **behind})
         for name in others:
             take.others[name].append(blocks[name])
@@ -212,7 +208,7 @@ class Job:
         if self._take is not None:  # what was rendered but not yet heard, then the motion is forgotten
             take, self._take = self._take, None
             self._feed_motion(take, sound)
-        end_s = self._rendered_s + TAIL_BLOCK_FRAMES / self._lines["truth"].rate_hz
+        end_s = self._rendered_s + BLOCK_FRAMES / self._lines["truth"].rate_hz
         behind = {name: self._lines[name].until(end_s) for name in sound.frames_read}
         heard = self._advance_lines(behind, sound.listening)
         sound.feed({name: Read(heard[name], self._lines[name].complete) for name in heard})

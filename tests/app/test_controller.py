@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
+from app.audio import PlayerStatus, Track
 from app.controller import GIVE_WAY_TICKS, Controller
 from app.main_window import MainWindow
 from app.session import Choices
@@ -361,6 +363,20 @@ def test_the_picture_gives_way_to_a_struck_pluck_but_not_for_long(
     assert shown == []
     controller._tick()
     assert len(shown) == 1
+
+
+def test_the_picture_gives_way_while_rendering_is_hardly_ahead_of_what_is_heard(
+    qtbot: QtBot, controller: Controller
+) -> None:
+    wait_for_take(qtbot, controller)
+    stage, half = controller.performance, Track(8_000, 8_000, ("model", "truth"))
+    half.append({source: np.zeros(4_000) for source in half.sources})
+    stage.track = half
+    heard = [PlayerStatus(position_s=position_s, playing=True) for position_s in (0.1, 0.3)]
+    assert [stage.hurried(status, 0.3) for status in heard] == [False, True]
+    assert not stage.hurried(replace(heard[1], playing=False), 0.3)
+    half.finish()
+    assert not stage.hurried(heard[1], 0.3), "there is nothing more to render"
 
 
 def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, controller: Controller) -> None:

@@ -16,6 +16,7 @@ import torch
 from app.audio import Track
 from app.export import SoundRequest, render_sound
 from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering import job as job_module
 from app.rendering import worker as worker_module
 from app.rendering.line import Line
 from app.rendering.velocity import Differentiator
@@ -196,11 +197,13 @@ def test_struck_plucks_sound_to_their_ends(small_preset: Path, worker: RenderWor
         assert found[late] == pytest.approx(expected[late], abs=3e-3 * np.abs(expected).max())
 
 
-def slow_down(monkeypatch: pytest.MonkeyPatch, pause_s: float) -> None:
+def slow_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To half the pace of the sound."""
+    monkeypatch.setattr(job_module, "BLOCK_FRAMES", 512)
     advance = Line.advance
 
     def slow(line: Line, frames: int, readout: torch.Tensor | None = None) -> np.ndarray:
-        time.sleep(pause_s * bool(frames))
+        time.sleep(2 * frames / line.rate_hz)
         return advance(line, frames, readout)
 
     monkeypatch.setattr(Line, "advance", slow)
@@ -210,7 +213,7 @@ def test_a_new_pluck_does_not_wait_for_a_late_one(
     small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(worker_module, "LOST_S", 1e9)
-    slow_down(monkeypatch, 0.3)  # a block lasts 0.13 s at most
+    slow_down(monkeypatch)
     worker.submit(request_of(small_preset))
     worker.strike()
     wait_until(lambda: bool(heard.started))
@@ -226,13 +229,13 @@ def test_a_new_pluck_does_not_wait_for_a_late_one(
 def test_an_earlier_pluck_that_comes_too_late_ends(
     small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    slow_down(monkeypatch, 0.3)
-    worker.submit(request_of(small_preset))
+    slow_down(monkeypatch)
+    worker.submit(request_of(small_preset, seconds=3.0))
     worker.strike()
     wait_until(lambda: bool(heard.started))
     worker.submit(request_of(small_preset, pluck=Pluck(0.6, 3.0)))
     wait_until(lambda: heard.started[0][1].complete)
-    assert heard.started[0][1].ready_frames < 7_000
+    assert heard.started[0][1].ready_frames < 2 * 8_000
     assert not worker._tails
     monkeypatch.undo()
     wait_until(lambda: bool(heard.finished))
