@@ -356,10 +356,6 @@ class StringView(QWidget):
         paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
         if self._frame is not None and not self._shows_pluck:
             paint_caption(painter, axes, self._frame)
-        if self.hasFocus():
-            painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
 
     @property
     def _heard(self) -> str:
@@ -387,7 +383,8 @@ class StringView(QWidget):
         """The picture behind the string, painted anew only when something in it changes."""
         # on which side words would be in the way of the pluck, with the words at its handle
         pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
-        key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._sources, self._warning, theme.face)
+        chosen = (self._trained, pluck, self._sources, self._warning)
+        key = (axes, self.devicePixelRatioF(), *chosen, theme.face, self.hasFocus())
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF())
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
@@ -396,6 +393,10 @@ class StringView(QWidget):
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             paint_ground(painter, axes, self._trained, pluck)
             paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
+            if self.hasFocus():
+                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
             painter.end()
             self._ground_pixmap, self._ground_key = pixmap, key
         return self._ground_pixmap
