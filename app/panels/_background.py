@@ -3,9 +3,8 @@
 It does the latest job alone: asking for another abandons the one under way. What it says reaches the window's thread
 through queued signals, and nothing of an abandoned job arrives any more.
 
-It gives way to sound and picture: it computes on one core, mostly without the interpreter's lock, and rests between
-the pieces of a job and while a pluck is rendered. Its priority is not lowered: on a busy machine a thread of low
-priority would hold the lock while it waits for a core, and the sound with it.
+It gives way to sound and picture: it computes on one core, mostly without the interpreter's lock, steps back behind
+them, and rests between the pieces of a job and while a pluck is rendered.
 """
 
 from __future__ import annotations
