@@ -303,6 +303,7 @@ class Controller(QObject):
         hidden = self._abx is not None  # a level would give away what is heard
         window.transport.meter.show_level(-math.inf if hidden else status.peak_db, status.limiting and not hidden)
         self.performance.rate_shown(status.rate_hz)
+        self.performance.watch(status)
         choices, take, track = self.session.choices, self.performance.take, self.performance.track
         window.transport.slots.show_gains({s: gain_db(choices, track, getattr(choices, s)) for s in SLOTS})
         self.audio.show(status, take)

@@ -73,6 +73,11 @@ class Performance(QObject):
             return False
         return track.ready_frames / track.rate_hz < status.position_s + comfortable_s
 
+    def watch(self, status: PlayerStatus) -> None:
+        """Says so where the playhead waits for rendering: the sound has a gap then."""
+        if status.waiting and status.position_s > 0 and self.track is not None and not self.track.complete:
+            self._window.error_label.setText("rendering, slower than it sounds: gaps …")
+
     # Intents
 
     def pluck(self) -> None:

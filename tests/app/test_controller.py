@@ -375,6 +375,10 @@ def test_the_picture_gives_way_while_rendering_is_hardly_ahead_of_what_is_heard(
     heard = [PlayerStatus(position_s=position_s, playing=True) for position_s in (0.1, 0.3)]
     assert [stage.hurried(status, 0.3) for status in heard] == [False, True]
     assert not stage.hurried(replace(heard[1], playing=False), 0.3)
+    stage.watch(heard[1])
+    assert "gaps" not in controller.window.error_label.text()
+    stage.watch(replace(heard[1], waiting=True))
+    assert "gaps" in controller.window.error_label.text()
     half.finish()
     assert not stage.hurried(heard[1], 0.3), "there is nothing more to render"
 
