@@ -133,4 +133,13 @@ def _check_grid(displacement: Tensor, grid_points: int) -> None:
         )
 
 
-__all__ = ["FULL_SCALE_M", "ModelSource", "Runaway", "SourceState", "StringSource", "TruthSource", "project"]
+__all__ = [
+    "FULL_SCALE_M",
+    "SILENCE",
+    "ModelSource",
+    "Runaway",
+    "SourceState",
+    "StringSource",
+    "TruthSource",
+    "project",
+]
