@@ -53,6 +53,7 @@ class ComparePanel(Panel):
         self._background.give_way_to(take)
 
     def show_moment(self, moment: Moment) -> None:
+        self._background.look()
         self._unchanged_s += moment.elapsed_s
         if self._stale:
             self._show()

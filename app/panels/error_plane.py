@@ -58,6 +58,7 @@ class ErrorPlanePanel(Panel):
         self._background.give_way_to(take)
 
     def show_moment(self, moment: Moment) -> None:
+        self._background.look()
         self._unchanged_s += moment.elapsed_s
         if self._moved:
             self.view.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)

@@ -48,6 +48,7 @@ class PartialsPanel(Panel):
         self._waiting = take
 
     def show_moment(self, moment: Moment) -> None:
+        self._background.look()
         if self._waiting is not None:  # only what is looked at is measured
             take, self._waiting = self._waiting, None
             self.view.progress.show_share(0.0)
