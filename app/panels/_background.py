@@ -4,8 +4,8 @@ It does the latest job alone: asking for another abandons the one under way. Wha
 through queued signals, and nothing of an abandoned job arrives any more.
 
 It gives way to sound and picture: it computes on one core, mostly without the interpreter's lock, and rests between
-the pieces of a job, while a pluck is rendered, and while nobody looks at the panel. Its priority is not lowered: on a busy machine a thread of low
-priority would hold the lock while it waits for a core, and the sound with it.
+the pieces of a job, while a pluck is rendered, and while nobody looks at the panel. Its priority is not lowered: on a
+busy machine a thread of low priority would hold the lock while it waits for a core, and the sound with it.
 """
 
 from __future__ import annotations
