@@ -23,6 +23,16 @@ class PresetEntry:
     size_bytes: int = 0
 
     @property
+    def own(self) -> bool:
+        """Whether it is the user's, not shipped with the program."""
+        return self.path.parent == user_folder()
+
+    @property
+    def title(self) -> str:
+        """As it is listed: a copy in the user's folder is told from the shipped one."""
+        return f"{self.info.title} (yours)" if self.own else self.info.title
+
+    @property
     def unplayable(self) -> str:
         """Why its model cannot be let go from rest, or nothing."""
         if self.info.model_configuration.get("input") == "two_frames":

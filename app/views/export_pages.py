@@ -149,7 +149,8 @@ class BatchPage(QWidget):
         self.presets.setFixedHeight(128)
         checked = set(batch.presets) or {choices.preset}
         for entry in self._entries:
-            item = QListWidgetItem(entry.info.title)
+            item = QListWidgetItem(entry.title)
+            item.setToolTip(entry.path.name)
             item.setCheckState(Qt.CheckState.Checked if entry.name in checked else Qt.CheckState.Unchecked)
             self.presets.addItem(item)
         self.presets.setCurrentRow(0)
@@ -230,7 +231,7 @@ def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
         heard += ", velocity"
     pluck = f"{shape} pluck at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
     modes = f". All modes, though mode {choices.solo} is heard alone" if choices.solo else ""
-    return f"{preset.info.title}, {pluck}, heard at {heard}{modes}"
+    return f"{preset.title}, {pluck}, heard at {heard}{modes}"
 
 
 def _line(name: str, text: str, example: str) -> QLineEdit:

@@ -7,7 +7,6 @@ from html import escape
 from PySide6.QtWidgets import QApplication
 
 from app.library import PresetEntry
-from app.preset_folders import user_folder
 from app.preset_words import (
     error_word,
     initial_word,
@@ -76,7 +75,7 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
 
 
 def _place(entry: PresetEntry) -> str:
-    return "your own" if entry.path.parent == user_folder() else "shipped with the program"
+    return "your own" if entry.own else "shipped with the program"
 
 
 def _can_be_remade(name: str) -> bool:

@@ -51,6 +51,11 @@ def test_the_preset_on_screen_is_computed_first_and_what_is_in_a_slot_next(
     qtbot.waitUntil(lambda: order == ["second", "first"], timeout=20_000)
 
 
+def test_a_row_tells_its_whole_name_and_its_file(shown: Any) -> None:
+    row = next(row for row in shown.table.rows if row.key == "second")
+    assert row.tip.splitlines() == [row.values[0], "second.safetensors"]
+
+
 def test_figures_of_an_earlier_pluck_are_told(qtbot: QtBot, controller: Controller, shown: Any) -> None:
     qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
     assert shown._words.text() == "2 presets on this pluck, 0.5 s"
