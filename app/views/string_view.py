@@ -211,6 +211,7 @@ class StringView(QWidget):
         at = event.position()
         if self._drag is None:
             self._hover(self._under(at))
+            self.setToolTip(self._warning if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered])
             return
         axes = self._axes()
         fine = FINE if event.modifiers() & _Shift else 1.0
@@ -289,7 +290,6 @@ class StringView(QWidget):
         self.setCursor(cursors.get(on, Qt.CursorShape.SizeHorCursor))
         if on != self._hovered:
             self._hovered = on
-            self.setToolTip(TIPS[on])
             self.update()
 
     def _under(self, at: QPointF) -> str | None:
