@@ -96,7 +96,9 @@ class SpectrumView(QWidget):
         self.setMinimumHeight(84)
         self.plot = pg.PlotWidget()
         self.plot.setAccessibleName("Spectrum")
-        self.plot.setToolTip("The spectrum at the listening point, at the playhead; 0 dB is a sine of full scale")
+        self.plot.setToolTip(
+            "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
+        )
         self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), RANGES_DB[-1])
         self.ranges.setToolTip("How far below full scale the axis reaches, the same for every source")
         self.ranges.setStyleSheet(SMALL)
