@@ -20,6 +20,7 @@ from engine.preset import PresetInfo, outside_training
 
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
+SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
 PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset"}
 HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
 WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
@@ -30,7 +31,7 @@ class StringPanel(Panel):
     title = "String"
     help = (
         "The string seen from the side: what slots A and B hold in motion, slowed as by a stroboscope, or the pluck "
-        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Darker parts lie "
+        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Hatched parts lie "
         "outside the training."
     )
     view: StringView
@@ -96,8 +97,7 @@ class StringPanel(Panel):
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
-        points = entry.info.grid_points if entry else 101
-        shape_mm = choices.pluck.displacement(points).numpy() * MM
+        shape_mm = choices.pluck.displacement(SHAPE_POINTS).numpy() * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
         view.set_trained(_trained(entry.info) if entry else TrainedPlucks())
