@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from app.analysis.heard import HeardMotion
 from app.library import Library
 from app.motion import Envelope, Strobe, frame_at
@@ -86,14 +88,17 @@ class StringPanel(Panel):
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
         ready = [min(motion.ready, position_s * motion.rate_hz) for motion in motions if motion.there]
-        shown = (take, ready, choices.speed, choices.envelope)
+        shown = (take, ready, choices.speed, choices.envelope, choices.solo)
         if not moment.playing and shown == self._shown:
             return
         self._shown = shown
         self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, choices.speed, take.fundamental_hz)
         shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
         envelope = self._envelope if choices.envelope else None
-        self.view.show_frame(frame_at(take, motions, position_s, shown_s, choices.speed, envelope))
+        frame = frame_at(take, motions, position_s, shown_s, choices.speed, envelope)
+        if choices.solo:
+            frame = replace(frame, caption=f"all modes, though mode {choices.solo} is heard alone   {frame.caption}")
+        self.view.show_frame(frame)
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view

@@ -68,5 +68,5 @@ class PresetBar(QWidget):
         self.name.setText(f"{'★  ' if favourite else ''}{title}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Preset: {title}")
         self.name.setToolTip("Browse the presets (Ctrl+P)")
-        self.card.setText(preset_summary(entry) if entry else "")
+        self.card.say(*(preset_summary(entry) if entry else [""]))
         self.card.setToolTip(preset_card(entry) if entry else "")

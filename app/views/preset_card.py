@@ -35,19 +35,21 @@ def preset_card(entry: PresetEntry) -> str:
     return f"{title}{what}<table>{rows}</table>"
 
 
-def preset_summary(entry: PresetEntry) -> str:
-    """The same in one line."""
+def preset_summary(entry: PresetEntry) -> list[str]:
+    """The same in one line, the longest wording first; the error is in all of them."""
     info = entry.info
-    parts = [
-        model_word(info.model),
-        f"{entry.parameters:,} parameters",
-        "tension-modulated string" if info.tension_modulated else "linear string",
-        f"{rate_word(info.rate_hz)}, {info.modes} modes",
-        f"trained on {info.horizon_s:g} s",
-    ]
-    if info.rel_mae is not None:
-        parts.append(f"validation error {error_word(info)}")
-    return "  ·  ".join(parts)
+    model, rate = model_word(info.model), rate_word(info.rate_hz)
+    string = "tension-modulated string" if info.tension_modulated else "linear string"
+    trained, parameters = f"trained on {info.horizon_s:g} s", f"{entry.parameters:,} parameters"
+    error = [f"validation error {error_word(info)}"] if info.rel_mae is not None else []
+    wordings = (
+        (model, parameters, string, f"{rate}, {info.modes} modes", trained),
+        (model, string, f"{rate}, {info.modes} modes", trained),
+        (model, f"{rate}, {info.modes} modes", trained),
+        (model, rate),
+        (model,),
+    )
+    return ["  ·  ".join([*parts, *error]) for parts in wordings]
 
 
 def _facts(entry: PresetEntry) -> list[tuple[str, str]]:

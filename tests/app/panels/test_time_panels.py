@@ -16,7 +16,16 @@ from pytestqt.qtbot import QtBot
 
 from app.controller import Controller
 from app.library import Library
-from app.panels import ErrorTimePanel, Moment, Panel, SpaceTimePanel, SpectrogramPanel, SpectrumPanel, WaveformPanel
+from app.panels import (
+    ErrorTimePanel,
+    Moment,
+    Panel,
+    SpaceTimePanel,
+    SpectrogramPanel,
+    SpectrumPanel,
+    StringPanel,
+    WaveformPanel,
+)
 from app.panels.spectrum import EVERY
 from app.rendering import Listening, Take
 from app.rendering.take import Motion
@@ -423,3 +432,12 @@ def test_a_view_that_is_not_looked_at_lets_the_last_take_go(
     panel.take_started(take)
     gc.collect()
     qtbot.waitUntil(lambda: gone() is None, timeout=10_000)
+
+
+def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None:
+    panel = make(StringPanel)
+    panel.show_moment(Moment(take, 0.5, False, 0.016))
+    assert "mode" not in panel.view._frame.caption
+    choose(panel, solo=2)
+    panel.show_moment(Moment(take, 0.5, False, 0.016))
+    assert panel.view._frame.caption.startswith("all modes, though mode 2 is heard alone")
