@@ -47,6 +47,7 @@ class Library:
 
     def __init__(self, entries: list[PresetEntry]) -> None:
         self.entries = entries
+        self._problems: list[str] = []  # that have been told
 
     @property
     def names(self) -> list[str]:
@@ -62,12 +63,16 @@ class Library:
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
 
     def refresh(self) -> list[str]:
-        """Reads the folders again; whoever holds this library has the new entries. Returns what was not usable."""
+        """Reads the folders again; whoever holds this library has the new entries.
+
+        Returns what is not usable, without what was told the last time.
+        """
         entries, problems = list_presets()
         if entries != self.entries:
             self.entries = entries
             self.changed.emit()
-        return problems
+        told, self._problems = self._problems, problems
+        return [problem for problem in problems if problem not in told]
 
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
