@@ -99,7 +99,7 @@ class SoundPage(QWidget):
         place.insertWidget(0, self.path, 100)
         form.addRow(label("File"), place)
         self.names = faint()
-        form.addRow(label(""), self.names)
+        form.addRow(label("Saved as"), self.names)
         self._form = form
 
     def suggest_name(self, rate_hz: int) -> None:
@@ -111,7 +111,7 @@ class SoundPage(QWidget):
                 self._preset.name, self._choices.pluck, rate_hz or self._preset.info.rate_hz, source
             )
             self.path.setText(str(Path(self._folder) / name))
-        self.names.setText("Saved as " + " and ".join(path.name for path in self.paths().values()))
+        self.names.setText("\n".join(path.name for path in self.paths().values()))
         self._form.setRowVisible(self.names, len(self.paths()) > 1)
 
     def paths(self) -> dict[Source, Path]:

@@ -175,6 +175,7 @@ QLabel#warning {{ color: {WARNING}; }}
 QLabel#good {{ color: {GOOD}; }}
 QLabel#title {{ font-size: 15px; font-weight: 600; }}
 QPushButton, QToolButton {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 6px 12px; }}
+QPushButton {{ outline: none; }}
 QPushButton:hover, QToolButton:hover {{ border-color: {FAINT}; }}
 QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {TEXT}; }}

@@ -196,7 +196,7 @@ def test_two_files_are_both_named(made) -> None:
     dialog = made({"source": "files"})
     first, second = (path.name for path in dialog.sound.paths().values())
     assert first != second
-    assert dialog.sound.names.text() == f"Saved as {first} and {second}"
+    assert dialog.sound.names.text() == f"{first}\n{second}"
     dialog.sound.source.setCurrentIndex(0)
     assert dialog.sound.names.isHidden()
 
