@@ -27,8 +27,8 @@ from app.settings import BatchChoices, ExportChoices
 from app.slots import other_preset
 from app.sound import SOURCES
 from app.sound_names import Pickup
-from app.views.parts import combo_box, tool_button
-from app.views.sound_form import faint, label, row_of, wav_settings
+from app.views.parts import combo_box, faint, tool_button
+from app.views.sound_form import label, row_of, wav_settings
 from engine.pluck import Pluck
 
 SOURCE_NAMES = (

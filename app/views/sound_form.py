@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QFormLayout, QHBoxLayou
 
 from app.settings import ExportChoices
 from app.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB, LONGEST_S
-from app.views.parts import combo_box
+from app.views.parts import combo_box, faint
 from app.wav import Bits, WavSettings
 
 RATES_HZ = (0, 44_100, 48_000, 96_000)  # 0: the model's own
@@ -127,9 +127,3 @@ def spin_box(
     spin.setMinimumWidth(84)
     spin.setValue(value)
     return spin
-
-
-def faint(text: str = "") -> QLabel:
-    made = QLabel(text)
-    made.setObjectName("faint")
-    return made

@@ -40,14 +40,14 @@ class SpaceTimeView(QWidget):
         super().__init__(parent)
         self.quantities = Segments("Shown", QUANTITIES)
         self.gains = combo_box(
-            "Gain of the colours", [("auto", AUTO), *((f"× {gain}", gain) for gain in GAINS)], AUTO
+            "Gain of the colours", [("auto gain", AUTO), *((f"gain {_times(gain)}", gain) for gain in GAINS)], AUTO
         )
         self.gains.setMinimumContentsLength(12)
         self.gains.setToolTip(
             "How far the colours are magnified: the bar beside the picture tells the displacement.\n"
             "Auto fits what is in view for most of the time; model and truth always have the same scale"
         )
-        self.gains.setStyleSheet(SMALL)
+        self.gains.setStyleSheet(f"{SMALL} padding-right: 0;")
         self.readout = Readout()
         self.plot = TimePlot(
             "Space–time",
@@ -163,7 +163,11 @@ class SpaceTimeView(QWidget):
             self._bar.axis.setScale(factor / MM)
             self._bar.axis.setLabel(unit if self._signed else f"{unit}, peak")
             self._bar.setLevels(limits)
-            self.gains.setItemText(0, f"auto (× {self._fitting_gain})")
+            self.gains.setItemText(0, f"auto gain {_times(self._fitting_gain)}")
+
+
+def _times(gain: int) -> str:
+    return f"× {gain}" if gain < 1000 else f"× {gain // 1000}k"
 
 
 def _colour_map(kind: str, signed: bool) -> pg.ColorMap:

@@ -19,7 +19,7 @@ from app.views import theme
 from app.views.axis_label import UprightLabel, fit_foot
 from app.views.curves import set_curves
 from app.views.legend import Legend
-from app.views.parts import combo_box, lay_out_plot
+from app.views.parts import combo_box, faint, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL
 
@@ -134,7 +134,7 @@ class SpectrumView(QWidget):
         self.set_full_scale("10 mm")
         self._fit()
         self.plot.viewport().installEventFilter(self)
-        lay_out_plot(self, (self.ranges,), self.readout, self.plot)
+        lay_out_plot(self, (faint("range"), self.ranges), self.readout, self.plot)
 
     @property
     def range_db(self) -> int:

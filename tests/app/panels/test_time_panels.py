@@ -101,7 +101,7 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
     assert view._image.image.max() == pytest.approx(0.04, rel=1e-3)
     assert view.scale_mm == pytest.approx(4 / 30)  # a gain of 30, of its own accord
     assert view._bar.levels() == pytest.approx((-4 / 30, 4 / 30))
-    assert view.gains.currentText() == "auto (× 30)"
+    assert view.gains.currentText() == "auto gain × 30"
 
 
 def test_bar_colours_and_readout_agree_on_the_sign(qtbot: QtBot, make: Make, take: Take) -> None:
