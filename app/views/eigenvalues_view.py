@@ -140,7 +140,7 @@ class EigenvaluesView(QWidget):
         return [
             f"{name} mode {mode}:  {pitch}{folded},  {off},  {decay} {string}{layer}",
             f"{short} mode {mode}:  {pitch},  {off},  {decay} {string}",
-            f"{short} mode {mode}:  {off},  {decay} {string}",
+            f"{mode}:  {pitch},  {off},  {decay} {string}",
             f"{mode}:  {off},  {decay}",
         ]
 
