@@ -82,7 +82,6 @@ class AudioControl(QObject):
         if self._dialog is None:
             self._dialog = dialog = AudioDialog(self._window)
             dialog.choice_made.connect(self._choose)
-            dialog.retry_asked.connect(self.open)
             dialog.rescan_asked.connect(lambda: self.open(rescan=True))
             dialog.tone_asked.connect(self._player.sound_tone)
             dialog.underruns_reset.connect(self._reset_underruns)

@@ -57,11 +57,11 @@ class BatchPlan:
 
     def __post_init__(self) -> None:
         for name in ("presets", "positions", "amplitudes_mm", "sources"):
-            values = getattr(self, name)
+            values, word = getattr(self, name), name.removesuffix("_mm")
             if not values:
-                raise ValueError(f"{name.replace('_', ' ')}: give at least one")
+                raise ValueError(f"{word}: give at least one")
             if len(set(values)) < len(values):
-                raise ValueError(f"{name.replace('_', ' ')}: one is given twice")
+                raise ValueError(f"{word}: one is given twice")
         for _ in self.plucks():
             pass
 

@@ -53,8 +53,10 @@ class BatchIndex:
             pass  # none yet, or not one of ours: it is written anew
 
     def add(self, rows: Sequence[BatchRow]) -> None:
-        """Raises ExportError."""
+        """Without any row there is no file. Raises ExportError."""
         self.rows |= {row.file: row for row in rows}
+        if not self.rows:
+            return
         text = io.StringIO()
         table = csv.DictWriter(text, [one.name for one in fields(BatchRow)], lineterminator="\n")
         table.writeheader()

@@ -34,7 +34,7 @@ TOUR = (
     ),
     (
         "Leave what it knows",
-        "The darker parts of the string are where the model was never plucked. You may pluck there; the window "
+        "The hatched parts of the string are where the model was never plucked. You may pluck there; the window "
         "says so.",
     ),
     (

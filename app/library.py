@@ -23,6 +23,16 @@ class PresetEntry:
     size_bytes: int = 0
 
     @property
+    def own(self) -> bool:
+        """Whether it is the user's, not shipped with the program."""
+        return self.path.parent == user_folder()
+
+    @property
+    def title(self) -> str:
+        """As it is listed: a copy in the user's folder is told from the shipped one."""
+        return f"{self.info.title} (yours)" if self.own else self.info.title
+
+    @property
     def unplayable(self) -> str:
         """Why its model cannot be let go from rest, or nothing."""
         if self.info.model_configuration.get("input") == "two_frames":
@@ -37,6 +47,7 @@ class Library:
 
     def __init__(self, entries: list[PresetEntry]) -> None:
         self.entries = entries
+        self._problems: list[str] = []  # that have been told
 
     @property
     def names(self) -> list[str]:
@@ -52,12 +63,16 @@ class Library:
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
 
     def refresh(self) -> list[str]:
-        """Reads the folders again; whoever holds this library has the new entries. Returns what was not usable."""
+        """Reads the folders again; whoever holds this library has the new entries.
+
+        Returns what is not usable, without what was told the last time.
+        """
         entries, problems = list_presets()
         if entries != self.entries:
             self.entries = entries
             self.changed.emit()
-        return problems
+        told, self._problems = self._problems, problems
+        return [problem for problem in problems if problem not in told]
 
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:

@@ -19,7 +19,7 @@ def source_title(source: str, library: Library) -> str:
     """What a button says."""
     if name := other_preset(source):
         entry = library.find(name)
-        return entry.info.title if entry else name
+        return entry.title if entry else name
     return source
 
 

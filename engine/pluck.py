@@ -36,14 +36,13 @@ class Pluck:
     width: float = 0.06
 
     def __post_init__(self) -> None:
-        for name, (low, high) in {
-            "position": POSITION_RANGE,
-            "width": WIDTH_RANGE,
-            "amplitude_mm": (0.0, LARGEST_AMPLITUDE_MM),
-        }.items():
-            value = getattr(self, name)
+        for name, value, (low, high), unit in (
+            ("position", self.position, POSITION_RANGE, ""),
+            ("width", self.width, WIDTH_RANGE, ""),
+            ("amplitude", self.amplitude_mm, (0.0, LARGEST_AMPLITUDE_MM), " mm"),
+        ):
             if not low <= value <= high:
-                raise ValueError(f"{name} must lie in {low:g} … {high:g}, not {value:g}")
+                raise ValueError(f"{name} must lie in {low:g} … {high:g}{unit}, not {value:g}{unit}")
         if self.shape not in SHAPES:
             raise ValueError(f"shape {self.shape!r} is not one of {', '.join(SHAPES)}")
 

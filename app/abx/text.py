@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.abx.record import AbxRecord, HeardSource
 from app.abx.trials import LEVEL
+from app.preset_words import shape_word
 
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
@@ -36,6 +37,7 @@ def verdict(record: AbxRecord) -> str:
 def as_text(record: AbxRecord) -> str:
     """The whole record; every line ends with a line break."""
     pluck, through = record.pluck, record.through
+    width = "" if pluck.shape == "triangular" else f", width {pluck.width:g}"
     head = {
         "Date": f"{record.date:%Y-%m-%d %H:%M:%S %z}",
         "Result": score_text(record),
@@ -43,7 +45,7 @@ def as_text(record: AbxRecord) -> str:
         "A": _source(record.a),
         "B": _source(record.b),
         **_presets(record),
-        "Pluck": f"position {pluck.position:g}, {pluck.amplitude_mm:g} mm, {pluck.shape}, width {pluck.width:g}",
+        "Pluck": f"position {pluck.position:g}, {pluck.amplitude_mm:g} mm, {shape_word(pluck.shape)}{width}",
         "Heard": f"at {pluck.listen:g} of the length, {pluck.seconds:g} s",
         "Device": f"{through.device} ({through.host_api}), {through.rate_hz} Hz, volume {through.volume_db:+g} dB",
         "Switch": "from the beginning" if through.restart_at_switch else "at the playhead",

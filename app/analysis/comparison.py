@@ -36,6 +36,7 @@ class ComparedRow:
     """
 
     name: str
+    file: str
     title: str
     model: str
     rate_hz: int
@@ -51,7 +52,7 @@ class ComparedRow:
     @classmethod
     def of(cls, entry: PresetEntry) -> ComparedRow:
         """What is known without computing."""
-        return cls(entry.name, entry.info.title, entry.info.model, entry.info.rate_hz, entry.parameters)
+        return cls(entry.name, entry.path.name, entry.title, entry.info.model, entry.info.rate_hz, entry.parameters)
 
 
 @dataclass(frozen=True)

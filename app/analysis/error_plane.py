@@ -22,7 +22,7 @@ from engine.reference import default_substeps
 from engine.sources import TruthSource, project
 
 SMALLEST_AMPLITUDE_MM = 0.5
-STRIDES = (8, 4, 2, 1)  # of the finest grid, level by level
+STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level
 FINEST = (49, 33)  # positions, amplitudes: a multiple of the coarsest stride, and one
 PLUCKS_AT_ONCE = 4
 FRAMES_AT_ONCE = 1000

@@ -36,6 +36,19 @@ class Picture:
     stop_s: float
     detail: Detail
 
+    @property
+    def signed(self) -> bool:
+        """Else it is of magnitudes."""
+        return self.detail != "envelope"
+
+    def at(self, time_s: float, place: float) -> float | None:
+        """What is drawn at a time and a place of the string, 0 … 1; None beside the picture."""
+        places, columns = self.displacement_m.shape
+        if not (self.start_s <= time_s < self.stop_s and 0 <= place <= 1):
+            return None
+        column = int((time_s - self.start_s) / (self.stop_s - self.start_s) * columns)
+        return float(self.displacement_m[round(place * (places - 1)), column])
+
 
 def motion_of(take: Take, quantity: str, first: int, last: int) -> NDArray[np.float32]:
     """Frames first … last (frames, places) of "model", "truth" or "error": model − truth, in m."""

@@ -4,7 +4,7 @@ It does the latest job alone: asking for another abandons the one under way. Wha
 through queued signals, and nothing of an abandoned job arrives any more.
 
 It gives way to sound and picture: it computes on one core, mostly without the interpreter's lock, steps back behind
-them, and rests between the pieces of a job and while a pluck is rendered.
+them, and rests between the pieces of a job, while a pluck is rendered, and while nobody looks at the panel.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from engine.preset import PresetError
 BREATH_S = 0.001  # between pieces of a job
 LOOK_AGAIN_S = 0.02
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
+UNSEEN_S = 1.0  # a panel that has not been looked at for so long is hidden
 REPORT_EVERY_S = 0.1  # shares of progress; results are told at once
 
 Work = Callable[[Job], object]
@@ -42,12 +43,12 @@ class _Task:
     owner: Background
 
     def check(self) -> None:
+        self.owner.give_way(self)
         if self.owner.is_abandoned(self.number):
             raise Cancelled
 
     def report(self, share: float, so_far: object = None) -> None:
         time.sleep(BREATH_S)
-        self.owner.give_way(self)
         self.check()
         self.owner.tell_progress(self.number, share, so_far)
 
@@ -72,12 +73,17 @@ class Background(QObject):
         self._thread: threading.Thread | None = None
         self._last_report_s = 0.0
         self._growing: Take | None = None
+        self._seen_s = time.monotonic()
         self._threads = _OneCore(torch.get_num_threads())
         self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
 
     def give_way_to(self, take: Take) -> None:
         """Lets jobs rest while this take is rendered: sound comes first."""
         self._growing = take
+
+    def look(self) -> None:
+        """The panel can be seen; a job rests while this has not been said for a while."""
+        self._seen_s = time.monotonic()
 
     @property
     def busy(self) -> bool:
@@ -86,6 +92,7 @@ class Background(QObject):
 
     def start(self, work: Work) -> None:
         """Does `work` as soon as the one under way has given up. Its return value is told by `finished`."""
+        self.look()
         with self._mailbox:
             self._number += 1
             self._task = _Task(self._number, work, self)
@@ -125,7 +132,9 @@ class Background(QObject):
         return number != self._number
 
     def give_way(self, task: _Task) -> None:
-        """Returns when no pluck is being rendered, or the job is abandoned."""
+        """Returns when the panel is seen and no pluck is being rendered, or the job is abandoned."""
+        while time.monotonic() - self._seen_s > UNSEEN_S and not self.is_abandoned(task.number):
+            time.sleep(LOOK_AGAIN_S)
         ready_frames, since_s = -1, time.monotonic()
         while (take := self._growing) is not None and not take.complete and not self.is_abandoned(task.number):
             now_s = time.monotonic()

@@ -1,4 +1,7 @@
-"""Several presets on the present pluck, computed one after the other while the table is looked at."""
+"""Several presets on the present pluck, computed one after the other while the table is looked at.
+
+What is heard comes first: the chosen preset, those in the slots, then the others.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from app.panels._background import Background
 from app.panels.base import Moment, Panel
 from app.rendering import Take
 from app.session import Session
+from app.slots import other_preset
 from app.views.compare_view import CompareView
 
 SETTLED_S = 0.5  # a pluck that is still being moved is not computed
@@ -53,6 +57,7 @@ class ComparePanel(Panel):
         self._background.give_way_to(take)
 
     def show_moment(self, moment: Moment) -> None:
+        self._background.look()
         self._unchanged_s += moment.elapsed_s
         if self._stale:
             self._show()
@@ -82,10 +87,16 @@ class ComparePanel(Panel):
     def _compute(self) -> None:
         self._tried, trial = self._wanted(), self._trial
         missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != trial]
+        missing.sort(key=lambda entry: self._urgency(entry.name))
         if missing:
             self.view.set_computing(0.0)
             self._background.start(lambda job: compare(missing, trial, job))
         self._show()
+
+    def _urgency(self, name: str) -> int:
+        choices = self.session.choices
+        heard = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
+        return heard.index(name) if name in heard else len(heard)
 
     def _progressed(self, share: float, row: ComparedRow | None) -> None:
         self.view.set_computing(share)
@@ -133,5 +144,10 @@ class ComparePanel(Panel):
             computed, row = self._rows.get(entry.name, (None, ComparedRow.of(entry)))
             shown.append((row, computed == trial))
         self.view.show_rows(shown, self.session.choices.preset)
-        count = len(entries)
-        self.view.set_words(f"{count} preset{'s' if count != 1 else ''} on this pluck, {trial.seconds:g} s")
+        count, fresh = len(entries), sum(of_this for _, of_this in shown)
+        done = f"{fresh} of {count}" if fresh < count else f"{count}"
+        former = any(row.mae is not None and not of_this for row, of_this in shown)
+        self.view.set_words(
+            f"{done} preset{'s' if count != 1 else ''} on this pluck, {trial.seconds:g} s"
+            + ("; grey: an earlier pluck" if former else "")
+        )

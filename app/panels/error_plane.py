@@ -24,7 +24,10 @@ MOST_KEPT = 64  # planes of some 13 KB
 class ErrorPlanePanel(Panel):
     key = "error_plane"
     title = "Error map"
-    help = "The model's error over pluck position and amplitude, computed in the background. A click plucks there."
+    help = (
+        "The model's error as trained, which is the first figure in the header, over pluck position and amplitude, "
+        "computed in the background. A click plucks there."
+    )
     view: ErrorPlaneView
 
     def __init__(self, session: Session, library: Library) -> None:
@@ -58,6 +61,7 @@ class ErrorPlanePanel(Panel):
         self._background.give_way_to(take)
 
     def show_moment(self, moment: Moment) -> None:
+        self._background.look()
         self._unchanged_s += moment.elapsed_s
         if self._moved:
             self.view.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)
@@ -85,7 +89,7 @@ class ErrorPlanePanel(Panel):
     def _finished(self, picture: PlanePicture) -> None:
         self.view.progress.show_share(None)
         self.view.show_picture(picture)
-        self.view.set_words("Relative error over the trained time, for every pluck of this shape; click to hear one")
+        self.view.set_words("Error as trained, for every pluck of this shape; click to hear one")
 
     def _failed(self, message: str, details: str) -> None:
         self.view.progress.show_share(None)

@@ -1,4 +1,4 @@
-"""The partials of the take on stage, measured when all of it is there."""
+"""The partials of the take on stage, measured when all of it is there; until then those before it are grey."""
 
 from __future__ import annotations
 
@@ -39,8 +39,9 @@ class PartialsPanel(Panel):
             self.view.show_solo(self.session.choices.solo)
 
     def take_started(self, take: Take) -> None:
-        self._waiting = None
+        self._waiting = self._rows = None
         self._background.cancel()
+        self.view.dim()
         self.view.progress.show_share(None)
         self.view.set_words("After the rendering: the partials of the new pluck")
 
@@ -48,6 +49,7 @@ class PartialsPanel(Panel):
         self._waiting = take
 
     def show_moment(self, moment: Moment) -> None:
+        self._background.look()
         if self._waiting is not None:  # only what is looked at is measured
             take, self._waiting = self._waiting, None
             self.view.progress.show_share(0.0)

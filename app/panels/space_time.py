@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from app.analysis.space_time import Envelopes, Picture, motion_of, picture
+from app.analysis.space_time import Envelopes, Picture, picture
 from app.library import Library
 from app.panels.base import Moment, Panel
 from app.panels.follower import Follower
@@ -35,6 +33,7 @@ class SpaceTimePanel(Panel):
         self._envelopes: Envelopes | None = None
         self._moments = 0
         self._shown: tuple[object, ...] = ()
+        self._picture: Picture | None = None
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "listen" in names:
@@ -43,7 +42,7 @@ class SpaceTimePanel(Panel):
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
         self._envelopes = None  # begun when it can be seen
-        self._shown = ()  # holds nothing of the last take
+        self._shown, self._picture = (), None  # holds nothing of the last take
         self.view.set_take(take.seconds, take.info.horizon_s, take.pluck.amplitude_mm)
 
     def show_moment(self, moment: Moment) -> None:
@@ -66,11 +65,12 @@ class SpaceTimePanel(Panel):
         if shown == self._shown:
             return
         self._shown = shown
-        made = picture(envelopes, view.quantity, times_s, columns)
+        self._picture = made = picture(envelopes, view.quantity, times_s, columns)
         if made is None:
             view.show_nothing()
             return
-        view.show_picture(made.displacement_m * MM, made.start_s, made.stop_s, self._typical_mm(envelopes, times_s))
+        typical_mm = self._typical_mm(envelopes, times_s)
+        view.show_picture(made.displacement_m * MM, made.start_s, made.stop_s, typical_mm, made.signed)
         view.readout.rest(_caption(made))
 
     def _typical_mm(self, envelopes: Envelopes, times_s: tuple[float, float]) -> float:
@@ -79,15 +79,11 @@ class SpaceTimePanel(Panel):
         return max(envelopes.typical_m(name, times_s) for name in names) * MM
 
     def _tell(self, time_s: float, place: float) -> None:
-        text = ""
-        if math.isfinite(time_s) and 0 <= place <= 1 and self._envelopes is not None:
-            take = self._envelopes.take
-            frame = round(time_s * take.info.rate_hz)
-            if 0 <= frame < take.ready_frames:
-                point = round(place * (take.info.grid_points - 1))
-                here_mm = float(motion_of(take, self.view.quantity, frame, frame + 1)[0, point]) * MM
-                text = f"{time_s:.4f} s   place {place:.2f}   {here_mm:+.4f} mm"
-        self.view.readout.tell(text)
+        here_m = self._picture.at(time_s, place) if self._picture is not None else None
+        if here_m is None:
+            self.view.readout.tell("")
+        else:
+            self.view.tell(time_s, place, here_m * MM)
 
 
 def _caption(made: Picture) -> str:

@@ -81,12 +81,13 @@ class SpectrogramPanel(Panel):
             self._drawn = last
 
     def _tell(self, time_s: float, height: float) -> None:
-        text, spectrogram = "", self._spectrogram
+        wordings, spectrogram = [""], self._spectrogram
         if math.isfinite(time_s) and spectrogram is not None:
             column = round(time_s / spectrogram.hop_s)
             frequency_hz = self.view.frequency_hz(height)
             row = round(frequency_hz / spectrogram.bin_hz)
             levels_db = spectrogram.levels_db[self.view.quantity][: spectrogram.ready]
             if 0 <= column < len(levels_db) and 0 <= row < levels_db.shape[1]:
-                text = f"{time_s:.3f} s   {frequency_hz:.0f} Hz   {levels_db[column, row]:.1f} dB"
-        self.view.readout.tell(text)
+                level, frequency = f"{levels_db[column, row]:.1f} dB", f"{frequency_hz:.0f} Hz"
+                wordings = [f"{time_s:.3f} s   {frequency}   {level}", f"{frequency}   {level}", level]
+        self.view.readout.tell(*wordings)

@@ -22,7 +22,8 @@ class SpectrumPanel(Panel):
     title = "Spectrum"
     help = (
         "Level against frequency of what slots A and B hold, at the playhead and the listening point, on the same "
-        "axes; 0 dB is a full-scale sine. A partial that is out of tune or decays wrongly parts here first."
+        "axes; 0 dB is a sine of the amplitude that the axis names. A partial that is out of tune or decays wrongly "
+        "parts here first."
     )
     view: SpectrumView
 

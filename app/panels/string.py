@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from app.analysis.heard import HeardMotion
 from app.library import Library
 from app.motion import Envelope, Strobe, frame_at
@@ -20,6 +22,7 @@ from engine.preset import PresetInfo, outside_training
 
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
+SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
 PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset"}
 HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
 WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
@@ -30,7 +33,7 @@ class StringPanel(Panel):
     title = "String"
     help = (
         "The string seen from the side: what slots A and B hold in motion, slowed as by a stroboscope, or the pluck "
-        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Darker parts lie "
+        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Hatched parts lie "
         "outside the training."
     )
     view: StringView
@@ -85,19 +88,21 @@ class StringPanel(Panel):
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
         ready = [min(motion.ready, position_s * motion.rate_hz) for motion in motions if motion.there]
-        shown = (take, ready, choices.speed, choices.envelope)
+        shown = (take, ready, choices.speed, choices.envelope, choices.solo)
         if not moment.playing and shown == self._shown:
             return
         self._shown = shown
         self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, choices.speed, take.fundamental_hz)
         shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
         envelope = self._envelope if choices.envelope else None
-        self.view.show_frame(frame_at(take, motions, position_s, shown_s, choices.speed, envelope))
+        frame = frame_at(take, motions, position_s, shown_s, choices.speed, envelope)
+        if choices.solo:
+            frame = replace(frame, caption=f"all modes, though mode {choices.solo} is heard alone   {frame.caption}")
+        self.view.show_frame(frame)
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
-        points = entry.info.grid_points if entry else 101
-        shape_mm = choices.pluck.displacement(points).numpy() * MM
+        shape_mm = choices.pluck.displacement(SHAPE_POINTS).numpy() * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
         view.set_trained(_trained(entry.info) if entry else TrainedPlucks())

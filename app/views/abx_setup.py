@@ -45,7 +45,7 @@ class SetupPage(QWidget):
         self._pair = [self._build_choice(name, place) for place, name in enumerate("AB")]
         self._trials = QSpinBox(minimum=1, maximum=MOST_TRIALS, value=trials)
         self._trials.setFixedSize(64, ROW_HEIGHT)
-        self._trials.setStyleSheet("QLineEdit { border: none; padding: 0 6px; }")
+        self._trials.lineEdit().setTextMargins(6, 0, 0, 0)
         self._trials.setAccessibleName("Number of trials")
         self._trials.setToolTip("Fixed before the start, for a test that may stop at a lucky moment proves nothing")
         self._trials.valueChanged.connect(self._show_trials)

@@ -55,7 +55,6 @@ class AudioDialog(QDialog):
     """Asks with signals, shows with `show_…`."""
 
     choice_made = Signal(object, object)  # DeviceChoice or None, SoundChoice
-    retry_asked = Signal()
     rescan_asked = Signal()
     tone_asked = Signal(str)  # left, right or both
     underruns_reset = Signal()
@@ -70,7 +69,6 @@ class AudioDialog(QDialog):
         self._problem_label.setObjectName("warning")
         self._problem_label.setWordWrap(True)
         self._problem_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._retry = _button("Try again", "Open the chosen output once more", self.retry_asked)
         self._device = combo_box("Output", [("System default", None)])
         self._device.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self._device.setToolTip("Where the sound goes; it is remembered by its name")
@@ -120,7 +118,9 @@ class AudioDialog(QDialog):
         )
         _set(self._problem_label, state.problem)
         _set(self._underruns, f"{state.underruns}")
-        self._problem.setVisible(bool(state.problem))
+        if self._problem.isHidden() == bool(state.problem):
+            self._problem.setVisible(bool(state.problem))
+            self.adjustSize()
         for button in self._tones:
             button.setEnabled(heard)
 
@@ -130,10 +130,10 @@ class AudioDialog(QDialog):
     def _lay_out(self) -> None:
         self._problem = QFrame()
         self._problem.setObjectName("panel")
-        problem = QHBoxLayout(self._problem)
-        problem.addWidget(self._problem_label, 1)
-        problem.addWidget(self._retry)
-        rescan = _button("Look again", "Look for outputs that were connected meanwhile", self.rescan_asked)
+        QHBoxLayout(self._problem).addWidget(self._problem_label)
+        rescan = _button(
+            "Look again", "Look for outputs that were connected meanwhile, and open the chosen one", self.rescan_asked
+        )
         self._tones = [
             _button(side.capitalize(), f"A soft tone for a second: {side}") for side in ("left", "both", "right")
         ]
@@ -149,7 +149,6 @@ class AudioDialog(QDialog):
         form.addRow("Output", _row(self._device, rescan))
         form.addRow("Sample rate", self._rate)
         form.addRow("Buffer", self._buffer)
-        form.addRow("", advice)
         form.addRow("Test tone", _row(*self._tones, None))
         form.addRow("Underruns", _row(self._underruns, reset, None))
         close = _button("Close", "Close; every choice already counts")
@@ -160,6 +159,7 @@ class AudioDialog(QDialog):
         column.addWidget(self._state_label)
         column.addWidget(self._problem)
         column.addLayout(form)
+        column.addWidget(advice)
         column.addStretch(1)
         column.addLayout(_row(None, close))
 

@@ -24,6 +24,12 @@ def error_map() -> pg.ColorMap:
     return _grounded("CET-D6", 0.5)
 
 
+def magnitudes_of(signed: pg.ColorMap) -> pg.ColorMap:
+    """The half of a map with two signs that is above zero."""
+    upper = np.linspace(0.5, 1, _COLOURS // 2 + 1)
+    return pg.ColorMap(2 * upper - 1, signed.map(upper, mode="byte"))
+
+
 def level_map() -> pg.ColorMap:
     """From the ground by violet and amber to white; on a light ground by amber and red to dark blue."""
     return _grounded("inferno" if theme.face == theme.DARK else "CET-L17", 0.0)

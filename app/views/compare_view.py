@@ -110,7 +110,7 @@ class CompareView(QWidget):
         menu.addSeparator()
         self._actions = {}
         for entry in entries:
-            action = menu.addAction(entry.info.title)
+            action = menu.addAction(entry.title)
             action.setCheckable(True)
             action.toggled.connect(lambda on, name=entry.name: self.preset_toggled.emit(name, on))
             self._actions[entry.name] = action
@@ -149,4 +149,5 @@ class CompareView(QWidget):
             row.model,
             row.note,
         )
-        return TableRow(row.name, values, grey=not fresh, bold=present, tip=row.note)
+        tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
+        return TableRow(row.name, values, grey=not fresh, bold=present, tip=tip)

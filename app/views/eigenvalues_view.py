@@ -84,7 +84,7 @@ class EigenvaluesView(QWidget):
         self._layer.setVisible(figure is not None and figure.layers > 1)
         self._draw()
         if figure is None:
-            self._words.setText(words)
+            self._words.say(words)
 
     def set_solo(self, mode: int) -> None:
         """The mode that is heard alone; 0: all."""
@@ -116,28 +116,33 @@ class EigenvaluesView(QWidget):
         if figure is None:
             return
         if point >= 0:
-            self._words.setText(self._describe(figure, point))
+            self._words.say(*self._describe(figure, point))
         elif self._solo:
-            self._words.setText(f"Mode {self._solo} alone is heard; Esc: all of them")
+            self._words.say(f"Mode {self._solo} alone is heard; Esc: all of them")
         else:
-            self._words.setText(figure.note)
+            self._words.say(figure.note)
 
-    def _describe(self, figure: PoleFigure, point: int) -> str:
+    def _describe(self, figure: PoleFigure, point: int) -> list[str]:
+        """In several wordings, the longest first."""
         count = len(self._shown)
         learned = point < count
         poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)
         mode = int(poles.mode[place])
-        text = f"{'Learned, nearest to' if learned else 'The string’s'} mode {mode}:  {poles.mode_hz[place]:.1f} Hz"
-        if poles.folded_hz[place] < poles.mode_hz[place] - 0.1:
-            text += f" (heard at {poles.folded_hz[place]:.0f} Hz)"
-        if learned:
-            text += f",  {poles.cents[place]:+.1f} cents"
-        text += f",  T60 {_t60_text(poles.t60_s[place])}"
-        if learned:
-            text += f" (string {_t60_text(figure.string.t60_s[mode - 1])})"
-            if figure.layers > 1:
-                text += f",  layer {figure.learned.layer[place] + 1}"
-        return text
+        name, short = ("Learned, nearest to", "Learned,") if learned else ("The string’s", "String’s")
+        pitch = f"{poles.mode_hz[place]:.1f} Hz"
+        heard = poles.folded_hz[place]
+        folded = f" (heard at {heard:.0f} Hz)" if heard < poles.mode_hz[place] - 0.1 else ""
+        decay = f"T60 {_t60_text(poles.t60_s[place])}"
+        if not learned:
+            return [f"{name} mode {mode}:  {pitch}{folded},  {decay}", f"{short} mode {mode}:  {pitch},  {decay}"]
+        off, string = f"{poles.cents[place]:+.1f} cents", f"(string {_t60_text(figure.string.t60_s[mode - 1])})"
+        layer = f",  layer {figure.learned.layer[place] + 1}" if figure.layers > 1 else ""
+        return [
+            f"{name} mode {mode}:  {pitch}{folded},  {off},  {decay} {string}{layer}",
+            f"{short} mode {mode}:  {pitch},  {off},  {decay} {string}",
+            f"{mode}:  {pitch},  {off},  {decay} {string}",
+            f"{mode}:  {off},  {decay}",
+        ]
 
     def _take(self, point: int) -> None:
         assert self._figure is not None

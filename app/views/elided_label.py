@@ -1,14 +1,33 @@
-"""A line of text that is cut with an ellipsis where there is too little room for it."""
+"""A line of text that is told in fewer words, or cut with an ellipsis, where there is too little room for it."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QStyle, QStyleOption
+from PySide6.QtWidgets import QLabel, QStyle, QStyleOption, QWidget
 
 
 class ElidedLabel(QLabel):
     """Takes the room there is; what it says never moves what is beside it. `text` is whole."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._shorter: tuple[str, ...] = ()
+
+    def say(self, text: str, *shorter: str) -> None:
+        """`shorter` are other wordings, the longest first, for where there is no room for the text."""
+        self._shorter = shorter
+        self.setText(text)
+        self.update()
+
+    @property
+    def shown(self) -> str:
+        """As much of it as there is room for."""
+        metrics, room = self.fontMetrics(), self.contentsRect().width()
+        for words in (self.text(), *self._shorter):
+            if metrics.horizontalAdvance(words) <= room:
+                return words
+        return metrics.elidedText(words, Qt.TextElideMode.ElideRight, room)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(0, super().minimumSizeHint().height())
@@ -21,7 +40,5 @@ class ElidedLabel(QLabel):
         option = QStyleOption()
         option.initFrom(self)
         self.style().drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
-        area = self.contentsRect()
-        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, area.width())
         painter.setPen(option.palette.windowText().color())
-        painter.drawText(area, self.alignment() | Qt.AlignmentFlag.AlignVCenter, text)
+        painter.drawText(self.contentsRect(), self.alignment() | Qt.AlignmentFlag.AlignVCenter, self.shown)

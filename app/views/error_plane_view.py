@@ -83,8 +83,9 @@ class ErrorPlaneView(QWidget):
             self._words.setText(self._resting)
             return
         error = self._picture.at(position, amplitude_mm)
-        about = "" if self._picture.spacing == 1 else "about "
-        text = "runs away" if math.isinf(error) else f"error {about}{100 * error:.3g} %"
+        text = "runs away" if math.isinf(error) else f"error as trained about {100 * error:.2g} %"
+        if self._picture.spacing > 1:
+            text += ", still coarse"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the trained range"
         self._words.setText(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
@@ -99,7 +100,7 @@ class _Map(pg.PlotWidget):
         super().__init__()
         self.setAccessibleName("Map of errors")
         self.setToolTip(
-            "The model's error for a pluck at each place (across) and amplitude (up).\n"
+            "The model's error as trained (the header's first figure) for a pluck at each place and amplitude.\n"
             "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the trained range"
         )
         self.setToolTipDuration(TIP_MS)

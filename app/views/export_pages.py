@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
@@ -26,7 +27,7 @@ from app.settings import BatchChoices, ExportChoices
 from app.slots import other_preset
 from app.sound import SOURCES
 from app.sound_names import Pickup
-from app.views.parts import combo_box, tool_button
+from app.views.parts import combo_box, faint, tool_button
 from app.views.sound_form import label, row_of, wav_settings
 from engine.pluck import Pluck
 
@@ -97,9 +98,12 @@ class SoundPage(QWidget):
         place = row_of(browse)
         place.insertWidget(0, self.path, 100)
         form.addRow(label("File"), place)
+        self.names = faint()
+        form.addRow(label("Saved as"), self.names)
+        self._form = form
 
     def suggest_name(self, rate_hz: int) -> None:
-        """A name after what is in the file, unless the user gave one."""
+        """A name after what is in the file, unless the user gave one; two files are named beneath."""
         if not self._named_by_user:
             chosen = self.source.currentData()
             source: Source = "model" if chosen == "files" else chosen
@@ -107,6 +111,8 @@ class SoundPage(QWidget):
                 self._preset.name, self._choices.pluck, rate_hz or self._preset.info.rate_hz, source
             )
             self.path.setText(str(Path(self._folder) / name))
+        self.names.setText("\n".join(path.name for path in self.paths().values()))
+        self._form.setRowVisible(self.names, len(self.paths()) > 1)
 
     def paths(self) -> dict[Source, Path]:
         """The files that will be written, by source."""
@@ -149,10 +155,12 @@ class BatchPage(QWidget):
         self.presets.setFixedHeight(128)
         checked = set(batch.presets) or {choices.preset}
         for entry in self._entries:
-            item = QListWidgetItem(entry.info.title)
+            item = QListWidgetItem(entry.title)
+            item.setToolTip(entry.path.name)
             item.setCheckState(Qt.CheckState.Checked if entry.name in checked else Qt.CheckState.Unchecked)
             self.presets.addItem(item)
-        self.presets.setCurrentRow(0)
+        self.presets.setCurrentRow(next((row for row, e in enumerate(self._entries) if e.name in checked), 0))
+        self.what = faint(f"{_shape_text(choices)}, {_heard_text(choices)}")
         self.positions = _line("Positions", batch.positions or f"{choices.position:g}", "0.1, 0.2, 0.35")
         self.amplitudes = _line("Amplitudes in mm", batch.amplitudes or f"{choices.amplitude_mm:g}", "1, 2, 5")
         self.sources = {
@@ -172,8 +180,11 @@ class BatchPage(QWidget):
         form = QFormLayout(self)
         form.setContentsMargins(0, 12, 0, 0)
         form.addRow(label("Presets"), self.presets)
-        form.addRow(label("Positions"), self.positions)
-        form.addRow(label("Amplitudes, mm"), self.amplitudes)
+        form.addRow(label("Plucks"), self.what)
+        for name, edit in (("Positions", self.positions), ("Amplitudes, mm", self.amplitudes)):
+            several = row_of(faint("several: commas between"))
+            several.insertWidget(0, edit, 100)
+            form.addRow(label(name), several)
         form.addRow(label("Sources"), row_of(*self.sources.values()))
         form.addRow(label("Folder"), place)
         form.addRow(label(""), row_of(self.overwrite))
@@ -182,6 +193,10 @@ class BatchPage(QWidget):
             edit.textChanged.connect(self.changed)
         for box in (*self.sources.values(), self.overwrite):
             box.toggled.connect(self.changed)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.presets.scrollToItem(self.presets.currentItem())
 
     def choices(self) -> BatchChoices:
         return BatchChoices(
@@ -222,21 +237,27 @@ class BatchPage(QWidget):
 
 
 def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
-    shape = shape_word(choices.shape)
-    heard = f"{choices.listen:.2f}"
+    pluck = f"{_shape_text(choices)}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
+    modes = f". All modes, though mode {choices.solo} is heard alone" if choices.solo else ""
+    return f"{preset.title}: {pluck}, {_heard_text(choices)}{modes}"
+
+
+def _shape_text(choices: Choices) -> str:
+    width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
+    return f"{shape_word(choices.shape)}{width}"
+
+
+def _heard_text(choices: Choices) -> str:
+    heard = f"heard at {choices.listen:.2f}"
     if choices.stereo:
         heard += f" (left) and {choices.listen_right:.2f} (right)"
-    if choices.pickup == "velocity":
-        heard += ", velocity"
-    pluck = f"{shape} pluck at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
-    modes = f". All modes, though mode {choices.solo} is heard alone" if choices.solo else ""
-    return f"{preset.info.title}, {pluck}, heard at {heard}{modes}"
+    return f"{heard}, velocity" if choices.pickup == "velocity" else heard
 
 
 def _line(name: str, text: str, example: str) -> QLineEdit:
     edit = QLineEdit(text)
     edit.setAccessibleName(name)
-    edit.setToolTip(f"{name}, commas between" if example else name)
+    edit.setToolTip(f"{name}: one, or several with commas between, for example {example}" if example else name)
     if example:
         edit.setPlaceholderText(f"for example {example}")
     return edit

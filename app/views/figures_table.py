@@ -85,6 +85,7 @@ class FiguresTable(QTableView):
         self.setTabKeyNavigation(False)
         self.setShowGrid(False)
         self.setWordWrap(False)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # names of one kind differ at the end
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(22)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
@@ -100,6 +101,11 @@ class FiguresTable(QTableView):
         chosen = self.chosen_key
         self._rows.replace(rows)
         self.choose(chosen)
+
+    def set_dimmed(self, dimmed: bool) -> None:
+        """Whether all figures are grey: of something earlier."""
+        self._rows.dimmed = dimmed
+        self.viewport().update()
 
     @property
     def rows(self) -> list[TableRow]:
@@ -162,6 +168,7 @@ class _Rows(QAbstractTableModel):
         super().__init__()
         self.columns = columns
         self.rows: list[TableRow] = []
+        self.dimmed = False
 
     def replace(self, rows: Sequence[TableRow]) -> None:
         if [row.key for row in rows] == [row.key for row in self.rows]:  # the place of the scroll bar stays
@@ -201,7 +208,7 @@ class _Rows(QAbstractTableModel):
         if role == Qt.ItemDataRole.FontRole and row.bold:
             return theme.small_font(12, bold=True)
         if role == Qt.ItemDataRole.ForegroundRole:
-            return QColor(theme.FAINT if row.grey or value is None else _colour(column))
+            return QColor(theme.FAINT if self.dimmed or row.grey or value is None else _colour(column))
         if role == Qt.ItemDataRole.ToolTipRole:
             return row.tip or None
         return None

@@ -98,7 +98,7 @@ def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -
     for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
         needed[place] = int(min(needed[place], max(0.0, titles / (len(needed) - done))))
         titles -= needed[place]
-    elide = Qt.TextElideMode.ElideRight
+    elide = Qt.TextElideMode.ElideMiddle
     return [
         _whole(replace(source, title=metrics.elidedText(source.title, elide, room)))
         for source, room in zip(told, needed, strict=True)

@@ -29,7 +29,7 @@ class Meter(QWidget):
         return QSize(150, 40)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(100, 40)
+        return QSize(90, 40)
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)

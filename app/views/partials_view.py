@@ -92,7 +92,12 @@ class PartialsView(QWidget):
         self._words.setText(text)
 
     def show_partials(self, rows: Sequence[PartialRow]) -> None:
+        self.table.set_dimmed(False)
         self.table.show_rows([self._row(row) for row in rows])
+
+    def dim(self) -> None:
+        """The figures are of an earlier pluck."""
+        self.table.set_dimmed(True)
 
     def show_solo(self, mode: int) -> None:
         """Marks the mode that is heard alone; 0: none."""

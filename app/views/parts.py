@@ -32,7 +32,13 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
     return box
 
 
-def words_label() -> QLabel:
+def faint(text: str = "") -> QLabel:
+    made = QLabel(text)
+    made.setObjectName("faint")
+    return made
+
+
+def words_label() -> ElidedLabel:
     """A faint line of words that takes the room there is: what it says never moves what is beside it."""
     label = ElidedLabel()
     label.setObjectName("faint")

@@ -64,9 +64,9 @@ class PresetBar(QWidget):
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
         from app.views.preset_card import preset_card, preset_summary  # the engine with them: not for the first sight
 
-        title = entry.info.title if entry else "No preset found"
+        title = entry.title if entry else "No preset found"
         self.name.setText(f"{'★  ' if favourite else ''}{title}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Preset: {title}")
         self.name.setToolTip("Browse the presets (Ctrl+P)")
-        self.card.setText(preset_summary(entry) if entry else "")
+        self.card.say(*(preset_summary(entry) if entry else [""]))
         self.card.setToolTip(preset_card(entry) if entry else "")

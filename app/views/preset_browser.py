@@ -92,6 +92,7 @@ class PresetBrowser(QFrame):
         made.setHeaderLabels(["", "Preset", "Model", "Rate", "Error"])
         made.setRootIsDecorated(False)
         made.setUniformRowHeights(True)
+        made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # presets of one string differ at the end
         made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         header = made.header()
@@ -166,14 +167,12 @@ class PresetBrowser(QFrame):
             for entry in entries:
                 info = entry.info
                 star = "★" if entry.name in favourites else "☆"
-                row = [star, info.title, model_word(info.model), rate_word(info.rate_hz), error_word(info)]
+                row = [star, entry.title, model_word(info.model), rate_word(info.rate_hz), error_word(info)]
                 item = QTreeWidgetItem(row)
-                item.setToolTip(_TITLE, f"{info.title}\n{string_word(info.tension_modulated)}")
+                item.setToolTip(_TITLE, f"{entry.title}\n{string_word(info.tension_modulated)}\n{entry.path.name}")
                 item.setToolTip(_STAR, "Favourite (Ctrl+D)")
                 for column in (_RATE, _ERROR):
                     item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                if star == "☆":
-                    item.setForeground(_STAR, self.palette().placeholderText())
                 self.list.addTopLevelItem(item)
         found = f"{len(entries)} of {total} presets" if len(entries) < total else f"{total} presets"
         self._state.setText(f"{found}   ·   your own: {folder}" if total else f"No presets   ·   your own: {folder}")

@@ -7,7 +7,6 @@ from html import escape
 from PySide6.QtWidgets import QApplication
 
 from app.library import PresetEntry
-from app.preset_folders import user_folder
 from app.preset_words import (
     error_word,
     initial_word,
@@ -36,19 +35,21 @@ def preset_card(entry: PresetEntry) -> str:
     return f"{title}{what}<table>{rows}</table>"
 
 
-def preset_summary(entry: PresetEntry) -> str:
-    """The same in one line."""
+def preset_summary(entry: PresetEntry) -> list[str]:
+    """The same in one line, the longest wording first; the error is in all of them."""
     info = entry.info
-    parts = [
-        model_word(info.model),
-        f"{entry.parameters:,} parameters",
-        "tension-modulated string" if info.tension_modulated else "linear string",
-        f"{rate_word(info.rate_hz)}, {info.modes} modes",
-        f"trained on {info.horizon_s:g} s",
-    ]
-    if info.rel_mae is not None:
-        parts.append(f"validation error {error_word(info)}")
-    return "  ·  ".join(parts)
+    model, rate = model_word(info.model), rate_word(info.rate_hz)
+    string = "tension-modulated string" if info.tension_modulated else "linear string"
+    trained, parameters = f"trained on {info.horizon_s:g} s", f"{entry.parameters:,} parameters"
+    error = [f"validation error {error_word(info)}"] if info.rel_mae is not None else []
+    wordings = (
+        (model, parameters, string, f"{rate}, {info.modes} modes", trained),
+        (model, string, f"{rate}, {info.modes} modes", trained),
+        (model, f"{rate}, {info.modes} modes", trained),
+        (model, rate),
+        (model,),
+    )
+    return ["  ·  ".join([*parts, *error]) for parts in wordings]
 
 
 def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
@@ -76,7 +77,7 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
 
 
 def _place(entry: PresetEntry) -> str:
-    return "your own" if entry.path.parent == user_folder() else "shipped with the program"
+    return "your own" if entry.own else "shipped with the program"
 
 
 def _can_be_remade(name: str) -> bool:

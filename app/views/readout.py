@@ -16,17 +16,17 @@ class Readout(ElidedLabel):
         self.setObjectName("faint")
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self._resting = ""
-        self._told = ""
+        self._resting: tuple[str, ...] = ("",)
+        self._told: tuple[str, ...] = ("",)
 
-    def rest(self, text: str) -> None:
-        self._resting = text
-        self.tell(self._told)
+    def rest(self, text: str, *shorter: str) -> None:
+        self._resting = (text, *shorter)
+        self.tell(*self._told)
 
-    def tell(self, text: str) -> None:
-        """Nothing: back to the resting text."""
-        self._told = text
-        text = text or self._resting
-        if text != self.text():
-            self.setText(text)
-            self.setToolTip(text)  # where there is too little room for it
+    def tell(self, text: str, *shorter: str) -> None:
+        """Nothing: back to the resting text. `shorter` as in `ElidedLabel`."""
+        self._told = (text, *shorter)
+        wordings = self._told if text else self._resting
+        if wordings[0] != self.text():
+            self.say(*wordings)
+            self.setToolTip(wordings[0])  # where there is too little room for it

@@ -101,7 +101,7 @@ class SlotButtons(QWidget):
         """In full, and as short as a button needs it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
-                return entry.info.title, entry.info.title
+                return entry.title, entry.title
         name = source.removeprefix("preset:")
         return name, "DIFF." if source == "difference" else name.upper()
 
@@ -114,7 +114,7 @@ class SlotButtons(QWidget):
             if metrics.horizontalAdvance(words) <= room:
                 return words
         room -= metrics.horizontalAdvance(f"{letter}    {beside}")
-        cut = metrics.elidedText(text, Qt.TextElideMode.ElideRight, room)
+        cut = metrics.elidedText(text, Qt.TextElideMode.ElideMiddle, room)
         return "  ".join(part for part in (letter, cut, beside) if part)
 
     def _gain_text(self, slot: str) -> str:
@@ -143,9 +143,10 @@ class SlotButtons(QWidget):
         others.setToolTipsVisible(True)
         for entry in self._entries:
             source = f"preset:{entry.name}"
-            action = self._add(others, held, entry.info.title, slot, source, getattr(self._choices, slot) == source)
+            action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
             action.setEnabled(not entry.unplayable)
-            action.setToolTip(entry.unplayable or f"Its model for the same pluck, from {entry.info.rate_hz} Hz")
+            told = entry.unplayable or f"Its model for the same pluck, from {entry.info.rate_hz} Hz"
+            action.setToolTip(f"{told}\n{entry.path.name}")
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)
         match.toggled.connect(lambda on: self.change_asked.emit("level_match", on))

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QFormLayout, QHBoxLayou
 
 from app.settings import ExportChoices
 from app.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB, LONGEST_S
-from app.views.parts import combo_box
+from app.views.parts import combo_box, faint
 from app.wav import Bits, WavSettings
 
 RATES_HZ = (0, 44_100, 48_000, 96_000)  # 0: the model's own
@@ -36,7 +36,7 @@ class SoundForm(QWidget):
         names = [("The model's own", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ if rate)]
         self.rate = combo_box("Sample rate", names, export.rate_hz)
         self.rate.setToolTip("A rate above the model's own adds no bandwidth")
-        self._rate_note = _faint()
+        self._rate_note = faint()
         self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
         self.bits.setToolTip("16 bits are dithered; floating point never clips")
         self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
@@ -55,7 +55,7 @@ class SoundForm(QWidget):
         form.addRow(label("Format"), row_of(self.bits))
         form.addRow(label("Level"), row_of(self.normalise))
         self._difference = QWidget()
-        self._difference.setLayout(row_of(self.gain, _faint("louder than it is")))
+        self._difference.setLayout(row_of(self.gain, faint("louder than it is")))
         form.addRow(label("Difference"), self._difference)
         self._form = form
         for box in (self.length, self.rate, self.bits):
@@ -87,7 +87,7 @@ class SoundForm(QWidget):
         for spin, shown in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
             spin.setVisible(shown)
         rate_hz = self.rate.currentData() or self._preset_rate_hz
-        text = f"{rate_hz} Hz" if rate_hz == self._preset_rate_hz else ""
+        text = "" if self.rate.currentData() else f"{rate_hz / 1000:g} kHz"
         if rate_hz > self._preset_rate_hz:
             text = f"adds no bandwidth: the model ends at {self._preset_rate_hz / 2000:g} kHz"
         self._rate_note.setText(text)
@@ -127,9 +127,3 @@ def spin_box(
     spin.setMinimumWidth(84)
     spin.setValue(value)
     return spin
-
-
-def _faint(text: str = "") -> QLabel:
-    made = QLabel(text)
-    made.setObjectName("faint")
-    return made

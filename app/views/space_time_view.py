@@ -8,14 +8,16 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtWidgets import QWidget
 
+from app.shown import readable_unit
 from app.views import theme
 from app.views.axis_label import UprightLabel, UprightTicks
-from app.views.colour_maps import displacement_map, error_map
+from app.views.colour_maps import displacement_map, error_map, magnitudes_of
 from app.views.parts import combo_box, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL, Segments
 from app.views.time_plot import TimePlot
 
+MM = 1000.0
 GAINS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
 AUTO = 0  # the largest of them at which what is given as typical is within the scale
 QUANTITIES = (
@@ -27,7 +29,10 @@ PLACES = (0, 0.25, 0.5, 0.75, 1)
 
 
 class SpaceTimeView(QWidget):
-    """Each of displacement and error keeps its own gain. Positions are in lengths of the string."""
+    """Each of displacement and error keeps its own gain. Positions are in lengths of the string.
+
+    Colours are of displacement with its sign, or of magnitudes: bar and readout say the same.
+    """
 
     listening_point_moved = Signal(float)
 
@@ -35,14 +40,14 @@ class SpaceTimeView(QWidget):
         super().__init__(parent)
         self.quantities = Segments("Shown", QUANTITIES)
         self.gains = combo_box(
-            "Gain of the colours", [("auto", AUTO), *((f"× {gain}", gain) for gain in GAINS)], AUTO
+            "Gain of the colours", [("auto gain", AUTO), *((f"gain {_times(gain)}", gain) for gain in GAINS)], AUTO
         )
         self.gains.setMinimumContentsLength(12)
         self.gains.setToolTip(
-            "How far the colours are magnified: the bar beside the picture tells the mm.\n"
+            "How far the colours are magnified: the bar beside the picture tells the displacement.\n"
             "Auto fits what is in view for most of the time; model and truth always have the same scale"
         )
-        self.gains.setStyleSheet(SMALL)
+        self.gains.setStyleSheet(f"{SMALL} padding-right: 0;")
         self.readout = Readout()
         self.plot = TimePlot(
             "Space–time",
@@ -65,12 +70,12 @@ class SpaceTimeView(QWidget):
         self._listening = pg.InfiniteLine(0, angle=0, pen=pg.mkPen(theme.translucent(theme.TEXT, 90), width=1))
         self._listening.setZValue(15)
         item.addItem(self._listening, ignoreBounds=True)
-        self._bar = pg.ColorBarItem(
-            values=(-1, 1), width=10, label="mm", colorMap=displacement_map(), interactive=False
-        )
+        self._bar = pg.ColorBarItem(values=(-1, 1), width=10, colorMap=displacement_map(), interactive=False)
+        self._bar.axis.enableAutoSIPrefix(False)
+        self._bar.axis.setLabel("mm")
         self._bar.setImageItem(self._image, insert_in=item)
-        self._maps = {"displacement": displacement_map(), "error": error_map()}
-        self._map_shown = "displacement"
+        self._signed = True
+        self._map_shown = ("displacement", True)
         theme.changes.face_changed.connect(self._take_face)
         self.quantities.chosen.connect(self._choose_quantity)
         self.gains.activated.connect(self._choose_gain)
@@ -101,14 +106,29 @@ class SpaceTimeView(QWidget):
             self._listening.setValue(listen)
 
     def show_picture(
-        self, displacement_mm: NDArray[np.float32], start_s: float, stop_s: float, typical_mm: float
+        self,
+        displacement_mm: NDArray[np.float32],
+        start_s: float,
+        stop_s: float,
+        typical_mm: float,
+        signed: bool = True,
     ) -> None:
-        """Displacement (places, columns) of the times start_s … stop_s; an automatic gain fits `typical_mm`."""
-        self._typical_mm = typical_mm
+        """Displacement (places, columns) of the times start_s … stop_s, or its magnitude where it is not `signed`.
+
+        An automatic gain fits `typical_mm`.
+        """
+        self._typical_mm, self._signed = typical_mm, signed
         self._show_scale()
         half = 0.5 / (len(displacement_mm) - 1)  # the grid's points are the middles of their rows
         self._image.setImage(displacement_mm, autoLevels=False)
         self._image.setRect(QRectF(start_s, -half, stop_s - start_s, 1 + 2 * half))
+
+    def tell(self, time_s: float, place: float, displacement_mm: float) -> None:
+        """What is drawn there, in the bar's unit."""
+        factor, unit = readable_unit(self.scale_mm / MM, "displacement")
+        value = factor * displacement_mm / MM
+        what = f"{value:+.4g} {unit}" if self._signed else f"peak {value:.4g} {unit}"
+        self.readout.tell(f"{time_s:.4f} s   place {place:.2f}   {what}", what)
 
     def show_nothing(self) -> None:
         """Nothing is there yet of the times in view."""
@@ -123,8 +143,7 @@ class SpaceTimeView(QWidget):
         return "error" if self.quantity == "error" else "displacement"
 
     def _take_face(self) -> None:
-        self._maps = {"displacement": displacement_map(), "error": error_map()}
-        self._bar.setColorMap(self._maps[self._map_shown])
+        self._bar.setColorMap(_colour_map(*self._map_shown))
 
     def _choose_quantity(self) -> None:
         self.gains.setCurrentIndex(self.gains.findData(self._gain[self._kind]))
@@ -135,10 +154,22 @@ class SpaceTimeView(QWidget):
         self._show_scale()
 
     def _show_scale(self) -> None:
-        if self._map_shown != self._kind:
-            self._map_shown = self._kind
-            self._bar.setColorMap(self._maps[self._kind])
-        limits = (-self.scale_mm, self.scale_mm)
+        if self._map_shown != (self._kind, self._signed):
+            self._map_shown = (self._kind, self._signed)
+            self._bar.setColorMap(_colour_map(*self._map_shown))
+        limits = (-self.scale_mm if self._signed else 0.0, self.scale_mm)
         if limits != self._bar.levels():
+            factor, unit = readable_unit(self.scale_mm / MM, "displacement")
+            self._bar.axis.setScale(factor / MM)
+            self._bar.axis.setLabel(unit if self._signed else f"{unit}, peak")
             self._bar.setLevels(limits)
-            self.gains.setItemText(0, f"auto (× {self._fitting_gain})")
+            self.gains.setItemText(0, f"auto gain {_times(self._fitting_gain)}")
+
+
+def _times(gain: int) -> str:
+    return f"× {gain}" if gain < 1000 else f"× {gain // 1000}k"
+
+
+def _colour_map(kind: str, signed: bool) -> pg.ColorMap:
+    made = error_map() if kind == "error" else displacement_map()
+    return made if signed else magnitudes_of(made)

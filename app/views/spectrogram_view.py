@@ -122,10 +122,18 @@ class SpectrogramView(QWidget):
         share = self._levels_db[first : self._drawn] / self.range_db + 1
         self._pixels[first : self._drawn] = np.clip(share, 0, 1) * 255
         if self._drawn:
+            self._tell_range()
             self._image.setImage(self._pixels[: self._drawn], autoLevels=False, levels=(0, 255))
             low, high = self._heights()
             half = self._hop_s / 2
             self._image.setRect(QRectF(-half, low, self._drawn * self._hop_s, high - low))
+
+    def _tell_range(self) -> None:
+        """Says why there is nothing to be seen."""
+        assert self._levels_db is not None
+        below = float(self._levels_db[: self._drawn].max()) < -self.range_db
+        words = f"below −{self.range_db} dB"
+        self.readout.rest(*((f"all of it lies {words}", words) if below else ("",)))
 
     def _take_face(self) -> None:
         self._image.setLookupTable(level_map().getLookupTable(nPts=256))

@@ -19,7 +19,7 @@ from app.views import theme
 from app.views.axis_label import UprightLabel, fit_foot
 from app.views.curves import set_curves
 from app.views.legend import Legend
-from app.views.parts import combo_box, lay_out_plot
+from app.views.parts import combo_box, faint, lay_out_plot
 from app.views.readout import Readout
 from app.views.segments import SMALL
 
@@ -96,7 +96,9 @@ class SpectrumView(QWidget):
         self.setMinimumHeight(84)
         self.plot = pg.PlotWidget()
         self.plot.setAccessibleName("Spectrum")
-        self.plot.setToolTip("The spectrum at the listening point, at the playhead; 0 dB is a sine of full scale")
+        self.plot.setToolTip(
+            "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
+        )
         self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), RANGES_DB[-1])
         self.ranges.setToolTip("How far below full scale the axis reaches, the same for every source")
         self.ranges.setStyleSheet(SMALL)
@@ -132,7 +134,7 @@ class SpectrumView(QWidget):
         self.set_full_scale("10 mm")
         self._fit()
         self.plot.viewport().installEventFilter(self)
-        lay_out_plot(self, (self.ranges,), self.readout, self.plot)
+        lay_out_plot(self, (faint("range"), self.ranges), self.readout, self.plot)
 
     @property
     def range_db(self) -> int:

@@ -14,6 +14,7 @@ from app.views.legend import paint_sources
 from app.views.string_axes import MARGIN_X, StringAxes
 
 LINE_HEIGHT = 15
+HATCHING = 70  # alpha, 0 … 255
 LEGEND_Y = 17.5  # the middle of the line above the string
 LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
 SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
@@ -92,7 +93,7 @@ def _shade(painter: QPainter, area: QRectF) -> None:
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.translucent(theme.face.shade, theme.face.shade_alpha))
     painter.drawRect(area)
-    painter.setBrush(QBrush(theme.translucent(theme.FAINT, 26), Qt.BrushStyle.BDiagPattern))
+    painter.setBrush(QBrush(theme.translucent(theme.FAINT, HATCHING), Qt.BrushStyle.BDiagPattern))
     painter.drawRect(area)
 
 

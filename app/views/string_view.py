@@ -211,6 +211,7 @@ class StringView(QWidget):
         at = event.position()
         if self._drag is None:
             self._hover(self._under(at))
+            self.setToolTip(self._warning if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered])
             return
         axes = self._axes()
         fine = FINE if event.modifiers() & _Shift else 1.0
@@ -289,7 +290,6 @@ class StringView(QWidget):
         self.setCursor(cursors.get(on, Qt.CursorShape.SizeHorCursor))
         if on != self._hovered:
             self._hovered = on
-            self.setToolTip(TIPS[on])
             self.update()
 
     def _under(self, at: QPointF) -> str | None:
@@ -312,15 +312,14 @@ class StringView(QWidget):
         return axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
 
     def _fit_span(self) -> None:
-        """Steps to a span that holds the pluck, or follows the decay; while a pluck is drawn it can only grow."""
-        largest_mm = self._pluck.amplitude_mm
-        if self._frame is not None and not self._shows_pluck:
+        """The span of the pluck at rest, or what follows the decay; while a pluck is drawn it can only grow."""
+        if self._drag == "pluck":
+            self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
+        elif self._frame is None:
+            self._span_mm = _span_mm(self._pluck.amplitude_mm)
+        else:
             largest_mm = self._frame.largest_mm()
-        wanted = _span_mm(largest_mm)
-        too_small = wanted > self._span_mm
-        much_too_large = self._drag != "pluck" and 1.4 * largest_mm < wanted < self._span_mm
-        if too_small or much_too_large:
-            self._span_mm = wanted
+            self._span_mm = max(_span_mm(largest_mm), min(self._span_mm, _span_mm(largest_mm, air=1.4)))
 
     # Painting
 
@@ -402,6 +401,6 @@ class StringView(QWidget):
         return self._ground_pixmap
 
 
-def _span_mm(largest_mm: float) -> float:
+def _span_mm(largest_mm: float, air: float = 1.15) -> float:
     """The least span that holds a displacement with some air."""
-    return next((span for span in SPANS_MM if span >= 1.15 * largest_mm), SPANS_MM[-1])
+    return next((span for span in SPANS_MM if span >= air * largest_mm), SPANS_MM[-1])

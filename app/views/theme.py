@@ -175,13 +175,15 @@ QLabel#warning {{ color: {WARNING}; }}
 QLabel#good {{ color: {GOOD}; }}
 QLabel#title {{ font-size: 15px; font-weight: 600; }}
 QPushButton, QToolButton {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 6px 12px; }}
+QPushButton {{ outline: none; }}
 QPushButton:hover, QToolButton:hover {{ border-color: {FAINT}; }}
 QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {TEXT}; }}
-QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus, QCheckBox:focus,
-QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, QMenuBar:focus
+QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus,
+QCheckBox:focus, QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, QMenuBar:focus
     {{ border: 1px solid {TEXT}; }}
-QPushButton:disabled, QToolButton:disabled, QComboBox:disabled {{ color: {DISABLED}; }}
+QPushButton:disabled, QToolButton:disabled, QComboBox:disabled, QLineEdit:disabled, QDoubleSpinBox:disabled,
+QSpinBox:disabled, QListWidget:disabled {{ color: {DISABLED}; }}
 {slots}
 QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; padding: 6px 9px; }}
 QToolButton#solo {{ padding: 1px 9px; }}
@@ -195,11 +197,12 @@ QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; b
 QToolButton#chip:checked {{ color: {TEXT}; background: {LINE}; border-color: {LINE}; }}
 QToolButton#chip:hover, QToolButton#chip:focus {{ border-color: {FAINT}; }}
 QToolButton#chip:disabled {{ color: {DISABLED}; }}
-QComboBox, QLineEdit, QDoubleSpinBox, QPlainTextEdit, QTextBrowser, QListWidget {{
+QComboBox, QLineEdit, QDoubleSpinBox, QSpinBox, QPlainTextEdit, QTextBrowser, QListWidget {{
     background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;
     selection-background-color: {TRUTH}; selection-color: {BACKGROUND}; }}
-QDoubleSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
-QDoubleSpinBox::up-button, QDoubleSpinBox::down-button {{ width: 0; border: none; }}
+QDoubleSpinBox QLineEdit, QSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
+QDoubleSpinBox::up-button, QDoubleSpinBox::down-button, QSpinBox::up-button, QSpinBox::down-button
+    {{ width: 0; border: none; }}
 QComboBox::drop-down {{ border: none; width: 22px; }}
 QComboBox::down-arrow {{ image: none; width: 0; height: 0; border-left: 4px solid {RAISED};
     border-right: 4px solid {RAISED}; border-top: 5px solid {FAINT}; }}

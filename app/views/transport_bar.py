@@ -21,6 +21,8 @@ from app.views.parts import combo_box, tool_button, vertical_rule
 from app.views.slot_buttons import SlotButtons
 from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
 
+SHAPE_WIDTH = 106  # of the longest name, with
+TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
 _SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
 
 KNOBS = {  # field of `Choices` -> (label, range, tip)
@@ -108,7 +110,6 @@ class TransportBar(QFrame):
         for knob in self.knobs.values():
             knob.set_narrow(compact)
         self.slots.set_narrow(compact)
-        self._shape.setFixedWidth(94 if compact else 106)
         self._export.setText("Export …" if compact else "Export WAV …")
         for button in (self._play, self._loop, self._stereo, self._velocity, self._export):
             button.setProperty("compact", compact)
@@ -170,7 +171,8 @@ class TransportBar(QFrame):
     def _build_shape(self) -> QVBoxLayout:
         self._shape = combo_box("Pluck shape", [(_SHAPE_NAMES[shape], shape) for shape in SHAPES])
         self._shape.setToolTip("The shape of the pluck")
-        self._shape.setFixedWidth(106)
+        self._shape.setStyleSheet(TIGHT)
+        self._shape.setFixedWidth(SHAPE_WIDTH)
         self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
         label = QLabel("PLUCK")
         label.setObjectName("knob")

@@ -81,8 +81,8 @@ def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, player: F
     assert notices.kept[-1][1] == "code"
     assert (control.device, control.sound) == (None, SoundChoice())
     assert "refuses" in control._dialog._problem_label.text()
-    control._dialog.retry_asked.emit()
-    assert player.opened[-1] == player.opened[-2]
+    control._dialog.rescan_asked.emit()
+    assert player.opened[-1][:4] == player.opened[-2][:4]
     control.show(PlayerStatus(device=SPEAKERS, changes_done=3), None)
     assert notices.text == ""
 

@@ -53,9 +53,13 @@ def test_a_refresh_tells_only_when_there_are_others(library: Library, small_pres
     shutil.copy(small_preset, own / "first.safetensors")
     (problem,) = library.refresh()
     assert "first.safetensors: there is a preset of this name already" in problem
+    assert library.refresh() == []  # it has been told
     assert (library.names, len(seen)) == (["first", "mine", "second"], 1)
     mine = library.find("mine")
     assert mine is not None
+    first = library.find("first")
+    assert first is not None
+    assert [mine.title, mine.info.title] == [f"{first.title} (yours)", first.title]
     assert (mine.path, mine.size_bytes) == (own / "mine.safetensors", small_preset.stat().st_size)
 
 

@@ -146,6 +146,14 @@ def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, br
     assert "A small string" in controller.window.presets.name.text()
 
 
+def test_the_error_stays_in_the_header_where_there_is_little_room(controller: Controller) -> None:
+    card = controller.window.presets.card
+    for width in (1200, 400, 300):
+        card.resize(width, 20)
+        assert card.shown.endswith("validation error 25 %")
+    assert "parameters" in card.text()
+
+
 def test_every_control_of_bar_and_browser_has_a_name_and_a_tip(
     controller: Controller, browser: PresetBrowser
 ) -> None:

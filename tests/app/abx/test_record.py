@@ -120,7 +120,7 @@ def test_the_text_says_everything(record: AbxRecord) -> None:
         "Model, turned down by 0.50 dB",
         "Preset    nylon\n",
         "SHA-256   0f0f",
-        "position 0.35, 4 mm, gaussian",
+        "position 0.35, 4 mm, Gaussian",
         "Headphones (ALSA), 48000 Hz",
         "Seed      5",
         "guessing alone",

@@ -64,7 +64,7 @@ def test_coarse_first_and_nothing_twice(monkeypatch: pytest.MonkeyPatch, job: ob
     job.cancel_after = 40  # type: ignore[attr-defined]
     with pytest.raises(Cancelled):
         plane.compute(None, Pluck(), job)  # type: ignore[arg-type]
-    assert asked[:35] == [(x, y) for x in range(0, 49, 8) for y in range(0, 33, 8)]
+    assert asked[:12] == [(x, y) for x in range(0, 49, 16) for y in range(0, 33, 16)]
     picture = plane.picture()
     assert picture is not None
     assert picture.spacing == 4
@@ -75,7 +75,7 @@ def test_coarse_first_and_nothing_twice(monkeypatch: pytest.MonkeyPatch, job: ob
     np.testing.assert_allclose(whole.error, POSITIONS[:, None] * AMPLITUDES_MM, rtol=1e-9)
     assert whole.at(POSITIONS[3], AMPLITUDES_MM[5]) == pytest.approx(POSITIONS[3] * AMPLITUDES_MM[5])
     spacings = [found.spacing for found in job.results]  # type: ignore[attr-defined]
-    assert spacings == [8, 4, 4, 2, 1]  # the second 4 is what the second computation found there
+    assert spacings == [16, 8, 4, 4, 2, 1]  # the second 4 is what the second computation found there
 
 
 def test_errors_are_those_of_the_sources(small_preset: Path, job: object) -> None:

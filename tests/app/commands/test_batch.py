@@ -126,13 +126,19 @@ def test_cancelling_keeps_whole_files_and_their_rows(small_preset: Path, folder:
     assert list((folder / "out").glob(".*")) == []
 
 
+def test_cancelling_before_the_first_file_leaves_no_index(small_preset: Path, folder: Path) -> None:
+    with pytest.raises(ExportCancelled):
+        run_batch(plan(small_preset, folder), cancelled=lambda: True)
+    assert list((folder / "out").iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
         (["--positions", "0.2,x"], "--positions: must be numbers"),
         (["--positions", ","], "--positions: give at least one number"),
         (["--positions", "0"], "--position: must lie in 0.02 … 0.98"),
-        (["--amplitudes", "1,1"], "amplitudes mm: one is given twice"),
+        (["--amplitudes", "1,1"], "amplitudes: one is given twice"),
         (["--sources", "all"], "all is not one of model, truth, difference, both"),
         (["--seconds", "0"], ""),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -10,6 +11,7 @@ import torch
 from pytestqt.qtbot import QtBot
 
 from app.analysis.job import Cancelled, Job
+from app.panels import _background
 from app.panels._background import Background
 from engine.preset import PresetError
 
@@ -110,6 +112,25 @@ def test_a_take_that_no_longer_grows_is_not_waited_for(qtbot: QtBot, background:
     background.give_way_to(Abandoned())  # type: ignore[arg-type]
     with qtbot.waitSignal(background.finished, timeout=10_000):
         background.start(lambda job: job.report(0.5))
+
+
+def test_a_job_rests_while_nobody_looks(qtbot: QtBot, background: Background) -> None:
+    shares: list[float] = []
+    background.progressed.connect(lambda share, _: shares.append(share))
+    resting = threading.Event()
+
+    def work(job: Job) -> None:
+        time.sleep(_background.UNSEEN_S + 0.1)
+        resting.set()
+        job.report(0.5, "half")
+
+    background.start(work)
+    assert resting.wait(10)
+    qtbot.wait(200)
+    assert shares == []
+    with qtbot.waitSignal(background.finished):
+        background.look()
+    assert shares == [0.5]
 
 
 @pytest.mark.parametrize(

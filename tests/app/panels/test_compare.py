@@ -38,6 +38,31 @@ def test_presets_of_the_same_string_are_compared(qtbot: QtBot, controller: Contr
     assert figures(shown)["first"][1] != before
 
 
+def test_the_preset_on_screen_is_computed_first_and_what_is_in_a_slot_next(
+    qtbot: QtBot, controller: Controller, shown: Any
+) -> None:
+    panel = next(panel for panel in controller.panels if panel.key == "compare")
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    order: list[str] = []
+    panel._background.progressed.connect(  # type: ignore[attr-defined]
+        lambda _, row: order.append(row.name) if row is not None else None
+    )
+    controller.session.update(preset="second", position=0.6)
+    qtbot.waitUntil(lambda: order == ["second", "first"], timeout=20_000)
+
+
+def test_a_row_tells_its_whole_name_and_its_file(shown: Any) -> None:
+    row = next(row for row in shown.table.rows if row.key == "second")
+    assert row.tip.splitlines() == [row.values[0], "second.safetensors"]
+
+
+def test_figures_of_an_earlier_pluck_are_told(qtbot: QtBot, controller: Controller, shown: Any) -> None:
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    assert shown._words.text() == "2 presets on this pluck, 0.5 s"
+    controller.session.update(position=0.6)
+    qtbot.waitUntil(lambda: shown._words.text() == "0 of 2 presets on this pluck, 0.5 s; grey: an earlier pluck")
+
+
 def test_presets_are_taken_out_and_put_in(qtbot: QtBot, controller: Controller, shown: Any) -> None:
     shown._actions["second"].trigger()
     assert list(figures(shown)) == ["first"]

@@ -45,7 +45,7 @@ def test_a_click_plucks_there(qtbot: QtBot, controller: Controller, shown: Any) 
     at = plane.mapFromScene(plane.getPlotItem().vb.mapViewToScene(QPointF(0.6, math.log10(8))))
     qtbot.mouseMove(plane.viewport(), at)
     qtbot.waitUntil(lambda: "Pluck at 0.60" in shown.words, timeout=5_000)
-    assert "error 5 %" in shown.words
+    assert "error as trained about 5 %" in shown.words
     qtbot.mouseClick(plane.viewport(), Qt.MouseButton.LeftButton, pos=at)
     choices = controller.session.choices
     assert choices.position == pytest.approx(0.6, abs=0.01)

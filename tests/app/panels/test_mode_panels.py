@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.controller import Controller
+from app.views import theme
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -102,6 +103,18 @@ def test_a_row_lets_its_mode_be_heard_alone(qtbot: QtBot, controller: Controller
     qtbot.keyClick(table, Qt.Key.Key_Return)
     assert session.choices.solo == 0
     assert table.chosen_key is None
+
+
+def test_partials_of_the_pluck_before_are_grey(qtbot: QtBot, controller: Controller, partials: Any) -> None:
+    def colours() -> set[str]:
+        model = partials.table.model()
+        role = Qt.ItemDataRole.ForegroundRole
+        return {model.index(0, column).data(role).name() for column in range(3)}
+
+    assert len(colours()) > 1
+    controller.session.update(position=0.6)
+    qtbot.waitUntil(lambda: colours() == {theme.FAINT.lower()}, timeout=20_000)
+    qtbot.waitUntil(lambda: len(colours()) > 1, timeout=20_000)
 
 
 def test_the_words_of_a_measuring_go(qtbot: QtBot, controller: Controller, partials: Any) -> None:

@@ -16,7 +16,16 @@ from pytestqt.qtbot import QtBot
 
 from app.controller import Controller
 from app.library import Library
-from app.panels import ErrorTimePanel, Moment, Panel, SpaceTimePanel, SpectrogramPanel, SpectrumPanel, WaveformPanel
+from app.panels import (
+    ErrorTimePanel,
+    Moment,
+    Panel,
+    SpaceTimePanel,
+    SpectrogramPanel,
+    SpectrumPanel,
+    StringPanel,
+    WaveformPanel,
+)
 from app.panels.spectrum import EVERY
 from app.rendering import Listening, Take
 from app.rendering.take import Motion
@@ -92,7 +101,42 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
     assert view._image.image.max() == pytest.approx(0.04, rel=1e-3)
     assert view.scale_mm == pytest.approx(4 / 30)  # a gain of 30, of its own accord
     assert view._bar.levels() == pytest.approx((-4 / 30, 4 / 30))
-    assert view.gains.currentText() == "auto (× 30)"
+    assert view.gains.currentText() == "auto gain × 30"
+
+
+def test_bar_colours_and_readout_agree_on_the_sign(qtbot: QtBot, make: Make, take: Take) -> None:
+    panel = make(SpaceTimePanel)
+    view = panel.view
+    watch(qtbot, panel, take, lambda: "without sign" in view.readout.text())
+    assert view._bar.levels() == (0, pytest.approx(view.scale_mm))
+    assert view._image.image.min() >= 0
+    panel._tell(0.3, 0.5)
+    assert view.readout.text().endswith(f"peak {panel._picture.at(0.3, 0.5) * 1000:.4g} mm")
+    view.plot.show_times(0.0, 0.02)
+    panel._tell(float("nan"), 0.5)
+    watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
+    assert view._bar.levels() == (-view.scale_mm, view.scale_mm)
+
+
+def test_small_errors_have_a_scale_of_their_own(make: Make) -> None:
+    view = make(SpaceTimePanel).view
+    view.set_take(1.0, 0.5, 4.0)
+    view.gains.setCurrentIndex(view.gains.findData(10_000))
+    view.gains.activated.emit(0)
+    axis = view._bar.axis
+    assert (axis.labelText, axis.scale) == ("µm", pytest.approx(1000))
+    view.tell(0.1, 0.5, 0.0003)
+    assert view.readout.text() == "0.1000 s   place 0.50   +0.3 µm"
+
+
+def test_levels_below_the_range_are_told(make: Make) -> None:
+    view = make(SpectrogramPanel).view
+    view.begin_picture(2, 3, 0.1)
+    view.show_columns(0, np.full((2, 3), -95.0, np.float32))
+    assert view.readout.text() == "all of it lies below −90 dB"
+    view.ranges.setCurrentIndex(view.ranges.findData(130))
+    view.ranges.activated.emit(0)
+    assert view.readout.text() == ""
 
 
 def test_each_quantity_keeps_its_gain(make: Make) -> None:
@@ -388,3 +432,12 @@ def test_a_view_that_is_not_looked_at_lets_the_last_take_go(
     panel.take_started(take)
     gc.collect()
     qtbot.waitUntil(lambda: gone() is None, timeout=10_000)
+
+
+def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None:
+    panel = make(StringPanel)
+    panel.show_moment(Moment(take, 0.5, False, 0.016))
+    assert "mode" not in panel.view._frame.caption
+    choose(panel, solo=2)
+    panel.show_moment(Moment(take, 0.5, False, 0.016))
+    assert panel.view._frame.caption.startswith("all modes, though mode 2 is heard alone")

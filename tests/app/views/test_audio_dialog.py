@@ -55,8 +55,8 @@ def test_a_fault_is_told_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDial
     assert not dialog._problem.isHidden()
     assert "no sound" in dialog._state_label.text()
     assert not button(dialog, "Left").isEnabled()
-    with qtbot.waitSignal(dialog.retry_asked):
-        button(dialog, "Try again").click()
+    with qtbot.waitSignal(dialog.rescan_asked):
+        button(dialog, "Look again").click()
 
 
 def test_the_tone_and_the_counter(qtbot: QtBot, dialog: AudioDialog) -> None:

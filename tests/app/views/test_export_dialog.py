@@ -170,9 +170,9 @@ def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Pa
     assert dialog.save.text() == "Export 8 files"
     for field, text, words in (
         (dialog.batch.positions, "0.3, x", "positions: numbers with commas"),
-        (dialog.batch.amplitudes, "", "amplitudes mm: give at least one"),
+        (dialog.batch.amplitudes, "", "amplitudes: give at least one"),
         (dialog.batch.positions, "0.3, 0.3", "positions: one is given twice"),
-        (dialog.batch.amplitudes, "99", "amplitude_mm must lie in 0 … 20, not 99"),
+        (dialog.batch.amplitudes, "99", "amplitude must lie in 0 … 20 mm, not 99 mm"),
     ):
         before = field.text()
         field.setText(text)
@@ -184,6 +184,21 @@ def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Pa
     assert len(wavs(tmp_path / "strings")) == 8
     assert (tmp_path / "strings" / "index.csv").is_file()
     run(qtbot, dialog, "0 files written, 8 were there already")
+
+
+def test_a_batch_says_what_all_its_plucks_have_and_shows_what_is_checked(qtbot: QtBot, made) -> None:
+    dialog = made({"batch": {"presets": ("small",)}}, {"shape": "raised_cosine", "width": 0.1, "listen": 0.2})
+    assert dialog.batch.what.text() == "raised cosine 0.100 wide, heard at 0.20"
+    assert dialog.batch.presets.currentItem().checkState() == Qt.CheckState.Checked
+
+
+def test_two_files_are_both_named(made) -> None:
+    dialog = made({"source": "files"})
+    first, second = (path.name for path in dialog.sound.paths().values())
+    assert first != second
+    assert dialog.sound.names.text() == f"{first}\n{second}"
+    dialog.sound.source.setCurrentIndex(0)
+    assert dialog.sound.names.isHidden()
 
 
 def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_path: Path) -> None:

@@ -45,6 +45,16 @@ def test_information_is_not_shown_as_a_fault(bar: NoticeBar) -> None:
     assert [notice.error for notice in bar.notices] == [True, False]
 
 
+def test_details_are_offered_where_they_add_something(bar: NoticeBar) -> None:
+    for message, details, offered in (
+        ("No sound.", "code -9996", True),
+        ("Broken.", "", False),
+        ("x: y", "y", False),
+    ):
+        bar.tell(message, details)
+        assert bar._details.isHidden() is not offered
+
+
 def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) -> None:
     bar.tell("No sound.", "what the driver said")
     bar.inform("Saved.")

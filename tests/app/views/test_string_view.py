@@ -153,6 +153,14 @@ def test_the_pointer_tells_what_can_be_grabbed(qtbot: QtBot, view: StringView) -
     assert len(shapes) == len(tips) == 3
 
 
+def test_the_pointer_on_a_warning_tells_all_of_it(qtbot: QtBot, view: StringView) -> None:
+    view.set_warning("amplitude 15.39 mm is outside the trained 0.5 … 10 mm")
+    qtbot.mouseMove(view, QPoint(200, 12))
+    assert view.toolTip() == "amplitude 15.39 mm is outside the trained 0.5 … 10 mm"
+    qtbot.mouseMove(view, QPoint(200, 200))
+    assert "Drag to pluck" in view.toolTip()
+
+
 def test_two_markers_are_told_apart_and_reset(qtbot: QtBot, view: StringView) -> None:
     view.set_listening_points(0.2, 0.6)
     moved, resets = recorded(view.listening_point_moved), recorded(view.listening_point_reset)

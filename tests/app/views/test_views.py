@@ -115,6 +115,15 @@ def test_the_string_view_zooms_with_the_decay(qtbot: QtBot) -> None:
     assert spans[-1] < spans[0]
 
 
+def test_the_axis_of_the_string_follows_the_pluck_at_rest(qtbot: QtBot) -> None:
+    view = StringView()
+    qtbot.addWidget(view)
+    for amplitude_mm, span_mm in ((4.0, 5), (20.0, 20), (4.0, 5), (1.0, 2)):
+        view.set_pluck(ShownPluck(0.3, amplitude_mm, np.zeros(101)))
+        view.grab()
+        assert view._span_mm == span_mm
+
+
 def test_animated_plots_survive(qtbot: QtBot) -> None:
     """Some pairs of PySide6 and pyqtgraph abort within seconds of this ("deallocating None")."""
     spectrum, waveform, string = SpectrumView(), WaveformView(), StringView()
