@@ -243,10 +243,10 @@ class MainWindow(QMainWindow):
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if any(url.isLocalFile() for url in event.mimeData().urls()):
-            event.acceptProposedAction()
+            _copy(event)
 
     def dropEvent(self, event: QDropEvent) -> None:
-        event.acceptProposedAction()
+        _copy(event)
         for url in event.mimeData().urls():
             if url.isLocalFile():
                 self.file_dropped.emit(url.toLocalFile())
@@ -254,3 +254,9 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()
         super().closeEvent(event)
+
+
+def _copy(event: QDropEvent) -> None:
+    """Never a move, after which a file manager would delete the user's file."""
+    event.setDropAction(Qt.DropAction.CopyAction)
+    event.accept()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeWidget
 from pytestqt.qtbot import QtBot
 
@@ -171,12 +171,17 @@ def test_presets_put_into_the_folder_appear_when_it_is_opened(
 
 
 def drop(controller: Controller, *files: Path) -> None:
+    """As from a file manager that proposes to move them."""
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
-    copy, button = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton
-    event = QDropEvent(QPointF(50, 50), copy, data, button, Qt.KeyboardModifier.NoModifier)
-    controller.window.dropEvent(event)
-    assert event.isAccepted()
+    actions, button = Qt.DropAction.CopyAction | Qt.DropAction.MoveAction, Qt.MouseButton.LeftButton
+    over = QDragEnterEvent(QPoint(50, 50), actions, data, button, Qt.KeyboardModifier.NoModifier)
+    dropped = QDropEvent(QPointF(50, 50), actions, data, button, Qt.KeyboardModifier.NoModifier)
+    for event, take in ((over, controller.window.dragEnterEvent), (dropped, controller.window.dropEvent)):
+        event.setDropAction(Qt.DropAction.MoveAction)
+        take(event)
+        assert event.isAccepted()
+        assert event.dropAction() == Qt.DropAction.CopyAction
 
 
 def test_a_file_over_any_view_reaches_the_window(controller: Controller) -> None:
