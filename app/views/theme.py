@@ -274,7 +274,8 @@ def _palette() -> QPalette:
 
 def apply_theme(app: QApplication, choice: FaceChoice = "dark") -> None:
     """Fusion with our palette, for the whole application; "system" follows the desktop."""
-    if app.style().name() != "fusion":
+    app.setStyleSheet("")  # a sheet that follows another is put on a part again for every part around it
+    if app.style().name() != "fusion":  # under a sheet it has no name
         app.setStyle("Fusion")
     hints = app.styleHints()
     hints.setColorScheme(_SCHEMES[choice])  # the window's frame and the file dialogs follow
