@@ -59,6 +59,27 @@ def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
 
 
+def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    asked: list[None] = []
+    browser.pluck_asked.connect(lambda: asked.append(None))
+    for key in "small sec":
+        qtbot.keyClick(browser.search, key)
+    assert (browser.search.text(), listed(browser), asked) == ("small sec", ["second"], [])
+    qtbot.keyClick(browser.search, KEY.Key_Down)
+    assert browser.list.hasFocus()
+    qtbot.keyClick(browser.list, KEY.Key_Space)
+    assert (browser.search.text(), len(asked)) == ("small sec", 1)
+    qtbot.keyClick(browser.list, KEY.Key_Backspace)
+    assert browser.search.hasFocus()
+    assert browser.search.text() == "small se"
+    browser.dismiss()
+    controller.presets.toggle()  # with the words of last time, to be typed over
+    qtbot.keyClick(browser.search, KEY.Key_Space)
+    assert (browser.search.text(), len(asked)) == ("small se", 2)
+
+
 def test_typing_filters_and_what_was_chosen_stays(
     qtbot: QtBot, controller: Controller, browser: PresetBrowser
 ) -> None:
