@@ -203,6 +203,8 @@ class PresetBrowser(QFrame):
         self.hide()
         if self._before is not None and self._before.isVisible():
             self._before.setFocus()
+        if not self._entries:  # next and previous would lead nowhere
+            self.clear_filter()
 
     def clear_filter(self) -> None:
         """All presets are listed again; told once."""

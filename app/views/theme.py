@@ -159,7 +159,6 @@ QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius:
 QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
 QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
 QTreeWidget::item {{ padding: 6px 5px; }}
-QTreeWidget::item:hover {{ background: {RAISED}; }}
 QTreeWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
 QTreeWidget:focus {{ border: 1px solid {FAINT}; }}
 QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; padding: 5px; }}

@@ -140,6 +140,32 @@ def test_a_filter_is_told_beside_the_preset_and_cleared_there(
     assert session.choices.preset == "first"
 
 
+def test_a_search_without_a_find_ends_with_the_browser(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    qtbot.keyClicks(browser.search, "zzz")
+    assert controller.window.presets.filtered.isVisible()
+    qtbot.keyClick(browser.search, KEY.Key_Escape)
+    assert not controller.window.presets.filtered.isVisible()
+    qtbot.keyClick(controller.window, KEY.Key_PageDown)
+    assert controller.session.choices.preset == "second"
+
+
+def test_the_marked_row_is_the_chosen_preset(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+    controller.session.update(preset="second")
+    for words, marked in (("first", []), ("", ["second"]), ("zzz", []), ("", ["second"])):
+        browser.search.setText(words)
+        rows = browser.list.selectionModel().selectedRows()
+        assert [listed(browser)[row.row()] for row in rows] == marked
+
+
+def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -> None:
+    browser.favourite_asked.emit("second")
+    assert listed(browser) == ["second", "first"]
+    browser.favourite_asked.emit("second")
+    assert listed(browser) == ["first", "second"]
+
+
 def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
     qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
     assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}
