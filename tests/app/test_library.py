@@ -94,7 +94,19 @@ def test_a_dropped_preset_is_chosen_at_once(library: Library, small_preset: Path
     dropped = receive(other_preset(small_preset, tmp_path / "New.safetensors"), library)
     assert (dropped.choices, dropped.notice) == ({"preset": "New"}, "")
     assert library.names == ["New", "first", "second"]
-    assert receive(small_preset, library).choices == {"preset": "first"}  # those bytes are there
+    assert files(own) == ["New.safetensors"]
+
+
+def test_a_dropped_preset_that_is_there_is_chosen_and_told(
+    library: Library, small_preset: Path, own: Path, tmp_path: Path
+) -> None:
+    dropped = receive(small_preset, library)
+    assert dropped.choices == {"preset": "first"}
+    assert "is the shipped preset “A small string" in dropped.notice
+    assert not own.exists()
+    new = other_preset(small_preset, tmp_path / "New.safetensors")
+    for notice in ("", "New.safetensors is your own preset “Another string"):
+        assert receive(new, library).notice.startswith(notice)
     assert files(own) == ["New.safetensors"]
 
 
