@@ -389,7 +389,7 @@ class StringView(QWidget):
         pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
         key = (axes, self.devicePixelRatioF(), self._trained, pluck, self._sources, self._warning, theme.face)
         if self._ground_pixmap is None or self._ground_key != key:
-            pixmap = QPixmap(self.size() * self.devicePixelRatioF())
+            pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
             pixmap.fill(QColor(theme.BACKGROUND))
             painter = QPainter(pixmap)
