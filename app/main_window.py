@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QMargins, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -59,6 +59,7 @@ KEYS = (  # (key, name of the signal, what it does)
 WIDE, HIGH = 960, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
 FACTS_HEIGHT = 20
+TITLE_BAR = 40  # at most; how high it is, is known too late
 
 PLAYED_KEYS = (  # see `app/keyboard.py`
     ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
@@ -216,8 +217,12 @@ class MainWindow(QMainWindow):
         return bytes(self.saveGeometry().toBase64().data()).decode("ascii")
 
     def restore_geometry(self, text: str) -> None:
+        """Opens where it was closed; in any case no larger than the screen is now."""
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
+        if not self.isMaximized() and not self.isFullScreen():
+            room = self.screen().availableSize()
+            self.resize(self.size().boundedTo(room.shrunkBy(QMargins(0, TITLE_BAR, 0, 0))))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """A small window spends its room on what is to be seen and turned."""

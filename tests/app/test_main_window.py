@@ -135,6 +135,18 @@ def test_in_a_narrow_window_the_controls_stand_closer_and_all_are_seen(qtbot: Qt
         assert right < width
 
 
+def test_it_opens_no_larger_than_the_screen(qtbot: QtBot) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    room = window.screen().availableSize()
+    window.resize(room + QSize(200, 100))
+    for saved in ("", window.geometry_text()):
+        window.resize(room + QSize(200, 100))
+        window.restore_geometry(saved)
+        assert window.width() <= room.width()
+        assert window.height() < room.height()
+
+
 def test_every_key_has_its_signal_and_words() -> None:
     assert len({key for key, _, _ in KEYS}) == len(KEYS)
     for _, signal, what in KEYS:
