@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 from app.views import theme
 
 SWEEP_DEGREES = 270
-WIDTH, NARROW_WIDTH = 62, 54
+WIDTH, NARROW_WIDTH = 62, 52
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down

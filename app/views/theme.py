@@ -186,8 +186,8 @@ QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; p
 QToolButton#solo {{ padding: 1px 9px; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
-*[compact="true"] {{ padding: 6px 8px; }}
-QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 8px; }}
+*[compact="true"] {{ padding: 6px 4px; }}
+QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 4px; }}
 QToolButton#narrow {{ padding: 6px 5px; }}
 QToolButton::menu-indicator {{ image: none; }}
 QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}
