@@ -56,7 +56,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
-WIDE, HIGH = 960, 560  # below, the window is sparing
+WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
 FACTS_HEIGHT = 20
 TITLE_BAR = 40  # at most; how high it is, is known too late
@@ -133,8 +133,7 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self._brand = QLabel("LEARNED STRINGS")
         self._brand.setObjectName("brand")
-        head = QHBoxLayout()
-        head.setSpacing(10)
+        self._head = head = QHBoxLayout()
         head.addWidget(self._brand)
         head.addWidget(self.presets, 1)
         tip = "Can you tell model and truth apart, blind? (Ctrl+T)"
@@ -230,6 +229,7 @@ class MainWindow(QMainWindow):
         self._brand.setVisible(self.width() >= WIDE)
         narrow, low = self.width() < ROOMY, self.height() < HIGH
         self.transport.set_compact(narrow)
+        self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)
         self._column.setSpacing(6 if low else 10)
