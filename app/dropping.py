@@ -36,9 +36,12 @@ def receive(file: Path, library: Library) -> Dropped:
 def _preset(file: Path, library: Library) -> Dropped:
     installed = install_preset(file, user_folder(), [entry.path for entry in library.entries])
     library.refresh()
-    if library.find(installed.name) is None:
+    entry = library.find(installed.name)
+    if entry is None:
         return Dropped(notice=f"{installed.path}: cannot be used; see whether the file is still there")
-    return Dropped({"preset": installed.name})
+    whose = "your own" if installed.path.parent == user_folder() else "the shipped"
+    notice = f"{file.name} is {whose} preset “{entry.info.title}” already; nothing was copied."
+    return Dropped({"preset": entry.name}, notice if installed.was_there else "")
 
 
 def _recipe(file: Path, library: Library) -> Dropped:

@@ -21,6 +21,7 @@ ANY_AMPLITUDE_MM = (0.5, 10.0)
 SOFTEST_MM = 0.05
 LARGEST_VELOCITY = 127
 VELOCITY_STEP = 16
+DIGITS = 4  # after the point: what is played stands in file names and recipes
 
 # Native codes of the ten keys from A on, and the letters where a platform tells no code.
 _ROW_CODES = {
@@ -52,13 +53,13 @@ class Reach:
     def place(self, share: float) -> float:
         """The position at 0 … 1 of the keys."""
         low, high = self.position
-        return min(low + min(max(share, 0.0), 1.0) * (high - low), high)
+        return _rounded(low + min(max(share, 0.0), 1.0) * (high - low), low, high)
 
     def amplitude_of(self, velocity: int) -> float:
         """Velocity 1 … 127 to an amplitude in mm: equal steps in dB."""
         low, high = self.amplitude_mm
         share = (min(max(velocity, 1), LARGEST_VELOCITY) - 1) / (LARGEST_VELOCITY - 1)
-        return min(low * (high / low) ** share, high)
+        return _rounded(low * (high / low) ** share, low, high)
 
     def velocity_of(self, amplitude_mm: float) -> int:
         """The nearest velocity of an amplitude."""
@@ -107,6 +108,10 @@ def play(press: KeyPress, reach: Reach, amplitude_mm: float, platform: str = sys
     if step is None:
         return None
     return Played({"amplitude_mm": reach.amplitude_of(reach.velocity_of(amplitude_mm) + step)}, plucks=False)
+
+
+def _rounded(value: float, low: float, high: float) -> float:
+    return min(max(round(value, DIGITS), low), high)
 
 
 def _ninth(digit: int) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from PySide6.QtCore import QByteArray, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QMargins, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -56,9 +56,10 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
-WIDE, HIGH = 960, 560  # below, the window is sparing
+WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
 FACTS_HEIGHT = 20
+TITLE_BAR = 40  # at most; how high it is, is known too late
 
 PLAYED_KEYS = (  # see `app/keyboard.py`
     ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
@@ -132,8 +133,7 @@ class MainWindow(QMainWindow):
     def _lay_out(self) -> None:
         self._brand = QLabel("LEARNED STRINGS")
         self._brand.setObjectName("brand")
-        head = QHBoxLayout()
-        head.setSpacing(10)
+        self._head = head = QHBoxLayout()
         head.addWidget(self._brand)
         head.addWidget(self.presets, 1)
         tip = "Can you tell model and truth apart, blind? (Ctrl+T)"
@@ -216,8 +216,12 @@ class MainWindow(QMainWindow):
         return bytes(self.saveGeometry().toBase64().data()).decode("ascii")
 
     def restore_geometry(self, text: str) -> None:
+        """Opens where it was closed; in any case no larger than the screen is now."""
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
+        if not self.isMaximized() and not self.isFullScreen():
+            room = self.screen().availableSize()
+            self.resize(self.size().boundedTo(room.shrunkBy(QMargins(0, TITLE_BAR, 0, 0))))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """A small window spends its room on what is to be seen and turned."""
@@ -225,6 +229,7 @@ class MainWindow(QMainWindow):
         self._brand.setVisible(self.width() >= WIDE)
         narrow, low = self.width() < ROOMY, self.height() < HIGH
         self.transport.set_compact(narrow)
+        self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)
         self._column.setSpacing(6 if low else 10)
@@ -243,10 +248,10 @@ class MainWindow(QMainWindow):
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if any(url.isLocalFile() for url in event.mimeData().urls()):
-            event.acceptProposedAction()
+            _copy(event)
 
     def dropEvent(self, event: QDropEvent) -> None:
-        event.acceptProposedAction()
+        _copy(event)
         for url in event.mimeData().urls():
             if url.isLocalFile():
                 self.file_dropped.emit(url.toLocalFile())
@@ -254,3 +259,9 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         self.closing.emit()
         super().closeEvent(event)
+
+
+def _copy(event: QDropEvent) -> None:
+    """Never a move, after which a file manager would delete the user's file."""
+    event.setDropAction(Qt.DropAction.CopyAction)
+    event.accept()

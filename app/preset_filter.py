@@ -26,7 +26,9 @@ class PresetFilter:
     favourites_only: bool = False
 
     def applied(self, entries: Iterable[PresetEntry], favourites: Collection[str]) -> list[PresetEntry]:
-        return [entry for entry in entries if self.matches(entry, favourites)]
+        """Favourites first, else in their order."""
+        found = [entry for entry in entries if self.matches(entry, favourites)]
+        return sorted(found, key=lambda entry: entry.name not in favourites)
 
     def matches(self, entry: PresetEntry, favourites: Collection[str]) -> bool:
         info = entry.info

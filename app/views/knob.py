@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 from app.views import theme
 
 SWEEP_DEGREES = 270
-WIDTH, NARROW_WIDTH = 62, 54
+WIDTH, NARROW_WIDTH = 62, 52
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
@@ -127,7 +127,7 @@ class Knob(QWidget):
         self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
         self._dragged_at = event.position()
         self.value_asked.emit(self.limits.value(self._dragged_share))
-        QToolTip.showText(self.mapToGlobal(QPoint(0, -TIP_ABOVE)), self.text, self)
+        QToolTip.showText(self._tip_place(), self.text, self)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self._dragged_at is not None and event.button() == Qt.MouseButton.LeftButton:
@@ -195,7 +195,14 @@ class Knob(QWidget):
         except ValueError:
             return
         if math.isfinite(value):
-            self.value_asked.emit(min(max(value, self.limits.low), self.limits.high))
+            taken = min(max(value, self.limits.low), self.limits.high)
+            self.value_asked.emit(taken)
+            if taken != value:
+                end = "At most" if value > taken else "At least"
+                QToolTip.showText(self._tip_place(), f"{end} {self.limits.text.format(taken)}", self)
+
+    def _tip_place(self) -> QPoint:
+        return self.mapToGlobal(QPoint(0, -TIP_ABOVE))
 
     def _close_editor(self) -> None:
         if self._editor is not None:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from app.views.elided_label import ElidedLabel
@@ -15,6 +16,30 @@ from app.views.parts import tool_button
 
 if TYPE_CHECKING:
     from app.library import PresetEntry
+
+PADDING = 26  # of the style sheet, with the borders
+
+
+class _Name(QPushButton):
+    """Cut in the middle where there is little room: presets of one string differ at their ends."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.setObjectName("preset")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setText(text)
+
+    def setText(self, text: str) -> None:
+        self._whole = text
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        cut, room = Qt.TextElideMode.ElideMiddle, self.width() - PADDING
+        super().setText(self.fontMetrics().elidedText(self._whole, cut, room, Qt.TextFlag.TextShowMnemonic))
 
 
 class PresetBar(QWidget):
@@ -28,13 +53,13 @@ class PresetBar(QWidget):
         super().__init__(parent)
         previous = tool_button("◀", "Previous preset", "Previous preset in the browser's list (Page up)")
         following = tool_button("▶", "Next preset", "Next preset in the browser's list (Page down)")
+        for button in (previous, following):
+            button.setObjectName("narrow")
         previous.clicked.connect(lambda: self.step_asked.emit(-1))
         following.clicked.connect(lambda: self.step_asked.emit(1))
-        self.name = QPushButton("Reading presets …")
-        self.name.setObjectName("preset")
-        self.name.setMinimumWidth(180)
+        self.name = _Name("Reading presets …")
+        self.name.setMinimumWidth(100)
         self.name.setMaximumWidth(420)
-        self.name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name.clicked.connect(self.browse_asked)
         self.filtered = tool_button("", "Clear the filter")
         self.filtered.setObjectName("filter")

@@ -2,7 +2,7 @@
 
 type              filters the list (words in any order; a comma between two)
 arrows            move in the list and load
-Space             plucks
+Space             plucks; in a search that has begun it is a blank
 Ctrl+D            makes a favourite, or no longer
 Enter, Escape     close
 """
@@ -202,6 +202,8 @@ class PresetBrowser(QFrame):
         self.hide()
         if self._before is not None and self._before.isVisible():
             self._before.setFocus()
+        if not self._entries:  # next and previous would lead nowhere
+            self.clear_filter()
 
     def clear_filter(self) -> None:
         """All presets are listed again; told once."""
@@ -249,26 +251,31 @@ class PresetBrowser(QFrame):
         if not isinstance(event, QKeyEvent):
             return False
         if event.type() == QEvent.Type.ShortcutOverride:
-            if self._is_ours(event) or (event.text() and event.text().isprintable()):
+            if self._is_ours(watched, event) or (event.text() and event.text().isprintable()):
                 event.accept()  # the window's own keys rest meanwhile
                 return True
         elif event.type() == QEvent.Type.KeyPress:
-            if self._is_ours(event):
+            if self._is_ours(watched, event):
                 self._press(event)
                 return True
-            if watched is self.list and event.text().strip() and event.text().isprintable():
+            typed = event.key() == _KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
+            if watched is self.list and typed:
                 self.search.setFocus()
-                self.search.insert(event.text())
-                return True
+                return QApplication.sendEvent(self.search, event)
         return False
 
-    @staticmethod
-    def _is_ours(event: QKeyEvent) -> bool:
+    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
         control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if event.key() == _KEYS.Key_D:
             return control
+        if event.key() == _KEYS.Key_Space and watched is self.search and self._search_begun():
+            return False
         keys = (_KEYS.Key_Return, _KEYS.Key_Enter, _KEYS.Key_Escape, _KEYS.Key_Space, *_MOVES)
         return event.key() in keys and not control
+
+    def _search_begun(self) -> bool:
+        """Something is in it that the next letter will not replace."""
+        return self.search.selectedText() != self.search.text()
 
     def _press(self, event: QKeyEvent) -> None:
         key = _KEYS(event.key())
@@ -288,6 +295,7 @@ class PresetBrowser(QFrame):
         rows = self.list.topLevelItemCount()
         if rows == 0:
             return
+        self.list.setFocus()  # where Space plucks
         page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
         step = {_KEYS.Key_Up: -1, _KEYS.Key_Down: 1, _KEYS.Key_PageUp: -page, _KEYS.Key_PageDown: page}[key]
         here = self.list.currentIndex().row()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
 
 from app.views.parts import tool_button
@@ -15,7 +15,7 @@ SMALL = "padding: 2px 8px; border-radius: 4px;"
 class Segments(QWidget):
     """Choices are known by their keys; the first is down at the start."""
 
-    chosen = Signal(str)  # a key, by the user
+    chosen = Signal(str)  # another key, by the user
 
     def __init__(self, name: str, choices: Iterable[tuple[str, str, str]], parent: QWidget | None = None) -> None:
         """`choices`: (key, text, tip) each."""
@@ -35,7 +35,7 @@ class Segments(QWidget):
             self._group.addButton(button, len(self._keys))
             self._keys.append(key)
             row.addWidget(button)
-        self._group.idClicked.connect(lambda row: self.chosen.emit(self._keys[row]))
+        self._group.idToggled.connect(self._toggled)
 
     @property
     def key(self) -> str:
@@ -43,4 +43,9 @@ class Segments(QWidget):
         return self._keys[self._group.checkedId()]
 
     def show_key(self, key: str) -> None:
-        self._group.button(self._keys.index(key)).setChecked(True)
+        with QSignalBlocker(self._group):
+            self._group.button(self._keys.index(key)).setChecked(True)
+
+    def _toggled(self, row: int, down: bool) -> None:
+        if down:
+            self.chosen.emit(self._keys[row])

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)
-WIDTH, NARROW_WIDTH = 138, 112  # fixed, so that a longer title moves nothing
+WIDTH, NARROW_WIDTH = 148, 108  # fixed, so that a longer title moves nothing
 PADDING = 18  # of the style sheet, with the borders
 
 _SOURCES = (

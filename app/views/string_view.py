@@ -385,7 +385,7 @@ class StringView(QWidget):
         chosen = (self._trained, pluck, self._sources, self._warning)
         key = (axes, self.devicePixelRatioF(), *chosen, theme.face, self.hasFocus())
         if self._ground_pixmap is None or self._ground_key != key:
-            pixmap = QPixmap(self.size() * self.devicePixelRatioF())
+            pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())
             pixmap.fill(QColor(theme.BACKGROUND))
             painter = QPainter(pixmap)

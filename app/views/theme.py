@@ -159,7 +159,6 @@ QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius:
 QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
 QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
 QTreeWidget::item {{ padding: 6px 5px; }}
-QTreeWidget::item:hover {{ background: {RAISED}; }}
 QTreeWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
 QTreeWidget:focus {{ border: 1px solid {FAINT}; }}
 QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; padding: 5px; }}
@@ -189,8 +188,8 @@ QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; p
 QToolButton#solo {{ padding: 1px 9px; }}
 QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
-*[compact="true"] {{ padding: 6px 8px; }}
-QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 8px; }}
+*[compact="true"] {{ padding: 6px 4px; }}
+QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 4px; }}
 QToolButton#narrow {{ padding: 6px 5px; }}
 QToolButton::menu-indicator {{ image: none; }}
 QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}
@@ -277,7 +276,8 @@ def _palette() -> QPalette:
 
 def apply_theme(app: QApplication, choice: FaceChoice = "dark") -> None:
     """Fusion with our palette, for the whole application; "system" follows the desktop."""
-    if app.style().name() != "fusion":
+    app.setStyleSheet("")  # a sheet that follows another is put on a part again for every part around it
+    if app.style().name() != "fusion":  # under a sheet it has no name
         app.setStyle("Fusion")
     hints = app.styleHints()
     hints.setColorScheme(_SCHEMES[choice])  # the window's frame and the file dialogs follow

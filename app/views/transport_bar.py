@@ -105,7 +105,7 @@ class TransportBar(QFrame):
         if compact == self._compact:
             return
         self._compact = compact
-        self._row.setContentsMargins(*((8, 8, 8, 8) if compact else (12, 8, 12, 8)))
+        self._row.setContentsMargins(*((4, 8, 4, 8) if compact else (12, 8, 12, 8)))
         self._row.setSpacing(2 if compact else 5)
         for knob in self.knobs.values():
             knob.set_narrow(compact)

@@ -145,7 +145,7 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     controller.instruments.plucked.connect(lambda: plucks.append(session.choices.position))
     for key in (Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L):
         qtbot.keyClick(window, key)
-    assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.3 + 0.4 * 8 / 9])
+    assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.6556])
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
     qtbot.keyClick(window, Qt.Key.Key_9)
     assert session.choices.amplitude_mm == pytest.approx(10)

@@ -98,7 +98,19 @@ def test_a_dropped_preset_is_chosen_at_once(library: Library, small_preset: Path
     dropped = receive(other_preset(small_preset, tmp_path / "New.safetensors"), library)
     assert (dropped.choices, dropped.notice) == ({"preset": "New"}, "")
     assert library.names == ["New", "first", "second"]
-    assert receive(small_preset, library).choices == {"preset": "first"}  # those bytes are there
+    assert files(own) == ["New.safetensors"]
+
+
+def test_a_dropped_preset_that_is_there_is_chosen_and_told(
+    library: Library, small_preset: Path, own: Path, tmp_path: Path
+) -> None:
+    dropped = receive(small_preset, library)
+    assert dropped.choices == {"preset": "first"}
+    assert "is the shipped preset “A small string" in dropped.notice
+    assert not own.exists()
+    new = other_preset(small_preset, tmp_path / "New.safetensors")
+    for notice in ("", "New.safetensors is your own preset “Another string"):
+        assert receive(new, library).notice.startswith(notice)
     assert files(own) == ["New.safetensors"]
 
 
@@ -159,7 +171,7 @@ def test_the_filter_finds_words_in_any_order_and_every_field(preset_folder: Path
     high = entry(name="high", title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman")
     both = [low, high]
     for search, found in (
-        (PresetFilter(), both),
+        (PresetFilter(), [high, low]),  # a favourite is on top
         (PresetFilter("b3, nyl"), [low]),
         (PresetFilter("STEEL 16"), [high]),
         (PresetFilter("steel nylon"), []),

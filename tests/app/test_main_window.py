@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
@@ -127,12 +128,38 @@ def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controll
 def test_in_a_narrow_window_the_controls_stand_closer_and_all_are_seen(qtbot: QtBot, controller: Controller) -> None:
     window = controller.window
     transport = window.transport
-    for width, words in ((1000, "Export …"), (1280, "Export WAV …"), (1000, "Export …")):
+    for width, words in ((1000, "Export …"), (1280, "Export WAV …"), (958, "Export …")):
         window.resize(width, 600)
         qtbot.waitUntil(lambda words=words: transport._export.text() == words)
         qtbot.waitUntil(lambda: transport.minimumSizeHint().width() <= transport.parentWidget().width())
         right = transport._export.mapTo(window, transport._export.rect().topRight()).x()
         assert right < width
+
+
+def test_in_a_small_window_with_a_filter_the_header_does_not_overlap(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    bar = window.presets
+    bar.set_listed(1, 21)
+    bar.name.setText("★  Nylon B3, noise, 16 kHz (integrated phase, blind recipe)   ▾")
+    for width in (760, 1000, 1280):
+        window.resize(width, 600)
+        qtbot.waitUntil(lambda width=width: bar.geometry().right() < width == window.width())
+        parts = [bar.layout().itemAt(at).geometry() for at in range(4)]
+        assert all(left.right() < right.left() for left, right in pairwise(parts))
+        assert bar.minimumSizeHint().width() <= bar.width()
+        assert bar.name.text().endswith("▾")
+
+
+def test_it_opens_no_larger_than_the_screen(qtbot: QtBot) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    room = window.screen().availableSize()
+    window.resize(room + QSize(200, 100))
+    for saved in ("", window.geometry_text()):
+        window.resize(room + QSize(200, 100))
+        window.restore_geometry(saved)
+        assert window.width() <= room.width()
+        assert window.height() < room.height()
 
 
 def test_every_key_has_its_signal_and_words() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeWidget
 from pytestqt.qtbot import QtBot
 
@@ -57,6 +57,27 @@ def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller
     assert browser.isVisible()
     assert browser.search.text() == ""
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+
+
+def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    asked: list[None] = []
+    browser.pluck_asked.connect(lambda: asked.append(None))
+    for key in "small sec":
+        qtbot.keyClick(browser.search, key)
+    assert (browser.search.text(), listed(browser), asked) == ("small sec", ["second"], [])
+    qtbot.keyClick(browser.search, KEY.Key_Down)
+    assert browser.list.hasFocus()
+    qtbot.keyClick(browser.list, KEY.Key_Space)
+    assert (browser.search.text(), len(asked)) == ("small sec", 1)
+    qtbot.keyClick(browser.list, KEY.Key_Backspace)
+    assert browser.search.hasFocus()
+    assert browser.search.text() == "small se"
+    browser.dismiss()
+    controller.presets.toggle()  # with the words of last time, to be typed over
+    qtbot.keyClick(browser.search, KEY.Key_Space)
+    assert (browser.search.text(), len(asked)) == ("small se", 2)
 
 
 def test_typing_filters_and_what_was_chosen_stays(
@@ -119,6 +140,32 @@ def test_a_filter_is_told_beside_the_preset_and_cleared_there(
     assert session.choices.preset == "first"
 
 
+def test_a_search_without_a_find_ends_with_the_browser(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    qtbot.keyClicks(browser.search, "zzz")
+    assert controller.window.presets.filtered.isVisible()
+    qtbot.keyClick(browser.search, KEY.Key_Escape)
+    assert not controller.window.presets.filtered.isVisible()
+    qtbot.keyClick(controller.window, KEY.Key_PageDown)
+    assert controller.session.choices.preset == "second"
+
+
+def test_the_marked_row_is_the_chosen_preset(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+    controller.session.update(preset="second")
+    for words, marked in (("first", []), ("", ["second"]), ("zzz", []), ("", ["second"])):
+        browser.search.setText(words)
+        rows = browser.list.selectionModel().selectedRows()
+        assert [listed(browser)[row.row()] for row in rows] == marked
+
+
+def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -> None:
+    browser.favourite_asked.emit("second")
+    assert listed(browser) == ["second", "first"]
+    browser.favourite_asked.emit("second")
+    assert listed(browser) == ["first", "second"]
+
+
 def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
     qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
     assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}
@@ -179,12 +226,17 @@ def test_presets_put_into_the_folder_appear_when_it_is_opened(
 
 
 def drop(controller: Controller, *files: Path) -> None:
+    """As from a file manager that proposes to move them."""
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
-    copy, button = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton
-    event = QDropEvent(QPointF(50, 50), copy, data, button, Qt.KeyboardModifier.NoModifier)
-    controller.window.dropEvent(event)
-    assert event.isAccepted()
+    actions, button = Qt.DropAction.CopyAction | Qt.DropAction.MoveAction, Qt.MouseButton.LeftButton
+    over = QDragEnterEvent(QPoint(50, 50), actions, data, button, Qt.KeyboardModifier.NoModifier)
+    dropped = QDropEvent(QPointF(50, 50), actions, data, button, Qt.KeyboardModifier.NoModifier)
+    for event, take in ((over, controller.window.dragEnterEvent), (dropped, controller.window.dropEvent)):
+        event.setDropAction(Qt.DropAction.MoveAction)
+        take(event)
+        assert event.isAccepted()
+        assert event.dropAction() == Qt.DropAction.CopyAction
 
 
 def test_a_file_over_any_view_reaches_the_window(controller: Controller) -> None:

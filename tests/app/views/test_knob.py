@@ -101,14 +101,22 @@ def test_page_keys_are_the_knobs_and_not_the_windows(knob: Knob) -> None:
         assert event.isAccepted() == accepted
 
 
-@pytest.mark.parametrize(("typed", "value"), [("7,5", 7.5), ("99", 20), ("3-", 4.0)])
-def test_a_typed_number_is_taken_within_the_range(qtbot: QtBot, knob: Knob, typed: str, value: float) -> None:
+@pytest.mark.parametrize(
+    ("typed", "value", "told"),
+    [("7,5", 7.5, ""), ("99", 20, "At most 20.00 mm"), ("-1", 0, "At least 0.00 mm"), ("3-", 4.0, "")],
+)
+def test_a_typed_number_is_taken_within_the_range(
+    qtbot: QtBot, knob: Knob, typed: str, value: float, told: str
+) -> None:
+    QToolTip.hideText()
+    qtbot.waitUntil(lambda: not QToolTip.isVisible())
     qtbot.keyClicks(knob, typed[0])
     assert knob._editor is not None
     qtbot.keyClicks(knob._editor, typed[1:])
     qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
     assert knob.value == value
     assert knob._editor is None
+    assert (QToolTip.text() if QToolTip.isVisible() else "") == told
 
 
 def test_escape_gives_typing_up(qtbot: QtBot, knob: Knob) -> None:
