@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,14 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from app.cli import main
+
+
+@pytest.fixture(autouse=True)
+def undressed(qapp: QApplication) -> Iterator[None]:
+    """The application as it was: a benchmark's window wears the theme."""
+    sheet = qapp.styleSheet()
+    yield
+    qapp.setStyleSheet(sheet)
 
 
 @pytest.fixture
