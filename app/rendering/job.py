@@ -1,7 +1,12 @@
-"""One pluck in the worker's hands: its motion and its sound, made block by block."""
+"""One pluck in the worker's hands: its motion and its sound, made block by block.
+
+The sound is read off the motion. Where that is too slow for a pluck that is heard, what is heard is rendered ahead of
+it, alone: only the listening points, which cost a fraction. Off stage nothing else is rendered.
+"""
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -30,6 +35,7 @@ FIRST_STEPS = 256  # small, so that a pluck sounds at once; more where that is n
 # Each block is twice as long as the last, up to this. Another pluck waits for no more; but each block is some hundred
 # calls, and each of them waits for the interpreter, which the window has most of the time.
 BLOCK_FRAMES = 2048
+LEAD_S = 0.3  # the motion waits until what is heard is so far ahead
 
 
 class Job:
@@ -52,7 +58,8 @@ class Job:
         self._load = load
         self._listener = listener
         self._helper = helper
-        self._lines: dict[str, Line] = {}
+        self._lines: dict[str, Line] = {}  # of the motion
+        self._ahead: dict[str, Line] = {}  # of what is heard, where it is further
         self._take: Take | None = None  # while it is on stage
         self._errors = ErrorSums(0)
         self._sound: Sound | None = None
@@ -94,8 +101,15 @@ class Job:
 
     @property
     def _rendered_s(self) -> float:
+        """Of the sound, or of the motion before there is one."""
         truth = self._lines["truth"]
-        return truth.done / truth.rate_hz
+        return (truth.done if self._sound is None else self._sound.frames_read["truth"]) / truth.rate_hz
+
+    @property
+    def _hurried(self) -> bool:
+        """Whether it is heard, and hardly further rendered than that."""
+        unfinished = self._sound is not None and self._sound.unfinished
+        return self.struck and unfinished and self.ahead_s(time.monotonic()) < LEAD_S
 
     def advance(self) -> None:
         """Does a block.
@@ -103,7 +117,7 @@ class Job:
         Raises:
             PresetError: the preset cannot be used.
         """
-        if not self._on_stage:
+        if self._hurried or not self._on_stage:
             self._advance_sound()
             return
         take = self._take = self._take or self._begin()
@@ -147,7 +161,7 @@ class Job:
         end_s = (first + frames) / truth.rate_hz if first + frames < take.frames else take.seconds + 1.0
         others = {name: self._lines[name] for name in self._wanted()[len(SOURCES) :]}
         behind = {name: min(BLOCK_FRAMES, line.until(end_s)) for name, line in others.items()}
-        blocks = self._advance_lines({**dict.fromkeys(SOURCES, frames), **behind})
+        blocks = self._advance_lines(self._lines, {**dict.fromkeys(SOURCES, frames), **behind})
         for name in others:
             take.others[name].append(blocks[name])
         if frames:
@@ -159,11 +173,13 @@ class Job:
     def _wanted(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
-    def _advance_lines(self, frames: Mapping[str, int], listening: Listening | None = None) -> dict[str, Block]:
+    def _advance_lines(
+        self, lines: Mapping[str, Line], frames: Mapping[str, int], listening: Listening | None = None
+    ) -> dict[str, Block]:
         """The next frames of each source, or what is heard of them; the first here, the helper does the others."""
 
         def advance(name: str) -> Block:
-            line = self._lines[name]
+            line = lines[name]
             return line.advance(frames[name], None if listening is None else listening.weights(line.grid_points))
 
         own, *others = frames
@@ -193,6 +209,7 @@ class Job:
             self._listener.track_replaced(take, track)
 
     def _feed_motion(self, take: Take, sound: Sound) -> None:
+        """What was not heard of the motion yet, if there is any."""
         reads = {}
         for name, done in sound.frames_read.items():
             motion = take.motion(name)
@@ -202,16 +219,20 @@ class Job:
         sound.feed(reads)
 
     def _advance_sound(self) -> None:
-        """Off stage: read off at the listening points at once, which costs a fraction of the motion."""
+        """A block of what is heard, ahead of the motion or, off stage, without it."""
         sound = self._sound
         assert sound is not None
-        if self._take is not None:  # what was rendered but not yet heard, then the motion is forgotten
-            take, self._take = self._take, None
-            self._feed_motion(take, sound)
+        if self._take is not None:
+            self._feed_motion(self._take, sound)
+        if not self._on_stage:
+            self._take = None
+        for name, done in sound.frames_read.items():
+            if name not in self._ahead or self._ahead[name].done != done:
+                self._ahead[name] = copy.copy(self._lines[name])
         end_s = self._rendered_s + BLOCK_FRAMES / self._lines["truth"].rate_hz
-        behind = {name: self._lines[name].until(end_s) for name in sound.frames_read}
-        heard = self._advance_lines(behind, sound.listening)
-        sound.feed({name: Read(heard[name], self._lines[name].complete) for name in heard})
+        behind = {name: self._ahead[name].until(end_s) for name in sound.frames_read}
+        heard = self._advance_lines(self._ahead, behind, sound.listening)
+        sound.feed({name: Read(heard[name], self._ahead[name].complete) for name in heard})
 
 
 def _first_frames(rate_hz: int) -> int:

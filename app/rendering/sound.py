@@ -112,7 +112,7 @@ class _Line:
         self.finished = False
 
     def feed(self, read: Read) -> None:
-        if self.finished:
+        if self.finished or not (len(read.signal_m) or read.last):
             return
         signal: NDArray[np.floating] = read.signal_m
         if self._differentiator is not None:
