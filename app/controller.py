@@ -43,7 +43,8 @@ from app.views.string_view import StringView
 from engine.preset import SHIPPED
 
 FRAME_MS = 16
-GIVE_WAY_TICKS = 3  # at most so many pictures are left out at a time for a pluck whose rendering is not ahead
+STARTING_TICKS = 9  # at most so many pictures are left out at a time for a pluck that begins,
+GIVE_WAY_TICKS = 3  # and for one whose rendering is hardly ahead
 COMFORTABLE_S = 0.3  # ahead of what is heard
 ProblemListener = Callable[[AudioProblem], None]
 
@@ -291,7 +292,8 @@ class Controller(QObject):
 
     def _tick(self) -> None:
         status = self.player.status()
-        if self._ticks_given < GIVE_WAY_TICKS and self.performance.hurried(status, COMFORTABLE_S):
+        starting, hurried = self.performance.starting, self.performance.hurried(status, COMFORTABLE_S)
+        if self._ticks_given < (STARTING_TICKS if starting else GIVE_WAY_TICKS if hurried else 0):
             self._ticks_given += 1
             return  # whoever renders it needs the interpreter more
         self._ticks_given = 0

@@ -64,11 +64,14 @@ class Performance(QObject):
         """Whether what is on stage is what was chosen."""
         return self.take is not None and motion_key(self.take) == self._wanted_key()
 
+    @property
+    def starting(self) -> bool:
+        """Whether a pluck waits for its first sound, or has begun and is not on stage yet."""
+        return self._play_when_ready or bool(self.strikes.awaited)
+
     def hurried(self, status: PlayerStatus, comfortable_s: float) -> bool:
-        """Whether a pluck waits for its first sound, or is heard while little more of it is rendered."""
+        """Whether what is on stage is heard while little more of it is rendered."""
         track = self.track
-        if self.strikes.awaited:
-            return True
         if track is None or track.complete or not status.playing:
             return False
         return track.ready_frames / track.rate_hz < status.position_s + comfortable_s
@@ -189,6 +192,7 @@ class Performance(QObject):
         self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
 
     def _render_failed(self, message: str, detail: str) -> None:
+        self._play_when_ready = False
         self.strikes.forget()
         self._window.error_label.setText("")
         self._window.notices.tell(message, detail)

@@ -23,8 +23,11 @@ class RenderMail(QObject):
         super().__init__()
         self._strikes = strikes
 
-    def take_started(self, take: Take, track: Track) -> None:
-        self.started.emit(take, track, self._strikes.begin(take, track))
+    def sound_started(self, take: Take, track: Track) -> bool:
+        return self._strikes.begin(take, track)
+
+    def take_started(self, take: Take, track: Track, sounds: bool) -> None:
+        self.started.emit(take, track, sounds)
 
     def track_replaced(self, take: Take, track: Track) -> None:
         self.replaced.emit(take, track)

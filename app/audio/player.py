@@ -254,18 +254,18 @@ class Player:
         """Mixes anew what was mixed before rendering had come so far."""
         output = self._output
         self._ahead.forget_played(output.queued_blocks)
-        if late := self._ahead.settled(output.changeable_blocks, output.block_frames):
+        if late := self._ahead.settled(output.mendable_blocks, output.block_frames):
             self._remix([], late)
 
-    def _remix(self, commands: Sequence[_Command], last: int | None = None) -> None:
-        """Obeys in the earliest block that can still be another, or the earliest of the last so many.
+    def _remix(self, commands: Sequence[_Command], mended: int = 0) -> None:
+        """Obeys in the earliest block that can still be another, or mends the last so many.
 
         What was mixed stays in the queue until its place is taken, so that no gap depends on how long that takes. If
         the device comes so far meanwhile, all is done again from a later block.
         """
         output, latest = self._output, Moment(self._mixer, self._tone)
         while True:
-            count = output.changeable_blocks if last is None else min(last, output.changeable_blocks)
+            count = min(mended, output.mendable_blocks) if mended else output.changeable_blocks
             self._ahead.forget_played(output.queued_blocks)
             moment = self._ahead.moment_before(count)
             self._mixer, self._tone = (moment or latest).again()
@@ -274,7 +274,7 @@ class Player:
             if moment is None:  # nothing of ours lies there: the next block obeys
                 return
             mixed = [self._mixed_block()]
-            while len(mixed) < output.replaced_blocks and self._mixer.steady(output.block_frames):
+            while len(mixed) < count if mended else self._goes_on(len(mixed)):
                 mixed.append(self._mixed_block())
             if output.replace(count, [each.block for each in mixed]):
                 break
@@ -283,6 +283,10 @@ class Player:
         self._timeline.take_back(first_end - output.block_frames)
         for number, each in enumerate(mixed):
             self._note(each, first_end + number * output.block_frames)
+
+    def _goes_on(self, blocks: int) -> bool:
+        """Whether more than so many replace what a command has changed."""
+        return blocks < self._output.replaced_blocks and self._mixer.steady(self._output.block_frames)
 
     def _load(self, track: Track, keep_position: bool = False, ring: bool = False) -> None:
         # If the device has changed meanwhile, the caller will see the new rate in status() and load again.

@@ -22,7 +22,8 @@ class SilentOutput:
         self.rate_hz = rate_hz
         self.block_frames = block_frames
         self.latency_s = 0.0
-        self.prompt_blocks = self.queued_blocks = self.changeable_blocks = self.replaced_blocks = 0  # nothing waits
+        self.prompt_blocks = self.queued_blocks = self.replaced_blocks = 0  # nothing waits
+        self.changeable_blocks = self.mendable_blocks = 0
         self.underruns = 0
         self.frames_queued = 0
         self._next_block_s = time.monotonic()

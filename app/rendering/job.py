@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from app.audio import Track
 from app.audio.strand import START_RESERVE_S
 from app.rendering.converter import GUARD_FRAMES
 from app.rendering.line import Line
@@ -36,6 +37,8 @@ FIRST_STEPS = 256  # small, so that a pluck sounds at once; more where that is n
 # calls, and each of them waits for the interpreter, which the window has most of the time.
 BLOCK_FRAMES = 2048
 LEAD_S = 0.3  # the motion waits until what is heard is so far ahead
+TELL_S = 0.1  # and the window, which then draws all of its views, until it is so far,
+TELL_AFTER_S = 0.15  # or so late
 
 
 class Job:
@@ -63,6 +66,7 @@ class Job:
         self._take: Take | None = None  # while it is on stage
         self._errors = ErrorSums(0)
         self._sound: Sound | None = None
+        self._untold: tuple[Track, bool] | None = None  # started, and whether it sounds
         self._on_stage = True
         self._finished = False  # and told
 
@@ -74,6 +78,7 @@ class Job:
     def leave_stage(self) -> None:
         """Another pluck takes over: only what sounds is rendered on, read off at the listening points."""
         self._on_stage = False
+        self._untold = None
         if self._sound is not None:
             self._sound.let_go()
 
@@ -119,13 +124,18 @@ class Job:
         """
         if self._hurried or not self._on_stage:
             self._advance_sound()
-            return
+        else:
+            self._advance_take()
+        self._tell_in_time()
+
+    def _advance_take(self) -> None:
         take = self._take = self._take or self._begin()
         self._find_others(take)
         if self._advance_motions(take):
             self._make_sound(take)
             if take.complete and not self._finished:
                 self._finished = True
+                self._tell()
                 self._listener.take_finished(take, self._errors)
 
     def _begin(self) -> Take:
@@ -204,9 +214,22 @@ class Job:
         assert track is not None
         if not self.started:
             self._started_s = time.monotonic()
-            self._listener.take_started(take, track)
+            self._untold = track, self._listener.sound_started(take, track)
         elif anew:
+            self._tell()
             self._listener.track_replaced(take, track)
+
+    def _tell_in_time(self) -> None:
+        if self._untold is not None and self._started_s is not None:
+            now_s, (_, sounds) = time.monotonic(), self._untold
+            if not sounds or self.ahead_s(now_s) > TELL_S or now_s - self._started_s > TELL_AFTER_S:
+                self._tell()
+
+    def _tell(self) -> None:
+        """Once, that it has started."""
+        untold, self._untold = self._untold, None
+        if untold is not None and self._take is not None:
+            self._listener.take_started(self._take, *untold)
 
     def _feed_motion(self, take: Take, sound: Sound) -> None:
         """What was not heard of the motion yet, if there is any."""
@@ -229,7 +252,8 @@ class Job:
         for name, done in sound.frames_read.items():
             if name not in self._ahead or self._ahead[name].done != done:
                 self._ahead[name] = copy.copy(self._lines[name])
-        end_s = self._rendered_s + BLOCK_FRAMES / self._lines["truth"].rate_hz
+        truth = self._ahead["truth"]
+        end_s = (truth.done + min(2 * truth.done, BLOCK_FRAMES)) / truth.rate_hz
         behind = {name: self._ahead[name].until(end_s) for name in sound.frames_read}
         heard = self._advance_lines(self._ahead, behind, sound.listening)
         sound.feed({name: Read(heard[name], self._ahead[name].complete) for name in heard})

@@ -57,8 +57,11 @@ class RenderRequest:
 class RenderListener(Protocol):
     """Hears of the worker's results, in the worker's thread."""
 
-    def take_started(self, take: Take, track: Track) -> None:
-        """A new pluck has its first block."""
+    def sound_started(self, take: Take, track: Track) -> bool:
+        """A new pluck has its first block; whether it sounds from now on."""
+
+    def take_started(self, take: Take, track: Track, sounds: bool) -> None:
+        """The same, told to whoever draws it: at once, or, where it sounds, when there is time for that."""
 
     def track_replaced(self, take: Take, track: Track) -> None:
         """The same pluck is heard from another point, at another rate, or beside another preset."""

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from app.audio import PlayerStatus, Track
-from app.controller import GIVE_WAY_TICKS, Controller
+from app.controller import STARTING_TICKS, Controller
 from app.main_window import MainWindow
 from app.session import Choices
 from app.settings import Settings, load_settings
@@ -358,7 +358,7 @@ def test_the_picture_gives_way_to_a_struck_pluck_but_not_for_long(
     shown: list[object] = []
     monkeypatch.setattr(controller.panels[0], "show_moment", shown.append)
     controller.performance.strikes.expect(("never", controller.session.choices.pluck, 1))
-    for _ in range(GIVE_WAY_TICKS):
+    for _ in range(STARTING_TICKS):
         controller._tick()
     assert shown == []
     controller._tick()

@@ -35,13 +35,20 @@ class Heard:
     """Collects what the worker says."""
 
     def __init__(self) -> None:
+        self.sounds = False  # what a started sound is told to do
+        self.begun: list[Track] = []
         self.started: list[tuple[Take, Track]] = []
         self.replaced: list[tuple[Take, Track]] = []
         self.finished: list[tuple[Take, ErrorSums]] = []
         self.failed: list[str] = []
         self.others_failed: list[str] = []
 
-    def take_started(self, take: Take, track: Track) -> None:
+    def sound_started(self, take: Take, track: Track) -> bool:
+        self.begun.append(track)
+        return self.sounds
+
+    def take_started(self, take: Take, track: Track, sounds: bool) -> None:
+        assert sounds == self.sounds
         self.started.append((take, track))
 
     def track_replaced(self, take: Take, track: Track) -> None:
@@ -224,6 +231,20 @@ def test_a_new_pluck_does_not_wait_for_a_late_one(
     monkeypatch.undo()
     wait_until(lambda: all(track.complete for _, track in heard.started))
     assert heard.started[0][1].ready_frames == pytest.approx(8_000, abs=8), "it goes on once there is time"
+
+
+def test_a_pluck_that_sounds_is_told_when_there_is_time_to_draw_it(
+    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_module, "TELL_S", 0.5)
+    heard.sounds = True
+    ready: list[int] = []
+    monkeypatch.setattr(heard, "take_started", lambda take, track, sounds: ready.append(track.ready_frames))
+    for number, patience_s in enumerate((60.0, 0.0), 1):
+        monkeypatch.setattr(job_module, "TELL_AFTER_S", patience_s)
+        worker.submit(request_of(small_preset, pluck=Pluck(0.1 * number, 3.0), seconds=3.0, struck=True))
+        wait_until(lambda number=number: len(ready) == number and heard.begun[-1].complete)
+    assert ready[0] >= 0.5 * 8_000 > 1_000 > ready[1]
 
 
 def test_an_earlier_pluck_that_comes_too_late_ends(
