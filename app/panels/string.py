@@ -87,8 +87,10 @@ class StringPanel(Panel):
             self._shown = ()
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
-        ready = [min(motion.ready, position_s * motion.rate_hz) for motion in motions if motion.there]
-        shown = (take, ready, choices.speed, choices.envelope, choices.solo)
+        there = [motion for motion in motions if motion.there]
+        # the sound may be ahead of the motion, and one motion ahead of another: all are of one moment
+        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
+        shown = (take, position_s, len(there), choices.speed, choices.envelope, choices.solo)
         if not moment.playing and shown == self._shown:
             return
         self._shown = shown

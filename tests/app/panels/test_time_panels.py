@@ -441,3 +441,17 @@ def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None
     choose(panel, solo=2)
     panel.show_moment(Moment(take, 0.5, False, 0.016))
     assert panel.view._frame.caption.startswith("all modes, though mode 2 is heard alone")
+
+
+def test_the_string_shows_both_motions_at_one_moment_however_late_they_are(make: Make, take: Take) -> None:
+    late = Take(take.preset_name, take.info, take.pluck, take.seconds)
+    model, truth = take.motion_m("model"), take.motion_m("truth")
+    late.append(model[:400], truth[:400])
+    late.motion("model").append(model[400:900])  # the truth's half of a block is on its way
+    panel = make(StringPanel)
+    panel.take_started(late)
+    panel.show_moment(Moment(late, take.seconds, True, 0.016))
+    assert panel.view._frame.caption.startswith(f"{399 / take.info.rate_hz:.3f} s")
+    shapes = panel.view._frame.shapes
+    assert np.abs(shapes["truth"]).max() > 0.1
+    assert shapes["model"] == pytest.approx(1.01 * shapes["truth"], rel=1e-4, abs=1e-6)
