@@ -23,6 +23,8 @@ from app.slots import render_request
 from app.strikes import MotionKey, Strikes, motion_key
 from engine.metrics import ErrorSums
 
+AT_FIRST_S = 0.3  # of a pluck, in which the window draws all of its views anew
+
 HearTrack = Callable[[Track], None]
 
 
@@ -78,7 +80,7 @@ class Performance(QObject):
 
     def watch(self, status: PlayerStatus) -> None:
         """Says so where the playhead waits for rendering: the sound has a gap then."""
-        if status.waiting and status.position_s > 0 and self.track is not None and not self.track.complete:
+        if status.waiting and status.position_s > AT_FIRST_S and self.track is not None and not self.track.complete:
             self._window.error_label.setText("rendering, slower than it sounds: gaps …")
 
     # Intents

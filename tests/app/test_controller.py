@@ -372,7 +372,7 @@ def test_the_picture_gives_way_while_rendering_is_hardly_ahead_of_what_is_heard(
     stage, half = controller.performance, Track(8_000, 8_000, ("model", "truth"))
     half.append({source: np.zeros(4_000) for source in half.sources})
     stage.track = half
-    heard = [PlayerStatus(position_s=position_s, playing=True) for position_s in (0.1, 0.3)]
+    heard = [PlayerStatus(position_s=position_s, playing=True) for position_s in (0.1, 0.4)]
     assert [stage.hurried(status, 0.3) for status in heard] == [False, True]
     assert not stage.hurried(replace(heard[1], playing=False), 0.3)
     stage.watch(heard[1])
