@@ -17,7 +17,7 @@ from app.views.string_ink import Band, StringFrame
 
 BLUR_S = 1 / 60  # an eye's or a picture's exposure
 ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
-ENVELOPE_BLOCK_S = 0.05
+ENVELOPE_BLOCK_S = 0.1
 MM = np.float32(1000)
 
 

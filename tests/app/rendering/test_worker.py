@@ -247,6 +247,27 @@ def test_a_pluck_that_sounds_is_told_when_there_is_time_to_draw_it(
     assert ready[0] >= 0.5 * 8_000 > 1_000 > ready[1]
 
 
+@pytest.mark.parametrize("lead_s", [0.4, 1e9])
+def test_what_is_heard_goes_ahead_of_the_motion(
+    small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch, lead_s: float
+) -> None:
+    """For a while, so that the motion overtakes it, or to the end: it is the same sound."""
+    monkeypatch.setattr(job_module, "LEAD_S", lead_s)
+    monkeypatch.setattr(job_module, "BLOCK_FRAMES", 300)
+    worker.submit(request_of(small_preset, seconds=3.0, struck=True, sound_rate_hz=4_000))
+    wait_until(lambda: bool(heard.started))
+    (take, track), *_ = heard.started
+    wait_until(lambda: track.complete)
+    if lead_s > 3:
+        assert not take.complete
+    monkeypatch.setattr(job_module, "LEAD_S", 0.0)
+    wait_until(lambda: bool(heard.finished))
+    assert take.complete
+    for source in ("model", "truth"):
+        expected = render_sound(SoundRequest(load_preset(small_preset), take.pluck, 0.37, 3.0, source))
+        assert track.read(source, 0, len(expected)) == pytest.approx(expected, abs=2e-5)
+
+
 def test_an_earlier_pluck_that_comes_too_late_ends(
     small_preset: Path, worker: RenderWorker, heard: Heard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
