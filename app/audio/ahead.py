@@ -8,7 +8,6 @@ from __future__ import annotations
 import copy
 from collections import deque
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,21 +46,15 @@ class Mixed:
     after: MixerStatus
 
 
-class _Noted(NamedTuple):
-    before: Moment
-    steady: bool
-    after: MixerStatus
-
-
 class Ahead:
-    """Moments and the status after them, one of each for a block in the queue."""
+    """The blocks in the queue, with what was known before each."""
 
     def __init__(self) -> None:
-        self._blocks: deque[_Noted] = deque()
+        self._blocks: deque[Mixed] = deque()
 
     def note(self, mixed: Mixed) -> None:
         """The latest block in the queue."""
-        self._blocks.append(_Noted(mixed.before, mixed.steady, mixed.after))
+        self._blocks.append(mixed)
 
     def forget_played(self, queued_blocks: int) -> None:
         while len(self._blocks) > queued_blocks:
@@ -77,8 +70,8 @@ class Ahead:
         They were mixed before rendering had come so far, and can be mixed better.
         """
         for number in range(min(blocks, len(self._blocks)), 0, -1):
-            noted = self._blocks[-number]
-            if not noted.steady and noted.before.mixer.steady(frames):
+            mixed = self._blocks[-number]
+            if not mixed.steady and mixed.before.mixer.steady(frames):
                 return number
         return 0
 

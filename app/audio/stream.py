@@ -32,7 +32,7 @@ BUFFER_S = 0.025  # of ready sound that a command waits for
 AHEAD_S = 0.25  # and of more, which it replaces: outlasts a busy moment of Python
 SOON_S = 0.05  # of that in any case: right after a command, and where rendering may still change it
 REPLACED_S = 0.02  # of new sound that takes the old one's place in one go, where it is rendered
-LEFT_S = 0.01  # to the device while it is mended what lies behind
+LEFT_S = 0.01  # to the device, while what lies behind is mended
 STALLED_AFTER_S = 1.5  # without a callback
 LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
 SETTLING_S = 0.1
@@ -134,8 +134,12 @@ class OutputStream:
 
     @property
     def mendable_blocks(self) -> int:
-        """The last so many may be mixed anew as a whole: the queue is as long as before, whenever that is ready."""
-        return max(0, len(self._ready) - max(2, math.ceil(LEFT_S * self.rate_hz / self.block_frames)))
+        """The last so many may be mixed anew as a whole: the queue is as long as before, whenever that is ready.
+
+        No more than there are buffers for beside those in the queue.
+        """
+        left = max(2, math.ceil(LEFT_S * self.rate_hz / self.block_frames))
+        return max(0, min(len(self._ready) - left, len(self._free)))
 
     def replace(self, count: int, blocks: Sequence[NDArray[np.float32]] = ()) -> bool:
         """Puts `blocks`, at most `replaced_blocks` or `count`, in the place of the last `count` of the queue.

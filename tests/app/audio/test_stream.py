@@ -112,6 +112,18 @@ def test_what_was_mixed_ahead_stays_until_it_is_replaced(stream: OutputStream, r
     assert stream.underruns == 0
 
 
+def test_what_may_be_mended_can_be_replaced_in_the_longest_queue(stream: OutputStream, raw_streams: list) -> None:
+    (raw,) = raw_streams
+    for _ in range(80):
+        go_ahead(stream, 1)
+        queued, count = stream.queued_blocks, stream.mendable_blocks
+        assert stream.replace(count, [block(2)] * count)
+        assert stream.queued_blocks == queued
+        stream._replaced_at = 0  # as far ahead as it ever goes
+        raw.tick()
+    assert 0 < count < queued - 2
+
+
 def test_nothing_is_replaced_that_the_device_has_come_to(stream: OutputStream, raw_streams: list) -> None:
     (raw,) = raw_streams
     for _ in range(10):
