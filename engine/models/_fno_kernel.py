@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from engine.models._compiled import COMPILED, HALF, ZERO, tanh
+from engine.kernels.compiled import COMPILED, HALF, ZERO, tanh
 
 Array = NDArray[np.float32]
 Pair = tuple[Array, Array]

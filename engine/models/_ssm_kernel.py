@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from engine.models._compiled import COMPILED, HALF, ONE, tanh
+from engine.kernels.compiled import COMPILED, HALF, ONE, tanh
 
 _CUBIC, _ROOT = np.float32(0.044715), np.float32(np.sqrt(2 / np.pi))
 

@@ -90,6 +90,12 @@ class SplittingSolver:
         self._coupling = string.tension_coupling(modes).to(self.device)
         self._eta_squared = string.wavenumbers(modes).square().to(self.device)
 
+    @property
+    def constants(self) -> tuple[Tensor, ...]:
+        """What the compiled kernels take: flows, kicks, coupling, η², sub-steps, levels, ω⁻²; see `_splitting_kernel`."""
+        of_flow = (self._flows, self._kicks, self._coupling, self._eta_squared)
+        return (*of_flow, self._substeps, self._levels, self._inverse_omega_squared)
+
     def advance(self, state: ModalState, steps: int) -> tuple[Tensor, ModalState]:
         """Modal amplitudes after 1 … steps samples, float64 (batch, steps, modes), and the last state."""
         if state.modes != self.modes:
@@ -112,9 +118,7 @@ class SplittingSolver:
         # compiles, or loads what it compiled earlier: only when it is needed
         from engine.reference._splitting_kernel import advance
 
-        of_flow = (self._flows, self._kicks, self._coupling, self._eta_squared)
-        of_level = (self._substeps, self._levels, self._inverse_omega_squared)
-        constants = [t.numpy() for t in (*of_flow, *of_level)]
+        constants = [t.numpy() for t in self.constants]
 
         def run(rows: slice) -> None:
             advance(q[rows].numpy(), v[rows].numpy(), out[rows].numpy(), *constants, self._silence)

@@ -1,0 +1,13 @@
+"""Everything compiled that makes sound: voices, and the mixer that a sound device calls without the interpreter.
+
+    memory     pointers and fences
+    layout     what lies where in a voice, a program and a mixer
+    bank       a voice of complex exponentials whose phases follow their energies: models with a linear decoder
+    truth      a voice of the solved string
+    rendered   a voice that reads samples which somebody else renders
+    voice      what all voices share: listening points, pick-up, gain, silence
+    mixer      the sum of all voices, volume, limiter, meters; the device's callback
+
+A voice and a mixer are flat arrays of eight-byte numbers; `engine.voices` makes them. The interpreter may be
+busy with anything: nothing here waits for it.
+"""

@@ -1,0 +1,507 @@
+"""A voice of latents z_n(t) whose frequencies follow their energies: `engine.models.integrated_phase`, compiled.
+
+It is what that module says, with time in samples of the trained rate and any number of frames a sample. Level and
+phase are computed at the ends of short segments and are cubics in between; within a segment z is advanced by products.
+Where the modulation M z² can be heard it is computed at every frame, for the latents that matter alone. Energies only
+decay, so that what has become too quiet to matter is left out for good. Any block is the same as if it were rendered
+in one piece: everything hangs on the frame alone.
+
+A linear model (DMD) is a bank without coupling.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import layout as at
+from engine.kernels.compiled import COMPILED
+
+SHORT, LONG = 16, 64  # frames of a segment, at first and later
+INAUDIBLE = 1e-6  # of full scale: what changes less than that is left out
+LOOK_EVERY = 8  # quanta
+_PI, _TWO_PI, _QUARTER = math.pi, 2 * math.pi, math.pi / 4
+
+
+@njit(inline="always", **COMPILED)
+def _turn(angle: float) -> tuple[float, float]:
+    """Cosine and sine of any angle to 1e-10, as arithmetic that becomes vector instructions."""
+    x = (angle - _TWO_PI * np.floor(angle / _TWO_PI + 0.5)) * 0.25
+    y = x * x
+    s = x * (1 - y * (1 / 6 - y * (1 / 120 - y * (1 / 5040 - y / 362880))))
+    c = 1 - y * (0.5 - y * (1 / 24 - y * (1 / 720 - y * (1 / 40320 - y / 3628800))))
+    s, c = 2 * s * c, 1 - 2 * s * s
+    return 1 - 2 * s * s, 2 * s * c
+
+
+@njit(inline="always", **COMPILED)
+def _exp(x: float) -> float:
+    """e^x to 1e-9 for -64 … 64, the same way; below it is as good as nothing."""
+    y = max(x, -64.0) / 64
+    e = 1 + y * (1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320)))))))
+    e *= e
+    e *= e
+    e *= e
+    e *= e
+    e *= e
+    return e * e
+
+
+@njit(inline="always", **COMPILED)
+def _tanh(x: float) -> float:
+    y = 0.5 * (-18.0 if x < -18 else 18.0 if x > 18 else x)
+    s = y * y
+    t = y * (135135 + s * (17325 + s * (378 + s))) / (135135 + s * (62370 + s * (3150 + 28 * s)))
+    return 2 * t / (1 + t * t)
+
+
+@njit(**COMPILED)
+def energies(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray) -> None:
+    """E_m (modes,) at a time in trained samples."""
+    whole = program.view(np.int64)
+    n = whole[at.P_MODES]
+    rows = at.state(n)
+    sigma = program[whole[at.O_SIGMA] :]
+    start = voice[rows + at.ENERGY_0 * n :]
+    for m in range(n):
+        out[m] = start[m] * _exp(-2 * sigma[m] * time)
+
+
+@njit(**COMPILED)
+def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
+    """f(E) - K E, (2 modes,)."""
+    whole = program.view(np.int64)
+    n = whole[at.P_MODES]
+    omega, coupling = program[whole[at.O_OMEGA] :], program[whole[at.O_COUPLING] :]
+    out[: 2 * n] = 0.0
+    units = program[whole[at.O_ENERGY_UNITS] :]
+    told = 0.0
+    for m in range(n):
+        told += units[m] * energy[m]
+    if told < 1e-12:
+        return
+    layers = whole[at.P_LAYERS]
+    if layers > 0:
+        single = program.view(np.float32)
+        values, results = scratch[: at.MOST_MODES].view(np.float32), scratch[at.MOST_MODES : 2 * at.MOST_MODES].view(np.float32)
+        for m in range(n):
+            values[m] = units[m] * energy[m]
+        slot = 2 * whole[at.O_NETWORK]
+        for layer in range(layers):
+            wide_in, wide_out = whole[at.P_WIDTHS + layer], whole[at.P_WIDTHS + layer + 1]
+            bias = single[slot : slot + wide_out]
+            weight = single[slot + wide_out :]
+            for o in range(wide_out):
+                results[o] = bias[o]
+            for i in range(wide_in):
+                value = values[i]
+                if value != np.float32(0):
+                    column = weight[i * wide_out : (i + 1) * wide_out]
+                    for o in range(wide_out):
+                        results[o] += value * column[o]
+            slot += wide_out * (1 + wide_in)
+            if layer + 1 < layers:
+                for o in range(wide_out):
+                    x = results[o]
+                    values[o] = x / (np.float32(1) + np.float32(_exp(-float(x))))
+            else:
+                at_zero, rate_units = program[whole[at.O_AT_ZERO] :], program[whole[at.O_RATE_UNITS] :]
+                factor = told if whole[at.P_SECOND_ORDER] else 1.0
+                for o in range(2 * n):
+                    out[o] = (results[o] - at_zero[o]) * rate_units[o] * factor
+    if whole[at.P_ADIABATIC]:
+        shares = program[whole[at.O_SHARES] :]
+        largest = program[whole[at.O_LARGEST] :]
+        linear, share, found = scratch[: n], scratch[at.MOST_MODES : at.MOST_MODES + n], scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + n]
+        for step in range(3):
+            found[:] = 0.0
+            for m in range(n):
+                if energy[m] * largest[m] < 1e-15:
+                    continue
+                e = energy[m] if step == 0 else energy[m] / math.sqrt(1 + 2 * max(share[m], -0.4))
+                row = shares[m * n : (m + 1) * n]
+                for j in range(n):
+                    found[j] += e * row[j]
+            if step == 0:
+                linear[:] = found
+            share[:] = found
+        for j in range(n):
+            out[n + j] += omega[j] * (math.sqrt(1 + 2 * max(share[j], -0.4)) - 1 - linear[j])
+
+
+@njit(**COMPILED)
+def strike(voice: np.ndarray, program: np.ndarray, scratch: np.ndarray) -> None:
+    """Fills in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
+    whole = program.view(np.int64)
+    counts = voice.view(np.int64)
+    n = whole[at.P_MODES]
+    rows = at.state(n)
+    sigma, coupling = program[whole[at.O_SIGMA] :], program[whole[at.O_COUPLING] :]
+    energy = voice[rows + at.ENERGY_0 * n : rows + (at.ENERGY_0 + 1) * n]
+    constant = voice[rows + at.CONSTANT * n : rows + (at.CONSTANT + 2) * n]
+    constant[:] = 0.0
+    for m in range(n):
+        level = voice[rows + at.LEVEL_0 * n + m]
+        energy[m] = math.exp(2 * level) if level > -300 else 0.0
+        if sigma[m] > 0 and energy[m] > 0:
+            share = energy[m] / (2 * sigma[m])
+            for j in range(2 * n):
+                constant[j] += share * coupling[m * 2 * n + j]
+    voice[rows + at.INTEGRAL * n : rows + (at.INTEGRAL + 2) * n] = 0.0
+    counts[at.NODE] = 0
+    counts[at.SEGMENT_VALID] = 0
+    counts[at.MODULATED] = whole[at.P_MODULATION]
+    counts[at.REFRESH] = 0
+    if whole[at.P_HIGHER]:
+        _integrate_from(voice, program, 0, scratch)
+
+
+@njit(**COMPILED)
+def _integrate_from(voice: np.ndarray, program: np.ndarray, node: int, scratch: np.ndarray) -> None:
+    """The higher orders at a node, half-way and at the next."""
+    n = program.view(np.int64)[at.P_MODES]
+    rows, spacing = at.state(n), program[at.P_SPACING]
+    energy, more = scratch[4 * at.MOST_MODES : 4 * at.MOST_MODES + n], scratch[5 * at.MOST_MODES :]
+    for half in range(3):
+        energies(voice, program, (node + 0.5 * half) * spacing, energy)
+        higher_orders(program, energy, voice[rows + (at.AT_LEFT + 2 * half) * n :], more)
+
+
+@njit(**COMPILED)
+def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.ndarray) -> None:
+    """Moves on to the node before a time."""
+    counts = voice.view(np.int64)
+    n = program.view(np.int64)[at.P_MODES]
+    rows, spacing = at.state(n), program[at.P_SPACING]
+    energy, more = scratch[4 * at.MOST_MODES : 4 * at.MOST_MODES + n], scratch[5 * at.MOST_MODES :]
+    wanted = int(time / spacing)
+    while counts[at.NODE] < wanted:
+        total = voice[rows + at.INTEGRAL * n : rows + (at.INTEGRAL + 2) * n]
+        left, middle, right = (
+            voice[rows + at.AT_LEFT * n : rows + (at.AT_LEFT + 2) * n],
+            voice[rows + at.AT_MIDDLE * n : rows + (at.AT_MIDDLE + 2) * n],
+            voice[rows + at.AT_RIGHT * n : rows + (at.AT_RIGHT + 2) * n],
+        )
+        for j in range(2 * n):
+            total[j] += spacing * (left[j] + 4 * middle[j] + right[j]) / 6
+            left[j] = right[j]
+        counts[at.NODE] += 1
+        node = counts[at.NODE]
+        energies(voice, program, (node + 0.5) * spacing, energy)
+        higher_orders(program, energy, middle, more)
+        energies(voice, program, (node + 1.0) * spacing, energy)
+        higher_orders(program, energy, right, more)
+
+
+@njit(**COMPILED)
+def _change(program: np.ndarray, level: np.ndarray, n: int, out: np.ndarray, scratch: np.ndarray) -> None:
+    """What A adds to the log gain of each latent, of levels log |z| (modes,)."""
+    whole = program.view(np.int64)
+    weight = program[whole[at.O_A] :]
+    squares, found = scratch[:n], scratch[at.MOST_MODES : at.MOST_MODES + n]
+    for m in range(n):
+        squares[m] = _exp(2 * level[m])
+    for step in range(3):
+        found[:] = 0.0
+        for m in range(n):
+            if squares[m] > 1e-14:
+                row = weight[m * n : (m + 1) * n]  # transposed
+                # where the change falls, the square that counts depends on the latent that is changed: see below
+                for j in range(n):
+                    found[j] += squares[m] * row[j]
+        if step == 0:
+            out[:n] = found
+            falls = False
+            for j in range(n):
+                falls = falls or found[j] < 0
+            if not falls:
+                break
+        else:
+            out[:n] = found
+        for m in range(n):
+            e = _exp(2 * level[m])
+            squares[m] = e / math.sqrt(1 + 4 * abs(out[m])) if out[m] < 0 else e
+    for j in range(n):
+        sign = -1.0 if out[j] < 0 else 1.0
+        out[j] = sign * math.log1p(4 * abs(out[j])) / 4
+
+
+@njit(**COMPILED)
+def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
+    """Level, phase and their slopes at a time, (4, modes) from `out` on, and what A adds, behind them."""
+    whole = program.view(np.int64)
+    counts = voice.view(np.int64)
+    n = whole[at.P_MODES]
+    rows = at.state(n)
+    sigma, omega = program[whole[at.O_SIGMA] :], program[whole[at.O_OMEGA] :]
+    coupling, largest = program[whole[at.O_COUPLING] :], program[whole[at.O_LARGEST] :]
+    start = voice[rows + at.ENERGY_0 * n :]
+    constant = voice[rows + at.CONSTANT * n :]
+    f, integral = scratch[: 2 * n], scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + 2 * n]
+    if whole[at.P_HIGHER]:
+        spacing = program[at.P_SPACING]
+        u = time / spacing - counts[at.NODE]
+        total, left = voice[rows + at.INTEGRAL * n :], voice[rows + at.AT_LEFT * n :]
+        middle, right = voice[rows + at.AT_MIDDLE * n :], voice[rows + at.AT_RIGHT * n :]
+        for j in range(2 * n):
+            slope = 4 * middle[j] - 3 * left[j] - right[j]
+            bend = 2 * (left[j] + right[j]) - 4 * middle[j]
+            f[j] = left[j] + u * (slope + u * bend)
+            integral[j] = constant[j] + total[j] + spacing * u * (left[j] + u * (0.5 * slope + u * bend / 3))
+    else:
+        f[:] = 0.0
+        for j in range(2 * n):
+            integral[j] = constant[j]
+    for m in range(n):
+        energy = start[m] * _exp(-2 * sigma[m] * time)
+        if energy * largest[m] < 1e-14:
+            continue
+        share = energy / (2 * sigma[m])
+        row = coupling[m * 2 * n : (m + 1) * 2 * n]
+        for j in range(2 * n):
+            f[j] += energy * row[j]
+            integral[j] -= share * row[j]
+    limit = program[at.P_LIMIT]
+    level_0, angle_0 = voice[rows + at.LEVEL_0 * n :], voice[rows + at.ANGLE_0 * n :]
+    level, phase, level_rate, phase_rate = out[:n], out[n : 2 * n], out[2 * n : 3 * n], out[3 * n : 4 * n]
+    for j in range(n):
+        saturated = _tanh(integral[j] / limit)
+        level[j] = level_0[j] - sigma[j] * time + limit * saturated
+        level_rate[j] = f[j] * (1 - saturated * saturated)  # the decay comes later: this part alone is held
+        phase[j] = angle_0[j] + omega[j] * time + integral[n + j]
+        phase_rate[j] = omega[j] + f[n + j]
+    if whole[at.P_ADIABATIC]:
+        _change(program, level, n, out[4 * n :], scratch)
+
+
+@njit(**COMPILED)
+def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+    """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
+
+    Args:
+        heard: otherwise only time goes on.
+    """
+    whole = program.view(np.int64)
+    counts = voice.view(np.int64)
+    n = whole[at.P_MODES]
+    rows = at.state(n)
+    ratio = program[at.P_RATIO]
+    first = counts[at.GENERATED]
+    if whole[at.P_HIGHER]:
+        _integrate_to(voice, program, first * ratio, scratch)
+    points = counts[at.POINTS]
+    if heard:
+        out[:] = 0.0
+        length = SHORT if first < whole[at.P_EARLY] else LONG
+        z = scratch[at.SCRATCH_ROWS * at.MOST_MODES :].view(np.float32)[: 2 * at.QUANTUM * n]
+        if not counts[at.SEGMENT_VALID]:
+            _keep_end(voice, program, first * ratio, scratch)
+        for begin in range(0, at.QUANTUM, length):
+            _segment(voice, program, first + begin, length, z[begin * 2 * n :], scratch)
+        if counts[at.MODULATED]:
+            if counts[at.REFRESH] == 0:
+                _look(voice, program, z, scratch)
+                counts[at.REFRESH] = LOOK_EVERY
+            counts[at.REFRESH] -= 1
+        modulated = counts[at.MODULATED] and counts[at.ROWS] > 0
+        for which in range(2 if fading else 1):
+            for point in range(points):
+                _sum(voice, n, which, point, z, out[2 * which + point])
+        if modulated:
+            _modulate(voice, program, z, fading, points, out, scratch)
+    else:
+        counts[at.SEGMENT_VALID] = 0
+    counts[at.GENERATED] = first + at.QUANTUM
+    loudest = -1e9
+    sigma = program[whole[at.O_SIGMA] :]
+    time = (first + at.QUANTUM) * ratio
+    for m in range(n):
+        level = voice[rows + at.LEVEL_0 * n + m] - sigma[m] * time
+        if heard and whole[at.P_HIGHER]:
+            level = max(level, voice[rows + at.LEVEL * n + m])
+        loudest = max(loudest, level)
+    voice[at.LOUDNESS] = loudest + program[at.P_LOUDNESS]
+
+
+@njit(**COMPILED)
+def _keep_end(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.ndarray) -> None:
+    """Where the next segment begins."""
+    counts = voice.view(np.int64)
+    n = program.view(np.int64)[at.P_MODES]
+    rows = at.state(n)
+    end = scratch[8 * at.MOST_MODES : 8 * at.MOST_MODES + 5 * n]
+    end[4 * n :] = 0.0
+    _move(voice, program, time, end, scratch)
+    voice[rows + at.LEVEL * n : rows + (at.LEVEL + 4) * n] = end[: 4 * n]
+    voice[rows + at.CHANGE * n : rows + (at.CHANGE + 1) * n] = end[4 * n :]
+    counts[at.SEGMENT_VALID] = 1
+
+
+@njit(**COMPILED)
+def _segment(voice: np.ndarray, program: np.ndarray, first: int, length: int, z: np.ndarray, scratch: np.ndarray) -> None:
+    """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
+    whole = program.view(np.int64)
+    n = whole[at.P_MODES]
+    rows = at.state(n)
+    ratio, limit = program[at.P_RATIO], program[at.P_LIMIT]
+    end = scratch[8 * at.MOST_MODES : 8 * at.MOST_MODES + 5 * n]
+    end[4 * n :] = 0.0
+    _move(voice, program, (first + length) * ratio, end, scratch)
+    sigma = program[whole[at.O_SIGMA] :]
+    width, count = length * ratio, float(length)
+    level, phase = voice[rows + at.LEVEL * n :], voice[rows + at.PHASE * n :]
+    level_rate, phase_rate = voice[rows + at.LEVEL_RATE * n :], voice[rows + at.PHASE_RATE * n :]
+    change, next_change = voice[rows + at.CHANGE * n :], voice[rows + (at.CHANGE + 1) * n :]
+    turns = scratch[16 * at.MOST_MODES :].view(np.float32)
+    zr, zi, rr, ri = turns[:n], turns[n : 2 * n], turns[2 * n : 3 * n], turns[3 * n : 4 * n]
+    sr, si, cr, ci = turns[4 * n : 5 * n], turns[5 * n : 6 * n], turns[6 * n : 7 * n], turns[7 * n : 8 * n]
+    for m in range(n):
+        held_left = min(max(level_rate[m] * width, -limit), limit) - sigma[m] * width
+        held_right = min(max(end[2 * n + m] * width, -limit), limit) - sigma[m] * width
+        rise, turn = end[m] - level[m], end[n + m] - phase[m]
+        turn_left, turn_right = phase_rate[m] * width, end[3 * n + m] * width
+        bend = (3 * rise - 2 * held_left - held_right) / (count * count)
+        cube = (-2 * rise + held_left + held_right) / (count * count * count)
+        twist = (3 * turn - 2 * turn_left - turn_right) / (count * count)
+        screw = (-2 * turn + turn_left + turn_right) / (count * count * count)
+        loud = _exp(level[m])
+        c, s = _turn(phase[m])
+        zr[m], zi[m] = loud * c, loud * s
+        grown = _exp(held_left / count + bend + cube)
+        c, s = _turn(turn_left / count + twist + screw)
+        rr[m], ri[m] = grown * c, grown * s
+        grown = _exp(2 * bend + 6 * cube)
+        c, s = _turn(2 * twist + 6 * screw)
+        sr[m], si[m] = grown * c, grown * s
+        grown = _exp(6 * cube)
+        c, s = _turn(6 * screw)
+        cr[m], ci[m] = grown * c, grown * s
+    for frame in range(length):
+        real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
+        for m in range(n):
+            a, b, c, d = zr[m], zi[m], rr[m], ri[m]
+            real[m], imaginary[m] = a, b
+            zr[m], zi[m] = a * c - b * d, a * d + b * c
+            e, f = sr[m], si[m]
+            rr[m], ri[m] = c * e - d * f, c * f + d * e
+            g, h = cr[m], ci[m]
+            sr[m], si[m] = e * g - f * h, e * h + f * g
+    for m in range(n):
+        level[m], level_rate[m], phase_rate[m] = end[m], end[2 * n + m], end[3 * n + m]
+        phase[m] = end[n + m]
+        next_change[m] = end[4 * n + m]
+
+
+@njit(**COMPILED)
+def _sum(voice: np.ndarray, n: int, which: int, point: int, z: np.ndarray, out: np.ndarray) -> None:
+    """Adds Re Σ w z at each frame of the quantum."""
+    slot = at.weights(n, which, point, 0)
+    w = voice[slot : slot + 2 * n]
+    constant = voice[at.bias(n, which, point)]
+    for frame in range(at.QUANTUM):
+        total = 0.0
+        row = z[frame * 2 * n : (frame + 1) * 2 * n]
+        for m in range(2 * n):
+            total += w[m] * row[m]
+        out[frame] += total + constant
+
+
+@njit(**COMPILED)
+def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.ndarray) -> None:
+    """Which latents' modulation can be heard, and whose squares are heard in it. Energies decay: no more later."""
+    whole = program.view(np.int64)
+    counts = voice.view(np.int64)
+    n = whole[at.P_MODES]
+    rows = at.state(n)
+    matrix, largest = program[whole[at.O_M] :], program[whole[at.O_M_LARGEST] :]
+    squares, loud = scratch[20 * at.MOST_MODES : 20 * at.MOST_MODES + n], scratch[21 * at.MOST_MODES : 21 * at.MOST_MODES + n]
+    loudest = 0.0
+    for m in range(n):
+        squares[m] = z[m] * z[m] + z[n + m] * z[n + m]
+        size = 0.0
+        for which in range(2):
+            for point in range(2):
+                slot = at.weights(n, which, point, 0)
+                size = max(size, abs(voice[slot + m]), abs(voice[slot + n + m]))
+        loud[m] = size * math.sqrt(squares[m])
+        loudest = max(loudest, loud[m])
+    row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
+    columns = 0
+    for m in range(n):
+        if squares[m] * largest[m] * loudest > INAUDIBLE:
+            column_list[columns] = m
+            columns += 1
+    kept = 0
+    change = voice[rows + at.CHANGE * n :]
+    for j in range(n):
+        effect = 0.0
+        for place in range(columns):
+            m = column_list[place]
+            entry = matrix[(j * n + m) * 4 : (j * n + m) * 4 + 4]
+            effect += squares[m] * (abs(entry[0]) + abs(entry[1]) + abs(entry[2]) + abs(entry[3]))
+        if whole[at.P_ADIABATIC]:
+            effect += abs(change[j])
+        if effect * loud[j] > INAUDIBLE:
+            row_list[kept] = j
+            kept += 1
+    counts[at.ROWS], counts[at.COLUMNS] = kept, columns
+    if kept == 0:
+        counts[at.MODULATED] = 0
+
+
+@njit(**COMPILED)
+def _modulate(
+    voice: np.ndarray, program: np.ndarray, z: np.ndarray, fading: bool, points: int, out: np.ndarray, scratch: np.ndarray
+) -> None:
+    """Adds what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
+    whole = program.view(np.int64)
+    counts = voice.view(np.int64)
+    n = whole[at.P_MODES]
+    rows, quantum = at.state(n), at.QUANTUM
+    matrix, limit = program[whole[at.O_M] :], program[at.P_LIMIT]
+    row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
+    change, next_change = voice[rows + at.CHANGE * n :], voice[rows + (at.CHANGE + 1) * n :]
+    squares = scratch[(at.SCRATCH_ROWS + 2 * quantum) * at.MOST_MODES :].view(np.float32)
+    columns = counts[at.COLUMNS]
+    for place in range(columns):
+        m = column_list[place]
+        real, imaginary = squares[2 * place * quantum :], squares[(2 * place + 1) * quantum :]
+        for frame in range(quantum):
+            a, b = z[frame * 2 * n + m], z[frame * 2 * n + n + m]
+            real[frame] = a * a - b * b
+            imaginary[frame] = np.float32(2) * a * b
+    growth, turn = scratch[22 * at.MOST_MODES :].view(np.float32), scratch[23 * at.MOST_MODES :].view(np.float32)
+    for place in range(counts[at.ROWS]):
+        j = row_list[place]
+        start = change[j]
+        step = (next_change[j] - start) / quantum
+        for frame in range(quantum):
+            growth[frame] = start + step * frame
+            turn[frame] = 0.0
+        for column in range(columns):
+            m = column_list[column]
+            entry = matrix[(j * n + m) * 4 : (j * n + m) * 4 + 4]
+            a, b = np.float32(entry[0]), np.float32(entry[1])
+            c, d = np.float32(entry[2]), np.float32(entry[3])
+            real, imaginary = squares[2 * column * quantum :], squares[(2 * column + 1) * quantum :]
+            for frame in range(quantum):
+                growth[frame] += a * real[frame] + b * imaginary[frame]
+                turn[frame] += c * real[frame] + d * imaginary[frame]
+        for frame in range(quantum):
+            gain = _exp(limit * _tanh(growth[frame] / limit))
+            cosine, sine = _turn(float(turn[frame]))
+            a, b = z[frame * 2 * n + j], z[frame * 2 * n + n + j]
+            growth[frame] = a * (gain * cosine - 1) - b * gain * sine
+            turn[frame] = a * gain * sine + b * (gain * cosine - 1)
+        for which in range(2 if fading else 1):
+            for point in range(points):
+                slot = at.weights(n, which, point, 0)
+                w, v = voice[slot + j], voice[slot + n + j]
+                row = out[2 * which + point]
+                for frame in range(quantum):
+                    row[frame] += w * growth[frame] + v * turn[frame]
+    if whole[at.P_ADIABATIC]:
+        for m in range(n):
+            change[m] = next_change[m]

@@ -1,0 +1,187 @@
+"""What lies where: a voice, a program and a mixer are flat arrays of eight-byte numbers, real or whole.
+
+A *program* is what voices of one source share: a model's parameters, or a solver's. A *voice* is one pluck of it as it
+rings. Slots are counted in eight-byte numbers. Whole numbers and real ones share the memory, each slot is always one
+or the other. One thread writes a slot while others may read it; a slot that a command changes is read once a quantum.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from engine.kernels.compiled import COMPILED
+
+QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
+
+# A voice's state
+WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
+# A voice's kind
+BANK, TRUTH, RENDERED = 0, 1, 2
+
+# Slots of a voice (W: whole number, R: real)
+STATE = 0  # W
+KIND = 1  # W
+PROGRAM = 2  # W address
+FRAME = 3  # W frames given out since the pluck
+GENERATED = 4  # W frames generated since the pluck: one quantum more where the pick-up senses velocity
+POINTS = 5  # W listening points, 1 or 2
+VELOCITY = 6  # W whether the pick-up senses velocity
+WANTED_GAIN = 7  # R set by a command
+GAIN = 8  # R as it is now
+FADE_FRAMES = 9  # W that a change of gain takes
+RELEASE = 10  # W above 0: fade out within so many frames, and end
+LIMIT = 11  # R the largest believable output, of full scale
+NEXT_WEIGHTS = 12  # W 1: the second set of weights is to be faded to; back to 0 when it is the first
+WEIGHTS_FADED = 13  # W frames of that fade
+STRUCK_S = 14  # R the device clock's time of the gesture
+BEGAN_S = 15  # R and of the callback that gave the device its first samples
+STARVED = 16  # W frames in which it should have sounded and had nothing to
+MODES = 17  # W latents, or modes, or 0
+MOVING = 18  # W modes of the truth that still move
+NODE = 19  # W the node from which a bank's integral goes on
+SEGMENT_VALID = 20  # W whether a bank knows where its last segment ended
+LOUDNESS = 21  # R nepers below full scale that the loudest latent, or all of the string, has now
+GAIN_FROM = 22  # R where the present change of gain began
+GAIN_TO = 23  # R and where it leads
+GAIN_DONE = 24  # W frames of it
+SILENT = 25  # W it counts as loudness what is below
+MODULATED = 26  # W whether a bank's modulation can still be heard
+SAMPLES = 27  # W address of a rendered voice's samples, float32 (frames, points)
+READY = 28  # W of them, set by whoever renders
+LENGTH = 29  # W of them in all; after the last the voice is over
+DRY = 30  # W whether it had nothing to play in the last quantum
+ATTACK = 31  # W frames of the fade-in at the pluck
+BEGAN_FRAME = 32  # W the mixer's frame at which it began
+REFRESH = 33  # W quanta until a bank looks again which of its modulation can be heard
+ROWS = 34  # W latents whose modulation can be heard
+COLUMNS = 35  # W latents that can be heard in others' modulation
+HEADER = 40
+
+SETS = 2  # of weights
+
+
+@njit(inline="always", **COMPILED)
+def weights(modes: int, which: int, point: int, part: int) -> int:
+    """First slot of the weights (modes,) of a set, a point, and of the real (0) or imaginary (1) parts."""
+    return HEADER + ((which * 2 + point) * 2 + part) * modes
+
+
+@njit(inline="always", **COMPILED)
+def bias(modes: int, which: int, point: int) -> int:
+    return HEADER + 8 * modes + which * 2 + point
+
+
+@njit(inline="always", **COMPILED)
+def history(modes: int, point: int) -> int:
+    """First slot of the last three quanta of displacement at a point, the latest last."""
+    return HEADER + 8 * modes + 4 + point * 3 * QUANTUM
+
+
+@njit(inline="always", **COMPILED)
+def state(modes: int) -> int:
+    """First slot of what a kind keeps for itself."""
+    return HEADER + 8 * modes + 4 + 6 * QUANTUM
+
+
+# Rows (modes,) of a bank's state, from `state` on
+LEVEL_0, ANGLE_0, ENERGY_0 = 0, 1, 2
+CONSTANT = 3  # two: what the linear term adds up to in the end
+INTEGRAL = 5  # two: of the higher orders up to the node
+AT_LEFT, AT_MIDDLE, AT_RIGHT = 7, 9, 11  # two each: the higher orders at the node, half-way and at the next
+LEVEL, PHASE, LEVEL_RATE, PHASE_RATE = 13, 14, 15, 16  # where the last segment ended
+ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
+CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
+BANK_ROWS = 21
+
+# Rows of the truth's state
+AMPLITUDE, SPEED = 0, 1
+TRUTH_ROWS = 2
+
+# Slots of a bank's program
+P_MODES = 0  # W
+P_RATIO = 1  # R trained samples a frame
+P_SPACING = 2  # R trained samples between nodes
+P_LIMIT = 3  # R the gain's limit in nepers
+P_SECOND_ORDER = 4  # W
+P_HIGHER = 5  # W whether there are higher orders at all
+P_ADIABATIC = 6  # W whether f follows the mean tension to all orders, and A is there
+P_LAYERS = 7  # W of the network g; 0: none
+P_MODULATION = 8  # W whether M is there
+P_LOUDNESS = 9  # R nepers: log of full scale's share of a latent of 1
+P_EARLY = 10  # W frames in which segments are short
+P_OFFSETS = 12  # W slots of the parts below
+(
+    O_SIGMA,
+    O_OMEGA,
+    O_COUPLING,
+    O_LARGEST,
+    O_SHARES,
+    O_ENERGY_UNITS,
+    O_RATE_UNITS,
+    O_AT_ZERO,
+    O_NETWORK,
+    O_M,
+    O_M_LARGEST,
+    O_A,
+) = range(P_OFFSETS, P_OFFSETS + 12)
+P_WIDTHS = P_OFFSETS + 12  # W sizes of the network's layers, from the input on, at most 8
+P_HEADER = P_WIDTHS + 8
+
+# Slots of the truth's program
+T_MODES = 0  # W
+T_STAGES = 1  # W
+T_LEVELS = 2  # W
+T_SILENCE = 3  # R
+T_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
+T_FLOWS, T_KICKS, T_COUPLING, T_ETA, T_SUBSTEPS, T_LEVEL_OF, T_INVERSE = 6, 7, 8, 9, 10, 11, 12  # W slots
+T_HEADER = 16
+
+# Slots of a rendered voice's program
+R_TAPS = 0  # W of the filter, to either side
+R_PHASES = 1  # W
+R_RATIO = 2  # R samples a frame
+R_FILTER = 3  # W slot of (phases + 1, 2 taps)
+R_HEADER = 8
+
+# Slots of a mixer
+MOST_VOICES = 256
+RING = 1024
+GAPS = 64
+GAP_FIELDS = 3  # frame, milliseconds, cause
+CAUSE_DEVICE, CAUSE_STARVED, CAUSE_RUNAWAY = 1, 2, 3
+M_RATE = 0  # R frames a second
+M_FRAMES = 1  # W given to the device
+M_CALLS = 2  # W of the callback
+M_NOW_S = 3  # R the device clock at the last call
+M_DAC_S = 4  # R and when its first sample is heard
+M_UNDERFLOWS = 5  # W that the device told
+M_ACTIVE = 6  # W voices
+M_PUSHED = 7  # W voices that were handed over
+M_TAKEN = 8  # W and taken up
+M_WANTED_VOLUME = 9  # R
+M_VOLUME = 10  # R
+M_LIMITER = 11  # R its level
+M_RELEASE = 12  # R its factor a frame
+M_REDUCTION = 13  # R the least gain since it was read, 1: none
+M_PEAK = 14  # R the highest sample since it was read
+M_NON_FINITE = 15  # W samples that were replaced by silence
+M_LEFT = 16  # W frames of the last quantum that are still to be given
+M_TONE_FRAME = 17  # W of the test tone; beyond its length: none
+M_TONE_LENGTH = 18  # W
+M_TONE_SIDE = 19  # W 1 left, 2 right, 3 both
+M_GAPS = 20  # W gaps so far
+M_CHANNELS = 21  # W of the device, 1 or 2
+M_SMOOTHING = 22  # R what is left a frame of a change of volume
+M_OVERRUNS = 23  # W voices that were refused because all places were taken
+M_VOICES = 32  # W addresses
+M_RING = M_VOICES + MOST_VOICES  # W addresses
+M_GAP_LIST = M_RING + RING  # R
+M_MIX = M_GAP_LIST + GAPS * GAP_FIELDS  # R (QUANTUM, 2)
+M_OUT = M_MIX + 2 * QUANTUM  # R (4, QUANTUM): two sets of weights at two points
+M_TAPS = M_OUT + 4 * QUANTUM  # R the differentiator's, (2 REACH + 1)
+REACH = 32  # frames of the differentiator to either side
+M_SCRATCH = M_TAPS + 2 * REACH + 2
+MOST_MODES = 512
+SCRATCH_ROWS = 32
+SCRATCH_SLOTS = SCRATCH_ROWS * MOST_MODES + 4 * QUANTUM * MOST_MODES
+MIXER_SLOTS = M_SCRATCH + SCRATCH_SLOTS

@@ -1,0 +1,32 @@
+"""Memory by its address: what a callback without an interpreter is given is a pointer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+# mypy: disable-error-code="no-untyped-def"
+
+
+@intrinsic
+def pointer(typing_context: Any, address: Any):  # noqa: ANN201
+    """A `void *` from an address (int64)."""
+
+    def generate(_context, builder, _signature, arguments):
+        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+
+    return types.voidptr(types.int64), generate
+
+
+@intrinsic
+def fence(typing_context: Any):  # noqa: ANN201
+    """What was written before is seen by other threads before what is written after."""
+
+    def generate(context, builder, _signature, _arguments):
+        builder.fence("seq_cst")
+        return context.get_dummy_value()
+
+    return types.void(), generate

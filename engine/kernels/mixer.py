@@ -1,0 +1,151 @@
+"""The sum of all voices, and the function that a sound device calls for it.
+
+`call` is a PortAudio callback: it takes up new voices, renders quanta, and hands them over, in compiled code, in the
+device's own thread and without the interpreter. `render` does the same where there is no device.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import carray, cfunc, njit, types
+
+from engine.kernels import layout as at
+from engine.kernels.memory import fence, pointer
+from engine.kernels.voice import add, note_gap
+from engine.kernels.compiled import COMPILED
+
+CEILING = 10 ** (-0.3 / 20)
+BELIEVED = 100.0  # +40 dBFS: the level that the limiter believes at most, so that one wild sample is soon forgotten
+TONE_HZ, TONE_LEVEL, TONE_FADE = 440.0, 0.1, 960
+UNDERFLOW = 4  # PortAudio's flag
+LATE = 1.5  # blocks that a device's clock may jump before it counts as a gap
+
+
+@njit(**COMPILED)
+def render(mixer: np.ndarray, frames: int, out: np.ndarray, now_s: float) -> None:
+    """The next frames, float32 (frames * channels,)."""
+    counts = mixer.view(np.int64)
+    channels = counts[at.M_CHANNELS]
+    done = 0
+    while done < frames:
+        if counts[at.M_LEFT] == 0:
+            _quantum(mixer, now_s)
+            counts[at.M_LEFT] = at.QUANTUM
+        begin = at.QUANTUM - counts[at.M_LEFT]
+        count = min(frames - done, counts[at.M_LEFT])
+        for frame in range(count):
+            left, right = mixer[at.M_MIX + 2 * (begin + frame)], mixer[at.M_MIX + 2 * (begin + frame) + 1]
+            if channels == 1:
+                out[done + frame] = 0.5 * (left + right)
+            else:
+                out[(done + frame) * channels] = left
+                out[(done + frame) * channels + 1] = right
+                for channel in range(2, channels):
+                    out[(done + frame) * channels + channel] = 0.0
+        counts[at.M_LEFT] -= count
+        counts[at.M_FRAMES] += count
+        done += count
+
+
+@njit(**COMPILED)
+def _quantum(mixer: np.ndarray, now_s: float) -> None:
+    counts = mixer.view(np.int64)
+    mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
+    _take_up(counts)
+    kept = 0
+    for place in range(counts[at.M_ACTIVE]):
+        address = counts[at.M_VOICES + place]
+        voice = carray(pointer(address), (1 << 40,), np.float64)
+        add(voice, mixer, now_s)
+        state = voice.view(np.int64)[at.STATE]
+        if state == at.SOUNDING:
+            counts[at.M_VOICES + kept] = address
+            kept += 1
+    fence()
+    counts[at.M_ACTIVE] = kept
+    _finish(mixer)
+
+
+@njit(**COMPILED)
+def _take_up(counts: np.ndarray) -> None:
+    """Voices that were handed over; beyond the last place they are refused, and over."""
+    pushed = counts[at.M_PUSHED]
+    fence()
+    while counts[at.M_TAKEN] < pushed:
+        address = counts[at.M_RING + counts[at.M_TAKEN] % at.RING]
+        if counts[at.M_ACTIVE] < at.MOST_VOICES:
+            counts[at.M_VOICES + counts[at.M_ACTIVE]] = address
+            counts[at.M_ACTIVE] += 1
+        else:
+            voice = carray(pointer(address), (1 << 40,), np.int64)
+            voice[at.STATE] = at.OVER
+            counts[at.M_OVERRUNS] += 1
+        fence()
+        counts[at.M_TAKEN] += 1
+
+
+@njit(**COMPILED)
+def _finish(mixer: np.ndarray) -> None:
+    """Volume, test tone, limiter and meter."""
+    counts = mixer.view(np.int64)
+    volume, wanted, smoothing = mixer[at.M_VOLUME], mixer[at.M_WANTED_VOLUME], mixer[at.M_SMOOTHING]
+    level, release = mixer[at.M_LIMITER], mixer[at.M_RELEASE]
+    reduction, peak = mixer[at.M_REDUCTION], mixer[at.M_PEAK]
+    for frame in range(at.QUANTUM):
+        if volume != wanted:
+            volume = wanted + (volume - wanted) * smoothing
+            if abs(volume - wanted) < 1e-7:
+                volume = wanted
+        left = mixer[at.M_MIX + 2 * frame] * volume
+        right = mixer[at.M_MIX + 2 * frame + 1] * volume
+        if counts[at.M_TONE_FRAME] < counts[at.M_TONE_LENGTH]:
+            now, length = counts[at.M_TONE_FRAME], counts[at.M_TONE_LENGTH]
+            envelope = min(1.0, min(now, length - now) / TONE_FADE)
+            wave = TONE_LEVEL * envelope * math.sin(2 * math.pi * TONE_HZ * now / mixer[at.M_RATE])
+            if counts[at.M_TONE_SIDE] & 1:
+                left += wave
+            if counts[at.M_TONE_SIDE] & 2:
+                right += wave
+            counts[at.M_TONE_FRAME] = now + 1
+        if not (abs(left) < 1e6 and abs(right) < 1e6):  # voices are watched; this is the last line of defence
+            left = right = 0.0
+            counts[at.M_NON_FINITE] += 1
+        loudest = min(max(abs(left), abs(right)), BELIEVED)
+        level = max(loudest, release * level)
+        if level > CEILING:
+            gain = CEILING / level
+            reduction = min(reduction, gain)
+            left = min(max(left * gain, -CEILING), CEILING)
+            right = min(max(right * gain, -CEILING), CEILING)
+        peak = max(peak, abs(left), abs(right))
+        mixer[at.M_MIX + 2 * frame], mixer[at.M_MIX + 2 * frame + 1] = left, right
+    mixer[at.M_VOLUME], mixer[at.M_LIMITER] = volume, level
+    mixer[at.M_REDUCTION], mixer[at.M_PEAK] = reduction, peak
+
+
+@cfunc(
+    types.int32(types.voidptr, types.voidptr, types.uint64, types.voidptr, types.uint64, types.voidptr),
+    nopython=True,
+    cache=True,
+    error_model="numpy",
+)
+def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
+    """PaStreamCallback; `user` is the mixer."""
+    mixer = carray(user, (at.MIXER_SLOTS,), np.float64)
+    counts = mixer.view(np.int64)
+    clock = carray(times, (3,), np.float64)
+    now_s, dac_s, count = clock[1], clock[2], np.int64(frames)
+    sounding = counts[at.M_ACTIVE] > 0
+    length_s = count / mixer[at.M_RATE]
+    missed_s = dac_s - mixer[at.M_DAC_S] - length_s
+    if flags & UNDERFLOW and counts[at.M_CALLS] > 0:
+        counts[at.M_UNDERFLOWS] += 1
+        if sounding:
+            note_gap(mixer, counts[at.M_FRAMES], 1000 * max(missed_s, 0.0), at.CAUSE_DEVICE)
+    mixer[at.M_NOW_S], mixer[at.M_DAC_S] = now_s, dac_s
+    counts[at.M_CALLS] += 1
+    block = carray(output, (count * counts[at.M_CHANNELS],), np.float32)
+    render(mixer, count, block, now_s)
+    return 0

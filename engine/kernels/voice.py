@@ -1,0 +1,153 @@
+"""What all voices share: listening points that may move, the pick-up, the gain, and the end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import carray, njit
+
+from engine.kernels import bank, rendered, truth
+from engine.kernels import layout as at
+from engine.kernels.memory import fence, pointer
+from engine.kernels.compiled import COMPILED
+
+MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
+_END = 960  # frames of the fade of a voice that has become silent
+
+
+@njit(**COMPILED)
+def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+    """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
+    counts = voice.view(np.int64)
+    kind = counts[at.KIND]
+    program = carray(pointer(counts[at.PROGRAM]), (1 << 40,), np.float64)
+    if kind == at.RENDERED:
+        rendered.generate(voice, program, out)
+        return
+    n = counts[at.MODES]
+    fading = counts[at.NEXT_WEIGHTS] == 1
+    fence()
+    if kind == at.BANK:
+        bank.generate(voice, program, fading, heard, out, scratch)
+    else:
+        truth.generate(voice, program, fading, heard, out)
+    if fading:
+        done, frames = counts[at.WEIGHTS_FADED], MOVE_QUANTA * at.QUANTUM
+        for point in range(counts[at.POINTS]):
+            for frame in range(at.QUANTUM):
+                share = (done + frame + 1) / frames
+                out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
+        counts[at.WEIGHTS_FADED] = done + at.QUANTUM
+        if counts[at.WEIGHTS_FADED] >= frames or not heard:
+            for slot in range(4 * n):
+                voice[at.HEADER + slot] = voice[at.HEADER + 4 * n + slot]
+            for point in range(2):
+                voice[at.bias(n, 0, point)] = voice[at.bias(n, 1, point)]
+            counts[at.WEIGHTS_FADED] = 0
+            fence()
+            counts[at.NEXT_WEIGHTS] = 0
+
+
+@njit(**COMPILED)
+def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray) -> None:
+    """As `_generate`, differentiated; the voice is generated a quantum ahead for that."""
+    counts = voice.view(np.int64)
+    n, quantum = counts[at.MODES], at.QUANTUM
+    begins = counts[at.GENERATED] == counts[at.FRAME]
+    for turn in range(2 if begins else 1):
+        _generate(voice, heard, out, scratch)
+        for point in range(counts[at.POINTS]):
+            slot = at.history(n, point)
+            past = voice[slot : slot + 3 * quantum]
+            for frame in range(2 * quantum):
+                past[frame] = past[frame + quantum]
+            for frame in range(quantum):
+                past[2 * quantum + frame] = out[point, frame]
+            if begins and turn == 0 and counts[at.FRAME] == 0:
+                for frame in range(1, quantum):  # at rest: before the pluck lies the mirror of what follows
+                    past[2 * quantum - frame] = past[2 * quantum + frame]
+    for point in range(counts[at.POINTS]):
+        slot = at.history(n, point)
+        past = voice[slot : slot + 3 * quantum]
+        for frame in range(quantum):
+            total = 0.0
+            for tap in range(2 * at.REACH + 1):
+                total += taps[tap] * past[quantum + frame - at.REACH + tap]
+            out[point, frame] = total
+
+
+@njit(**COMPILED)
+def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> None:
+    """Adds the next quantum of a voice to the mix, (QUANTUM, 2), and says in its state whether it goes on."""
+    counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
+    quantum = at.QUANTUM
+    out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
+    scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
+    mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
+    release = counts[at.RELEASE]
+    wanted = 0.0 if release > 0 else voice[at.WANTED_GAIN]
+    if wanted != voice[at.GAIN_TO]:
+        voice[at.GAIN_FROM], voice[at.GAIN_TO] = voice[at.GAIN], wanted
+        counts[at.GAIN_DONE] = 0
+        if release > 0:
+            counts[at.FADE_FRAMES] = release
+    heard = voice[at.GAIN] != 0 or voice[at.GAIN_TO] != 0
+    starved = counts[at.STARVED]
+    if counts[at.VELOCITY]:
+        taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
+        _velocity(voice, heard, out, scratch, taps)
+    else:
+        _generate(voice, heard, out, scratch)
+    points = counts[at.POINTS]
+    if starved == 0 and counts[at.STARVED] > 0:
+        note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
+    if heard:
+        limit = voice[at.LIMIT]
+        for point in range(points):
+            for frame in range(quantum):
+                if not abs(out[point, frame]) <= limit:  # also where it is not a number
+                    counts[at.STATE] = at.RUNAWAY
+                    note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_RUNAWAY)
+                    return
+        first, attack = counts[at.FRAME], counts[at.ATTACK]
+        source, goal, done, length = voice[at.GAIN_FROM], voice[at.GAIN_TO], counts[at.GAIN_DONE], counts[at.FADE_FRAMES]
+        for frame in range(quantum):
+            gain = goal
+            if done + frame < length:
+                gain = source + (goal - source) * ((done + frame + 1) / length)
+            if first + frame < attack:
+                gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
+            mix[frame, 0] += gain * out[0, frame]
+            mix[frame, 1] += gain * out[points - 1, frame]
+        counts[at.GAIN_DONE] = min(done + quantum, length)
+        voice[at.GAIN] = goal if done + quantum >= length else source + (goal - source) * ((done + quantum) / length)
+    if counts[at.FRAME] == 0:
+        counts[at.BEGAN_FRAME] = mix_counts[at.M_FRAMES]
+        voice[at.BEGAN_S] = now_s
+    counts[at.FRAME] += quantum
+    counts[at.STATE] = at.SOUNDING
+    if release > 0 and (not heard or (voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0)):
+        counts[at.STATE] = at.OVER
+    elif release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
+        counts[at.RELEASE] = _END
+
+
+@njit(**COMPILED)
+def note_gap(mixer: np.ndarray, frame: int, milliseconds: float, cause: int) -> None:
+    """One more silence that nobody asked for."""
+    counts = mixer.view(np.int64)
+    slot = at.M_GAP_LIST + (counts[at.M_GAPS] % at.GAPS) * at.GAP_FIELDS
+    mixer[slot], mixer[slot + 1], mixer[slot + 2] = frame, milliseconds, cause
+    fence()
+    counts[at.M_GAPS] += 1
+
+
+@njit(**COMPILED)
+def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
+    """Lets a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
+    counts = voice.view(np.int64)
+    out = mixer[at.M_OUT : at.M_OUT + 4 * at.QUANTUM].reshape(4, at.QUANTUM)
+    for _ in range((frames + at.QUANTUM // 2) // at.QUANTUM):
+        _generate(voice, False, out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+    counts[at.FRAME] = counts[at.GENERATED]

@@ -1,0 +1,157 @@
+"""The mixer: voices are handed to it, and a device's callback, a clock, or a file takes its frames."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels import layout as at
+from engine.pluck import FULL_SCALE_M
+from engine.voices.ear import FULL_SCALE_M_S
+from engine.voices.voice import Voice
+
+LIMITER_RELEASE_S = 0.08
+VOLUME_SMOOTHING_S = 0.015
+KAISER_BETA = 8.0
+CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUNAWAY: "runaway"}
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A silence that nobody asked for: when, as seconds of sound since the mixer began, and why."""
+
+    time_s: float
+    cause: str
+    milliseconds: float
+
+
+class Mixer:
+    """Its memory is what the kernels work on; commands come from any thread, frames are taken by one."""
+
+    def __init__(self, rate_hz: int, channels: int = 2) -> None:
+        self.rate_hz = rate_hz
+        self.memory = memory = np.zeros(at.MIXER_SLOTS)
+        self._counts = counts = memory.view(np.int64)
+        self._lock = threading.Lock()
+        self._voices: list[Voice] = []  # handed over and not over yet: their memory is in use
+        self._gaps_read = 0
+        memory[at.M_RATE] = rate_hz
+        counts[at.M_CHANNELS] = channels
+        memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
+        memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
+        memory[at.M_SMOOTHING] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
+        counts[at.M_TONE_FRAME] = counts[at.M_TONE_LENGTH] = 0
+        memory[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1] = _differentiator(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
+
+    @property
+    def address(self) -> int:
+        return int(self.memory.ctypes.data)
+
+    def add(self, *voices: Voice) -> None:
+        """Hands voices over: they begin together, with the next quantum. Any thread, at once.
+
+        Raises:
+            ValueError: a voice is of another rate.
+        """
+        for voice in voices:
+            if voice.program.rate_hz != self.rate_hz:
+                raise ValueError(f"the voice has {voice.program.rate_hz} Hz, the mixer {self.rate_hz} Hz")
+        with self._lock:
+            counts = self._counts
+            pushed, room = int(counts[at.M_PUSHED]), at.RING - int(counts[at.M_PUSHED] - counts[at.M_TAKEN])
+            for number, voice in enumerate(voices[:room]):
+                counts[at.M_RING + (pushed + number) % at.RING] = voice.address
+                self._voices.append(voice)
+            counts[at.M_PUSHED] = pushed + min(len(voices), room)
+
+    def forget_ended(self) -> None:
+        """Frees what is over. Any thread, now and then."""
+        with self._lock:
+            self._voices = [voice for voice in self._voices if not voice.over]
+
+    @property
+    def voices(self) -> list[Voice]:
+        """Those that have been handed over and are not over."""
+        with self._lock:
+            return [voice for voice in self._voices if not voice.over]
+
+    def render(self, frames: int) -> NDArray[np.float32]:
+        """The next frames, (frames, channels), where no device takes them."""
+        from engine.kernels.mixer import render
+
+        channels = int(self._counts[at.M_CHANNELS])
+        out = np.zeros(frames * channels, np.float32)
+        render(self.memory, frames, out, float(self._counts[at.M_FRAMES]) / self.rate_hz)
+        return out.reshape(frames, channels)
+
+    def set_volume(self, factor: float) -> None:
+        """Of everything; 1 leaves the samples as they are."""
+        self.memory[at.M_WANTED_VOLUME] = factor
+
+    def sound_tone(self, side: str) -> None:
+        """A soft tone for a second, on "left", "right" or "both"."""
+        self._counts[at.M_TONE_LENGTH] = 0
+        self._counts[at.M_TONE_FRAME] = 0
+        self._counts[at.M_TONE_SIDE] = {"left": 1, "right": 2}.get(side, 3)
+        self._counts[at.M_TONE_LENGTH] = self.rate_hz
+
+    @property
+    def seconds(self) -> float:
+        """Of sound, given so far."""
+        return float(self._counts[at.M_FRAMES]) / self.rate_hz
+
+    @property
+    def calls(self) -> int:
+        """Of the device's callback."""
+        return int(self._counts[at.M_CALLS])
+
+    @property
+    def underflows(self) -> int:
+        return int(self._counts[at.M_UNDERFLOWS])
+
+    @property
+    def output_latency_s(self) -> float:
+        """From a callback to its first sample at the loudspeaker, as the device said last; 0 where it does not."""
+        return max(0.0, float(self.memory[at.M_DAC_S] - self.memory[at.M_NOW_S]))
+
+    def take_peak(self) -> float:
+        """The highest sample since it was asked for the last time."""
+        peak = float(self.memory[at.M_PEAK])
+        self.memory[at.M_PEAK] = 0.0
+        return peak
+
+    def take_reduction_db(self) -> float:
+        """The limiter's strongest reduction since it was asked for the last time; 0: untouched."""
+        gain = float(self.memory[at.M_REDUCTION])
+        self.memory[at.M_REDUCTION] = 1.0
+        return -20 * math.log10(gain)
+
+    def new_gaps(self) -> list[Gap]:
+        """Those since this was asked for the last time; of very many only the latest."""
+        found, total = [], int(self._counts[at.M_GAPS])
+        for number in range(max(self._gaps_read, total - at.GAPS), total):
+            slot = at.M_GAP_LIST + number % at.GAPS * at.GAP_FIELDS
+            frame, milliseconds, cause = self.memory[slot : slot + at.GAP_FIELDS]
+            found.append(Gap(frame / self.rate_hz, CAUSES.get(int(cause), "unknown"), float(milliseconds)))
+        self._gaps_read = total
+        return found
+
+    @property
+    def non_finite(self) -> int:
+        """Samples that were replaced by silence."""
+        return int(self._counts[at.M_NON_FINITE])
+
+
+def _differentiator(rate_hz: int) -> NDArray[np.float64]:
+    """Taps of the derivative of a band-limited signal, per second: a Kaiser-windowed ideal differentiator.
+
+    Its phase is exact (the taps are odd about the middle) and its gain true within 0.05 % up to 0.9 of half the rate.
+    """
+    distance = np.arange(1, at.REACH + 1)
+    window = np.kaiser(2 * at.REACH + 1, KAISER_BETA)[at.REACH + 1 :]
+    half = rate_hz * np.where(distance % 2, 1.0, -1.0) / distance * window
+    return np.concatenate([-half[::-1], [0.0], half])

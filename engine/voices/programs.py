@@ -1,0 +1,267 @@
+"""Programs: what all voices of one source share, at one sample rate.
+
+A model whose decoder is linear becomes a bank of latents, and the string itself a solver; both are compiled and sound
+at once, at the device's own rate. Any other model is rendered ahead at the rate that it was trained at, and converted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from engine.kernels import layout as at
+from engine.models.base import StringModel
+from engine.models.dmd import DMD
+from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
+from engine.preset import PresetInfo
+from engine.pluck import FULL_SCALE_M
+from engine.reference import SplittingSolver, default_substeps
+from engine.sine_transform import synthesis_matrix, to_modes
+
+HEARD_SILENCE = 1e-6  # of a mode, of all: what the truth leaves out where it is heard is 120 dB down
+HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
+FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
+
+Array = NDArray[np.float64]
+Strike = Callable[[Tensor], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """See the module; the kernels read `memory`.
+
+    Attributes:
+        modes: latents of a bank, modes of a solver, 0 where samples are rendered.
+        start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
+        read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
+            scale.
+    """
+
+    kind: int
+    memory: Array
+    modes: int
+    rate_hz: int
+    grid_points: int
+    start: Strike
+    read: Callable[[Tensor], tuple[Array, Array]]
+
+    @property
+    def address(self) -> int:
+        return int(self.memory.ctypes.data)
+
+
+def bank_program(model: StringModel[object], info: PresetInfo, rate_hz: int) -> Program | None:
+    """The program of a model whose latents move by themselves and whose decoder is linear; None for any other."""
+    if isinstance(model, DMD) and model.configuration.input == "displacement":
+        return _dmd_program(model, info, rate_hz)
+    if isinstance(model, KoopmanIntegrated) and _is_bank(model):
+        return _integrated_program(model, info, rate_hz)
+    return None
+
+
+def _is_bank(model: KoopmanIntegrated) -> bool:
+    c = model.configuration
+    widths = (c.state_size, *c.eigenvalue_widths)
+    plain = model.multiplier is None and model.decoder_residual is None and c.input == "displacement"
+    return plain and max(widths) <= at.MOST_MODES and len(c.eigenvalue_widths) < 7
+
+
+@torch.no_grad()
+def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int) -> Program:
+    c, n = model.configuration, model.configuration.state_size
+    rates = model._rates()
+    units = model.energy_units if model.energy_units is not None else torch.ones(n, dtype=torch.float64)
+    rate_units = model._rate_units
+    if not isinstance(rate_units, Tensor):
+        rate_units = torch.full((2 * n,), float(rate_units), dtype=torch.float64)
+    network, at_zero, widths = np.zeros(0, np.float32), torch.zeros(2 * n), [0]
+    if model.g is not None:
+        at_zero = model.g(torch.zeros(n))
+        layers = [layer for layer in model.g if isinstance(layer, nn.Linear)]
+        widths = [n, *(layer.out_features for layer in layers)]
+        network = np.concatenate([_flat(layer) for layer in layers])
+    turn = rates.coupling[:, n:]
+    modulation = largest_m = torch.zeros(0, dtype=torch.float64)
+    if model.M_out is not None:
+        matrix = (model.M_out * model._modulation_units).double().view(2, n, 2, n)
+        modulation = matrix.permute(1, 3, 0, 2).contiguous()  # (of, by, gain or turn, of Re z² or of Im z²)
+        largest_m = modulation.abs().sum((2, 3)).amax(0)
+    change = torch.zeros(0, dtype=torch.float64)
+    if model.A_out is not None:
+        change = (model.A_out * model._modulation_units[:n]).double().T.contiguous()
+    ratio = info.rate_hz / rate_hz
+    header = {
+        at.P_RATIO: ratio,
+        at.P_SPACING: float(c.node_spacing),
+        at.P_LIMIT: model._gain_limit,
+        at.P_LOUDNESS: math.log(info.scale_m / FULL_SCALE_M),
+    }
+    counts = {
+        at.P_MODES: n,
+        at.P_SECOND_ORDER: int(c.second_order),
+        at.P_HIGHER: int(model.g is not None or c.adiabatic),
+        at.P_ADIABATIC: int(c.adiabatic),
+        at.P_LAYERS: len(widths) - 1 if model.g is not None else 0,
+        at.P_MODULATION: int(model.M_out is not None),
+        at.P_EARLY: math.ceil(SETTLED * c.node_spacing / ratio / at.QUANTUM) * at.QUANTUM,
+        **{at.P_WIDTHS + place: width for place, width in enumerate(widths)},
+    }
+    parts = (
+        rates.sigma,
+        rates.omega,
+        rates.coupling,
+        rates.coupling.abs().amax(1),
+        turn / rates.omega,
+        units,
+        rate_units.double(),
+        at_zero.double(),
+        torch.from_numpy(np.pad(network, (0, len(network) % 2)).view(np.float64)),
+        modulation,
+        largest_m,
+        change,
+    )
+    memory = _packed(at.P_HEADER, header, counts, dict(zip(range(at.P_OFFSETS, at.P_WIDTHS), parts, strict=True)))
+    weight, offset = model.decoder.weight.double(), model.decoder.bias.double()
+
+    def start(displacement_m: Tensor) -> tuple[Array, Array]:
+        with torch.inference_mode():
+            z = model.release((displacement_m[None] / info.scale_m).float()).origin[0].to(torch.complex128)
+        return z.abs().clamp(min=1e-300).log().numpy(), z.angle().numpy()
+
+    def read(weights: Tensor) -> tuple[Array, Array]:
+        scale = info.scale_m / FULL_SCALE_M
+        return (scale * weights.T @ weight).numpy(), (scale * offset @ weights).numpy()
+
+    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
+
+
+@torch.no_grad()
+def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
+    present = model.magnitude_log > -600
+    sigma, omega = -model.magnitude_log[present].double(), model.angle[present].double()
+    n = int(present.sum())
+    zeros = torch.zeros(n, dtype=torch.float64)
+    parts = [sigma, omega, torch.zeros(n, 2 * n, dtype=torch.float64), zeros, *(zeros[:0] for _ in range(8))]
+    header = {
+        at.P_RATIO: info.rate_hz / rate_hz,
+        at.P_SPACING: 1.0,
+        at.P_LIMIT: 1.0,
+        at.P_LOUDNESS: math.log(info.scale_m / FULL_SCALE_M),
+    }
+    memory = _packed(
+        at.P_HEADER, header, {at.P_MODES: n}, dict(zip(range(at.P_OFFSETS, at.P_WIDTHS), parts, strict=True))
+    )
+    real, imaginary = model.modes.double().chunk(2, dim=-1)
+    modes = torch.cat([real[:, present], -imaginary[:, present]], dim=-1)
+
+    def start(displacement_m: Tensor) -> tuple[Array, Array]:
+        with torch.inference_mode():
+            z = model.release((displacement_m[None] / info.scale_m).float()).origin[0, present].to(torch.complex128)
+        return z.abs().clamp(min=1e-300).log().numpy(), z.angle().numpy()
+
+    def read(weights: Tensor) -> tuple[Array, Array]:
+        return (info.scale_m / FULL_SCALE_M * weights.T @ modes).numpy(), np.zeros(weights.shape[1])
+
+    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
+
+
+def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
+    """The physics of a preset's string, with its modes, at any rate.
+
+    Args:
+        coarser: how many times fewer sub-steps than `default_substeps`.
+    """
+    n = info.modes
+    substeps = max(1, -(-default_substeps(info.string, n, rate_hz) // coarser))
+    solver = SplittingSolver(
+        info.string,
+        n,
+        rate_hz,
+        tension_modulated=info.tension_modulated,
+        substeps=substeps,
+        silence=HEARD_SILENCE,
+    )
+    flows, kicks, coupling, eta, steps, level_of, inverse = (part.numpy() for part in solver.constants)
+    levels, stages = flows.shape[:2]
+    padded = np.zeros((levels, stages))
+    padded[:, : stages - 1] = kicks
+    memory = _packed(
+        at.T_HEADER,
+        {at.T_SILENCE: HEARD_SILENCE, at.T_LOUDNESS: -math.log(FULL_SCALE_M)},
+        {at.T_MODES: n, at.T_STAGES: stages, at.T_LEVELS: levels},
+        {
+            at.T_FLOWS: flows,
+            at.T_KICKS: padded,
+            at.T_COUPLING: coupling,
+            at.T_ETA: eta,
+            at.T_SUBSTEPS: steps,
+            at.T_LEVEL_OF: level_of,
+            at.T_INVERSE: inverse,
+        },
+    )
+    synthesis = synthesis_matrix(info.grid_points, n)
+
+    def start(displacement_m: Tensor) -> tuple[Array, Array]:
+        return to_modes(displacement_m.double(), n).numpy(), np.zeros(n)
+
+    def read(weights: Tensor) -> tuple[Array, Array]:
+        found = (weights.T @ synthesis.T / FULL_SCALE_M).numpy()
+        return np.concatenate([found, np.zeros_like(found)], axis=1), np.zeros(len(found))
+
+    return Program(at.TRUTH, memory, n, rate_hz, info.grid_points, start, read)
+
+
+def rendered_program(info: PresetInfo, rate_hz: int) -> Program:
+    """For samples that are rendered ahead at the preset's own rate: a Kaiser-windowed sinc in `FILTER_PHASES` phases."""
+    ratio = info.rate_hz / rate_hz
+    cutoff = min(1.0, 1 / ratio)
+    phase = np.arange(FILTER_PHASES + 1)[:, None] / FILTER_PHASES
+    place = np.arange(-FILTER_TAPS + 1, FILTER_TAPS + 1)[None] - phase
+    window = np.i0(FILTER_BETA * np.sqrt(np.clip(1 - (place / FILTER_TAPS) ** 2, 0, 1))) / np.i0(FILTER_BETA)
+    table = cutoff * np.sinc(cutoff * place) * window
+    memory = _packed(
+        at.R_HEADER,
+        {at.R_RATIO: ratio},
+        {at.R_TAPS: FILTER_TAPS, at.R_PHASES: FILTER_PHASES},
+        {at.R_FILTER: np.concatenate([table, table[-1:]])},
+    )
+
+    def start(_displacement_m: Tensor) -> tuple[Array, Array]:
+        return np.zeros(0), np.zeros(0)
+
+    def read(weights: Tensor) -> tuple[Array, Array]:
+        return np.zeros((weights.shape[1], 0)), np.zeros(weights.shape[1])
+
+    return Program(at.RENDERED, memory, 0, rate_hz, info.grid_points, start, read)
+
+
+def _flat(layer: nn.Linear) -> NDArray[np.float32]:
+    """Bias, then weights by input, float32."""
+    bias = torch.zeros(layer.out_features) if layer.bias is None else layer.bias
+    return torch.cat([bias.detach(), layer.weight.detach().T.flatten()]).numpy().astype(np.float32)
+
+
+def _packed(
+    header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, Tensor | NDArray[np.generic]]
+) -> Array:
+    """One array of a header and its parts, whose places the header tells."""
+    arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
+    memory = np.zeros(header_slots + sum(len(array) for array in arrays))
+    counts = memory.view(np.int64)
+    for slot, real in reals.items():
+        memory[slot] = real
+    for slot, whole in wholes.items():
+        counts[slot] = whole
+    place = header_slots
+    for slot, array in zip(parts, arrays, strict=True):
+        counts[slot] = place
+        target = counts if array.dtype == np.int64 else memory
+        target[place : place + len(array)] = array
+        place += len(array)
+    return memory

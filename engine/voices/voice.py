@@ -1,0 +1,166 @@
+"""One pluck of a program, as it rings."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from engine.kernels import layout as at
+from engine.voices.ear import Ear
+from engine.voices.programs import Program
+
+ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade would swallow
+FADE_S = 0.020  # another source, another gain
+SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
+BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
+
+
+class Voice:
+    """Made and told by one thread, rendered by another: what is told is heard within a quantum.
+
+    Args:
+        displacement_m: as it is let go, (grid_points,), projected on the modes in use.
+        gain: with which it is heard, 0 for a source that is only kept ready.
+        seconds: of a rendered voice: how much room there is for its samples.
+    """
+
+    def __init__(
+        self, program: Program, displacement_m: Tensor, ear: Ear, gain: float = 1.0, seconds: float = 0.0,
+        source_rate_hz: int = 0,
+    ) -> None:
+        n = program.modes
+        rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS}.get(program.kind, 0)
+        self.program, self.ear = program, ear
+        self.memory = memory = np.zeros(_state(n) + rows * n)
+        self._counts = counts = memory.view(np.int64)
+        counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = program.kind, program.address, n
+        counts[at.POINTS], counts[at.VELOCITY] = len(ear.points), ear.pickup == "velocity"
+        memory[at.WANTED_GAIN] = memory[at.GAIN] = memory[at.GAIN_FROM] = memory[at.GAIN_TO] = gain
+        counts[at.FADE_FRAMES] = round(FADE_S * program.rate_hz)
+        counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
+        memory[at.SILENT] = SILENT_DB * math.log(10) / 20
+        peak = float(displacement_m.abs().max())
+        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / ear.full_scale * (1.0 if not counts[at.VELOCITY] else 60.0)
+        first, second = program.start(displacement_m)
+        place = _state(n)
+        memory[place : place + n], memory[place + n : place + 2 * n] = first, second
+        self._samples: NDArray[np.float32] | None = None
+        if program.kind == at.TRUTH:
+            counts[at.MOVING] = n
+        elif program.kind == at.BANK:
+            from engine.kernels.bank import strike
+
+            strike(memory, program.memory, np.empty(at.SCRATCH_SLOTS))
+        else:
+            length = max(1, math.ceil(seconds * source_rate_hz) + 1)
+            self._samples = np.zeros((length, len(ear.points)), np.float32)
+            counts[at.SAMPLES], counts[at.LENGTH] = self._samples.ctypes.data, length
+        self._set_weights(0, ear)
+
+    @property
+    def address(self) -> int:
+        return int(self.memory.ctypes.data)
+
+    @property
+    def over(self) -> bool:
+        """Whether it sounds no more and its memory may go."""
+        return bool(self._counts[at.STATE] in (at.OVER, at.RUNAWAY))
+
+    @property
+    def ran_away(self) -> bool:
+        return bool(self._counts[at.STATE] == at.RUNAWAY)
+
+    @property
+    def sounding(self) -> bool:
+        return bool(self._counts[at.STATE] == at.SOUNDING)
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been ringing, as far as the device was given it."""
+        return float(self._counts[at.FRAME]) / self.program.rate_hz
+
+    @property
+    def starved_s(self) -> float:
+        """How long it had nothing to play."""
+        return float(self._counts[at.STARVED]) / self.program.rate_hz
+
+    @property
+    def struck_to_began_s(self) -> float | None:
+        """From the gesture to the callback that gave its first samples to the device; None until then."""
+        if not self._counts[at.FRAME] or not self.memory[at.STRUCK_S]:
+            return None
+        return float(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
+
+    @property
+    def level_db(self) -> float:
+        """Of the loudest latent, or all of the string, in dB of full scale."""
+        return float(self.memory[at.LOUDNESS]) * 20 / math.log(10)
+
+    def set_struck(self, time_s: float) -> None:
+        """Notes when the gesture was, on the device's clock."""
+        self.memory[at.STRUCK_S] = time_s
+
+    def set_gain(self, gain: float) -> None:
+        """Fades to another gain."""
+        self.memory[at.WANTED_GAIN] = gain
+
+    def release(self, seconds: float) -> None:
+        """Fades to silence and ends; a release under way goes on."""
+        if self._counts[at.RELEASE] == 0:
+            self._counts[at.RELEASE] = max(1, round(seconds * self.program.rate_hz))
+
+    def listen(self, ear: Ear) -> bool:
+        """Fades to other points. False where it cannot now: a fade is under way; ask again.
+
+        One that is rendered ahead, and one that is picked up otherwise, stay as they are: True.
+        """
+        same = (len(ear.points), ear.pickup) == (len(self.ear.points), self.ear.pickup)
+        if self.program.kind == at.RENDERED or not same or ear == self.ear:
+            return True
+        if self._counts[at.NEXT_WEIGHTS]:
+            return False
+        self._set_weights(1, ear)
+        self._counts[at.WEIGHTS_FADED] = 0
+        self._counts[at.NEXT_WEIGHTS] = 1
+        self.ear = ear
+        return True
+
+    def append(self, samples: NDArray[np.floating]) -> None:
+        """More of what a rendered voice reads, (frames, points) of full scale at its own rate."""
+        assert self._samples is not None
+        ready = int(self._counts[at.READY])
+        count = min(len(samples), len(self._samples) - ready)
+        self._samples[ready : ready + count] = samples[:count]
+        self._counts[at.READY] = ready + count
+
+    @property
+    def room(self) -> int:
+        """Samples that a rendered voice still lacks."""
+        return 0 if self._samples is None else len(self._samples) - int(self._counts[at.READY])
+
+    def end_here(self) -> None:
+        """A rendered voice has no more samples than it was given."""
+        self._counts[at.LENGTH] = max(1, self._counts[at.READY])
+
+    def skip(self, seconds: float, mixer_memory: NDArray[np.float64]) -> None:
+        """Before it is handed over: lets it ring unheard for so long."""
+        from engine.kernels.voice import forward
+
+        forward(self.memory, mixer_memory, round(seconds * self.program.rate_hz))
+        self._counts[at.ATTACK] = 0
+        self.memory[at.GAIN] = self.memory[at.GAIN_FROM] = 0.0
+
+    def _set_weights(self, which: int, ear: Ear) -> None:
+        n = self.program.modes
+        weights, bias = self.program.read(ear.weights(self.program.grid_points))
+        for point in range(len(ear.points)):
+            place = at.HEADER + (which * 2 + point) * 2 * n
+            self.memory[place : place + 2 * n] = weights[point]
+            self.memory[at.HEADER + 8 * n + which * 2 + point] = bias[point]
+
+
+def _state(modes: int) -> int:
+    return at.HEADER + 8 * modes + 4 + 6 * at.QUANTUM
