@@ -5,34 +5,37 @@ A choice is saved once the device plays with it: one that was refused must not l
 
 from __future__ import annotations
 
+import statistics
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
-from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, PlayerStatus, ProblemKind, output_devices
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, ProblemKind, Sound, SoundStatus, output_devices
 from app.main_window import MainWindow
 from app.settings import Buffer, DeviceChoice, SoundChoice
 from app.views.audio_dialog import AudioDialog, AudioState
 
 if TYPE_CHECKING:
+    from app.playing import Notes
     from app.rendering import Take
 
-# of sound ahead: medium has room for a busy interpreter, and still a prompt pluck
-LATENCY_S: dict[Buffer, float] = {"low": 0.015, "medium": 0.05, "high": 0.15}
+# of the device's own buffer; sound waits for nothing else
+LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
 EVERY = 30  # moments between two looks at the list of devices
 
 
 class AudioControl(QObject):
     """`device` and `sound` are to be saved."""
 
-    def __init__(self, window: MainWindow, player: Player, device: DeviceChoice | None, sound: SoundChoice) -> None:
+    def __init__(self, window: MainWindow, output: Sound, device: DeviceChoice | None, sound: SoundChoice) -> None:
         super().__init__(window)
         self.device, self.sound = device, sound
         self._wish = (device, sound)
-        self._window, self._player = window, player
+        self._window, self._output = window, output
         self._changes = 0
         self._notice = ""
-        self._underruns_before = 0  # the user's zero
+        self._latencies_s: tuple[float, ...] = ()
+        self._gaps_before = 0  # the user's zero
         self._listed: list[DeviceChoice] | None = None
         self._moments = 0
         self._dialog: AudioDialog | None = None
@@ -42,7 +45,7 @@ class AudioControl(QObject):
         """Opens what is wished for."""
         device, sound = self._wish
         self._changes += 1
-        self._player.open(
+        self._output.open(
             AudioDevice(device.name, device.host_api) if device else None,
             LATENCY_S.get(sound.buffer, LATENCY_S["medium"]),
             sound.rate_hz,
@@ -56,11 +59,11 @@ class AudioControl(QObject):
             self._window.notices.withdraw(self._notice)  # one word on the sound at a time
         self._notice = str(problem)
         if problem.kind is not ProblemKind.STALLED:
-            device = self._player.status().device
+            device = self._output.status().device
             self._notice += f" “{device.name}” plays on." if device else " The app goes on without sound."
         self._window.notices.tell(self._notice, problem.detail)
 
-    def show(self, status: PlayerStatus, take: Take | None) -> None:
+    def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
         """The present state, sixty times a second."""
         if status.problem is None:
             if self._notice:
@@ -68,13 +71,12 @@ class AudioControl(QObject):
                 self._notice = ""
             if status.changes_done == self._changes and status.device is not None:
                 self.device, self.sound = self._wish
-        if status.underruns < self._underruns_before:  # another stream
-            self._underruns_before = 0
+        self._latencies_s = notes.latencies_s
         if take is not None:
             self._show_badge(status, take.info.rate_hz)
         if self._dialog is not None and self._dialog.isVisible():
             self._moments += 1
-            self._dialog.show_state(_state(status, self._underruns_before))
+            self._dialog.show_state(self._state(status))
             if self._moments % EVERY == 0 and self._listed is not None:
                 self._list_devices()
 
@@ -83,12 +85,12 @@ class AudioControl(QObject):
             self._dialog = dialog = AudioDialog(self._window)
             dialog.choice_made.connect(self._choose)
             dialog.rescan_asked.connect(lambda: self.open(rescan=True))
-            dialog.tone_asked.connect(self._player.sound_tone)
-            dialog.underruns_reset.connect(self._reset_underruns)
+            dialog.tone_asked.connect(self._output.sound_tone)
+            dialog.gaps_reset.connect(self._reset_gaps)
         self._listed = None
         self._list_devices()
         self._dialog.show_sound(self._wish[1])
-        self._dialog.show_state(_state(self._player.status(), self._underruns_before))
+        self._dialog.show_state(self._state(self._output.status()))
         self._dialog.show()
         self._dialog.raise_()
 
@@ -96,14 +98,14 @@ class AudioControl(QObject):
         self._wish = (device, sound)
         self.open()
 
-    def _reset_underruns(self) -> None:
-        self._underruns_before = self._player.status().underruns
+    def _reset_gaps(self) -> None:
+        self._gaps_before = len(self._output.status().gaps)
 
     def _list_devices(self) -> None:
         """Fills the list when it has changed. Without PortAudio it is asked once only: asking takes long then."""
         first = self._listed is None
         try:
-            found = output_devices(rescan=first and self._player.status().device is None)
+            found = output_devices(rescan=first and self._output.status().device is None)
         except AudioUnavailable:
             found, listed = [], None
         else:
@@ -112,7 +114,7 @@ class AudioControl(QObject):
             self._dialog.show_devices(listed or [], self._wish[0])
         self._listed = listed
 
-    def _show_badge(self, status: PlayerStatus, model_rate_hz: int) -> None:
+    def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
         label = self._window.rate_label
         model = f"{model_rate_hz / 1000:g}"
         fault = status.device is None
@@ -127,12 +129,15 @@ class AudioControl(QObject):
             label.setProperty("fault", fault)
             label.style().polish(label)
 
-
-def _state(status: PlayerStatus, underruns_before: int) -> AudioState:
-    device = status.device
-    return AudioState(
-        f"“{device.name}” ({device.host_api})" if device else "",
-        f"{status.rate_hz / 1000:g} kHz, latency {1000 * status.latency_s:.0f} ms",
-        status.problem or "",
-        status.underruns - underruns_before,
-    )
+    def _state(self, status: SoundStatus) -> AudioState:
+        device, gaps = status.device, status.gaps[self._gaps_before :]
+        facts = f"{status.rate_hz / 1000:g} kHz, buffer {1000 * status.latency_s:.0f} ms"
+        if self._latencies_s:
+            facts += f", key to device {1000 * statistics.median(self._latencies_s):.1f} ms (measured)"
+        return AudioState(
+            f"“{device.name}” ({device.host_api})" if device else "",
+            facts,
+            status.problem or "",
+            tuple(f"{gap.time_s:.1f} s: {gap.cause}" for gap in gaps),
+            status.load,
+        )

@@ -18,7 +18,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from app.about import about_text
 from app.abx.subject import subject_of
 from app.appearance import Appearance
-from app.audio import AudioProblem, Player
+from app.audio import AudioProblem, Sound
 from app.audio_control import AudioControl
 from app.dropping import receive
 from app.history import History
@@ -31,7 +31,7 @@ from app.performance import Performance
 from app.preset_desk import PresetDesk
 from app.session import Session
 from app.settings import Settings, save_settings
-from app.slots import gain_db, levels, missing_presets
+from app.slots import missing_presets, mix_of
 from app.views.about_dialog import AboutDialog
 from app.views.abx_dialog import AbxDialog
 from app.views.export_dialog import ExportDialog
@@ -43,9 +43,10 @@ from app.views.string_view import StringView
 from engine.preset import SHIPPED
 
 FRAME_MS = 16
-STARTING_TICKS = 9  # at most so many pictures are left out at a time for a pluck that begins,
-GIVE_WAY_TICKS = 3  # and for one whose rendering is hardly ahead
-COMFORTABLE_S = 0.3  # ahead of what is heard
+IDLE_MS = 100  # between two looks while nothing moves
+LIVELY_S = 1.0  # after the last movement pictures go on at full pace
+METER_FALL_DB_PER_S = 20.0
+METER_FLOOR_DB = -120.0
 ProblemListener = Callable[[AudioProblem], None]
 
 
@@ -63,7 +64,7 @@ class Controller(QObject):
         window: MainWindow,
         settings: Settings,
         settings_path: Path,
-        make_player: Callable[[ProblemListener], Player] = Player,
+        make_sound: Callable[[ProblemListener], Sound] = Sound,
     ) -> None:
         super().__init__(window)
         self.window = window
@@ -71,13 +72,15 @@ class Controller(QObject):
         self._settings = settings
         self._settings_path = settings_path
         self._audio_mail = _AudioMail()
-        self.player = make_player(self._audio_mail.told.emit)
-        self.audio = AudioControl(window, self.player, settings.device, settings.sound)
+        self.sound = make_sound(self._audio_mail.told.emit)
+        self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
         self.appearance = Appearance(window, settings.look)
         self._last_tick_s = time.monotonic()
-        self._ticks_given = 0
-        self._pictures_held = False
-        self._abx: AbxDialog | None = None  # while it is open, the player is its own
+        self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._tick)
+        self._lively_until_s = 0.0
+        self._peak_db = METER_FLOOR_DB
+        self._abx: AbxDialog | None = None  # while it is open, the sound is its own
         self._help: HelpDialog | None = None
         self.library = Library([])
         problems = self.library.refresh()
@@ -85,7 +88,7 @@ class Controller(QObject):
             self.session, self.library, window.presets, PresetBrowser(window), settings.favourites
         )
         self.panels = fill(window, self.session, self.library)
-        self.performance = Performance(window, self.session, self.library, self.player, self.panels)
+        self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
         window.order_tabs()
         self._connect()
         if self.entry is None and (first := self.library.first()):
@@ -95,17 +98,16 @@ class Controller(QObject):
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session)
         self._connect_history()
-        self.instruments = Instruments(window, self.session, self.library, settings.midi)
-        self.instruments.plucked.connect(self.pluck)
+        self.instruments = Instruments(window, self.session, self.library, settings.midi, self.performance.strike)
+        self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
         for problem in problems:
             self.window.notices.tell(problem)
-        self._choices_shown(frozenset(type(self.session.choices).model_fields))
         self.audio.open()
-        self.performance.render()
-        self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self._tick)
+        everything = frozenset(type(self.session.choices).model_fields)
+        self.performance.choices_changed(everything)
+        self._choices_shown(everything)
         self._timer.start()
 
     # Connections
@@ -114,7 +116,7 @@ class Controller(QObject):
         window, session = self.window, self.session
         session.changed.connect(self._choices_changed)
         for panel in self.panels:
-            panel.seek_asked.connect(self.player.seek)
+            panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)
             panel.told.connect(window.notices.tell)
         self.presets.pluck_asked.connect(self.pluck)
@@ -161,12 +163,13 @@ class Controller(QObject):
     # Intents
 
     def pluck(self) -> None:
-        self.performance.pluck()
-        self._hold_pictures(bool(self.performance.strikes.awaited))
+        if self._abx is None:
+            self.performance.pluck()
 
     def play_or_stop(self) -> None:
-        self.performance.play_or_stop()
-        self.window.transport.show_playing(self.player.status().playing)
+        if self._abx is None:
+            self.performance.play_or_stop()
+            self.window.transport.show_playing(self.performance.playing)
 
     def export(self) -> None:
         choices = self.session.choices
@@ -186,18 +189,18 @@ class Controller(QObject):
 
     def listening_test(self) -> None:
         """Opens the ABX test on what is on stage; until it is closed, the player belongs to it."""
-        entry, stage = self.entry, self.performance
-        if entry is None or stage.track is None or not stage.ready:
-            self.window.notices.tell("The listening test needs a sound: wait until the pluck is rendered.")
+        entry = self.entry
+        if entry is None or entry.unplayable:
+            self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
             subject = subject_of(entry, self.session.choices)
         except OSError as error:
             self.window.notices.tell(f"{entry.path} cannot be read ({error.strerror}).")
             return
-        self._abx = AbxDialog(self.player, subject, self._settings.abx, self.window)
+        self.performance.stop()
+        self._abx = AbxDialog(self.sound, subject, self._settings.abx, self.performance.render_sound, self.window)
         self._abx.finished.connect(self._listening_test_ended)
-        stage.lend_player(self._abx.set_track)
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
@@ -205,7 +208,6 @@ class Controller(QObject):
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
         dialog.deleteLater()
-        self.performance.take_player_back()
 
     def show_help(self) -> None:
         if self._help is None:
@@ -254,12 +256,12 @@ class Controller(QObject):
         for panel in self.panels:
             panel.close()
         self.performance.close()
-        self.player.close()
+        self.sound.close()
 
     # Session → everything
 
     def _choices_changed(self, names: frozenset[str]) -> None:
-        self.performance.choices_changed()  # first of all: a pluck may be waiting for it
+        self.performance.choices_changed(names)
         self._choices_shown(names)
 
     def _choices_shown(self, names: frozenset[str]) -> None:
@@ -272,45 +274,45 @@ class Controller(QObject):
         for panel in self.panels:
             panel.choices_changed(names)
         window.show_solo(choices.solo)
-        if names & {"a", "b", "heard"}:
-            self.performance.select()
-        if names & {"level_match", "difference_gain_db"}:
-            self.player.set_levels(levels(choices))
-        if "loop" in names:
-            self.player.set_loop(choices.loop)
         if "volume_db" in names:
-            self.player.set_volume_db(choices.volume_db)
+            self.sound.set_volume_db(choices.volume_db)
+        self._wake()
 
-    def _hold_pictures(self, on: bool) -> None:
-        """Nothing is painted while a struck pluck's first block is rendered: both need the interpreter."""
-        if on != self._pictures_held:
-            self._pictures_held = on
-            for panel in self.panels:
-                panel.view.setUpdatesEnabled(not on)
+    def _wake(self) -> None:
+        """Something may move: pictures at full pace for a while."""
+        self._lively_until_s = time.monotonic() + LIVELY_S
+        if self._timer.interval() != FRAME_MS:
+            self._timer.setInterval(FRAME_MS)
 
     # Sixty times a second
 
     def _tick(self) -> None:
-        status = self.player.status()
-        starting, hurried = self.performance.starting, self.performance.hurried(status, COMFORTABLE_S)
-        if self._ticks_given < (STARTING_TICKS if starting else GIVE_WAY_TICKS if hurried else 0):
-            self._ticks_given += 1
-            return  # whoever renders it needs the interpreter more
-        self._ticks_given = 0
-        self._hold_pictures(False)
         now_s = time.monotonic()
         elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        window = self.window
-        window.transport.show_playing(status.playing)
-        hidden = self._abx is not None  # a level would give away what is heard
-        window.transport.meter.show_level(-math.inf if hidden else status.peak_db, status.limiting and not hidden)
-        self.performance.rate_shown(status.rate_hz)
-        self.performance.watch(status)
-        choices, take, track = self.session.choices, self.performance.take, self.performance.track
-        window.transport.slots.show_gains({s: gain_db(choices, track, getattr(choices, s)) for s in SLOTS})
-        self.audio.show(status, take)
-        position_s = min(status.position_s, take.seconds) if take is not None else 0.0
-        moment = Moment(take, position_s, status.playing, elapsed_s)
+        window, performance, status = self.window, self.performance, self.sound.status()
+        performance.tick()
+        playing, take = performance.playing, performance.take
+        window.transport.show_playing(playing)
+        self._show_level(elapsed_s)
+        mix, choices = mix_of(self.session.choices), self.session.choices
+        window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
+        self.audio.show(status, performance.notes, take)
+        moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
         for panel in self.panels:
             if panel.view.isVisible():
                 panel.show_moment(moment)
+        if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
+            self._lively_until_s = now_s + LIVELY_S
+        wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS
+        if self._timer.interval() != wanted_ms:
+            self._timer.setInterval(wanted_ms)
+
+    def _show_level(self, elapsed_s: float) -> None:
+        mixer = self.sound.mixer
+        peak, reduction_db = mixer.take_peak(), mixer.take_reduction_db()
+        fallen_db = self._peak_db - METER_FALL_DB_PER_S * elapsed_s
+        self._peak_db = max(20 * math.log10(peak) if peak > 0 else METER_FLOOR_DB, fallen_db, METER_FLOOR_DB)
+        hidden = self._abx is not None  # a level would give away what is heard
+        self.window.transport.meter.show_level(
+            -math.inf if hidden else self._peak_db, reduction_db > 0.01 and not hidden
+        )

@@ -2,33 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 
 from app.keyboard import KeyPress, Reach, play
 from app.library import Library
 from app.main_window import MainWindow
 from app.midi import MidiChoices
 from app.midi_control import MidiControl
-from app.session import Session
+from app.session import Choices, Session
 from app.views.playing_keys import PlayingKeys
 
 
 class Instruments(QObject):
-    """`plucked` after new values are chosen; `told` is for the user."""
+    """`played` after a note was struck and the session knows it; `told` is for the user.
 
-    plucked = Signal()
+    A note goes straight to `strike`, in the thread of its gesture; the session, and with it the window, is told when
+    the window has time.
+    """
+
+    played = Signal()
     told = Signal(str)
 
-    def __init__(self, window: MainWindow, session: Session, library: Library, midi: MidiChoices) -> None:
+    _struck = Signal(dict)  # from any thread
+
+    def __init__(
+        self,
+        window: MainWindow,
+        session: Session,
+        library: Library,
+        midi: MidiChoices,
+        strike: Callable[[Choices], object],
+    ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
+        self._strike = strike
+        self._told: dict[str, Any] = {}  # of notes, and not in the session yet
+        self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
         self._keys.pressed.connect(self._press)
-        self.midi = MidiControl(midi, lambda: self.reach, lambda: library.names, self)
-        self.midi.performed.connect(self.perform)
+        self.midi = MidiControl(
+            midi, lambda: self.reach, lambda: library.names, lambda changes: self.perform(changes, True), self
+        )
+        self.midi.performed.connect(lambda changes: self.perform(changes, False))
         self.midi.told.connect(self.told)
         window.midi_asked.connect(lambda: self.midi.show_dialog(window))
 
@@ -46,10 +65,20 @@ class Instruments(QObject):
         return Reach.of(entry.info if entry else None)
 
     def perform(self, changes: dict[str, Any], plucks: bool) -> None:
-        """New values of `Choices`, and a pluck."""
-        self._session.update(**changes)
+        """New values of `Choices`, and a pluck. Any thread."""
         if plucks:
-            self.plucked.emit()
+            self._strike(self._session.choices.model_copy(update={**self._told, **changes}))
+            self._told = {**self._told, **changes}
+            self._struck.emit(changes)
+        else:
+            self._session.update(**changes)
+
+    def _tell_session(self, changes: dict[str, Any]) -> None:
+        """Once for all notes that were struck meanwhile."""
+        told, self._told = self._told, {}
+        if told:
+            self._session.play(**told)
+            self.played.emit()
 
     def _press(self, press: KeyPress) -> None:
         played = play(press, self.reach, self._session.choices.amplitude_mm)

@@ -24,9 +24,6 @@ from app.views.theme import apply_theme
 if TYPE_CHECKING:
     from app.controller import Controller
 
-# The callback and what feeds it must get the interpreter from the picture soon, and then keep it for a whole block.
-SWITCH_INTERVAL_S = 0.001
-
 
 class _Start(QObject):
     """Loads the engine in a thread of its own once the window is painted, then brings the window to life."""
@@ -85,7 +82,6 @@ def load_engine() -> None:
 
 def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
     """Opens the app and returns its exit status when it is closed. `watch` is given the window before it is shown."""
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
     gc.disable()  # until `collect_between_events`: nothing is thrown away before
     return_large_blocks()
     path = settings_file()

@@ -1,29 +1,34 @@
 """MIDI in the window: the input's messages become what the string does, and the dialog what is remembered.
 
-Messages come in mido's thread and reach the window's thread through a queued signal.
+Messages come in mido's thread. Notes are played there, without the window; controllers reach the window's thread
+through a queued signal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.keyboard import Reach
-from app.midi import TURNED, Control, Message, MidiChoices, meaning_of
+from app.midi import TURNED, Control, Message, MidiChoices, Note, meaning_of
 from app.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
 from app.views.midi_dialog import MidiDialog
 
 
 class MidiControl(QObject):
-    """`performed` asks for new values of `Choices` and whether the string is plucked; `told` is for the user.
+    """`performed` asks for new values of `Choices`; `told` is for the user.
+
+    Args:
+        play: plucks with new values of `Choices`; called in mido's thread.
 
     Attributes:
         choices: what is to be remembered.
     """
 
-    performed = Signal(dict, bool)
+    performed = Signal(dict)
     told = Signal(str)
     _received = Signal(object)  # emitted in mido's thread
 
@@ -32,6 +37,7 @@ class MidiControl(QObject):
         choices: MidiChoices,
         reach: Callable[[], Reach],
         presets: Callable[[], list[str]],
+        play: Callable[[dict[str, Any]], None],
         parent: QObject | None = None,
         load: Callable[[], Backend] = load_backend,
     ) -> None:
@@ -39,10 +45,11 @@ class MidiControl(QObject):
         self.choices = choices
         self._reach = reach
         self._presets = presets
+        self._play = play
         self._learning: str | None = None  # the field that the next controller is taught
         self._dialog: MidiDialog | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
-        self.input = MidiInput(self._received.emit, load)
+        self.input = MidiInput(self._receive, load)
 
     def start(self) -> None:
         """Opens the remembered input, if any; says why it cannot."""
@@ -108,12 +115,20 @@ class MidiControl(QObject):
         self.choices = choices
         self._show_choices()
 
-    # Messages, in the window's thread
+    # Messages
+
+    def _receive(self, message: Message) -> None:
+        """In mido's thread. A note is played at once; all else waits for the window."""
+        if isinstance(message, Note):
+            meaning = meaning_of(message, self.choices, self._reach(), self._presets())
+            self._play(meaning.changes)
+        else:
+            self._received.emit(message)
 
     def _answer(self, message: Message) -> None:
         if self._learning is not None and isinstance(message, Control):
             field, self._learning = self._learning, None
             self._remember(self.choices.learned(field, message.controller))
         meaning = meaning_of(message, self.choices, self._reach(), self._presets())
-        if meaning.changes or meaning.plucks:
-            self.performed.emit(meaning.changes, meaning.plucks)
+        if meaning.changes:
+            self.performed.emit(meaning.changes)

@@ -1,60 +1,77 @@
-"""The life of a pluck: asked for, rendered, heard, shown, measured; and the next one that takes its place.
+"""The pluck that is played and the pluck that is shown.
 
-Everything here runs in the window's thread, but for a struck pluck's first sound (`app/strikes.py`).
+A gesture strikes a note, which sounds at once; the picture follows: the render worker makes the motion of the same
+pluck, and the views show it at the note's own time. Everything here runs in the window's thread, but for `strike`.
 """
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
-from app.audio import Player, PlayerStatus, Track
+from app.audio import Sound
 from app.library import Library, PresetEntry
 from app.main_window import MainWindow
 from app.panels import Panel, StringPanel
+from app.playing import Note, Notes, Sources, Stroke
 from app.preset_words import percent
 from app.render_mail import RenderMail
 from app.rendering import RenderRequest, RenderWorker, Take
-from app.session import Session
+from app.session import Choices, Session
 from app.silence import why_ran_away
-from app.slots import render_request
-from app.strikes import MotionKey, Strikes, motion_key
+from app.slots import ear_of, mix_of, render_request, stroke_of
 from engine.metrics import ErrorSums
+from engine.pluck import Pluck
 
-AT_FIRST_S = 0.3  # of a pluck, in which the window draws all of its views anew
+MotionKey = tuple[str, Pluck, int]  # the preset's name, the pluck, the number of frames
+LOOP_AHEAD_S = 0.5  # the next turn of a loop is handed over so long before it begins
+EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
+MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
-HearTrack = Callable[[Track], None]
+
+def motion_key(take: Take) -> MotionKey:
+    """What tells the motion of a take from others."""
+    return take.preset_name, take.pluck, take.frames
+
+
+@dataclass
+class _Shown:
+    """What the views show: a motion, and the note that says how far it is; None: it stands at `parked_s`."""
+
+    take: Take | None = None
+    note: Note | None = None
+    parked_s: float = 0.0
 
 
 class Performance(QObject):
-    """What is on stage, and the render worker that puts it there.
-
-    Attributes:
-        take, track: what is shown, and its sound.
-    """
+    """See the module. `notes` may be told from any thread."""
 
     def __init__(
-        self, window: MainWindow, session: Session, library: Library, player: Player, panels: Sequence[Panel]
+        self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
     ) -> None:
         super().__init__(window)
-        self.take: Take | None = None
-        self.track: Track | None = None
-        self.strikes = Strikes(player, lambda: session.source_heard)
-        self._window, self._session, self._library, self._player = window, session, library, player
+        self._window, self._session, self._library, self._sound = window, session, library, sound
         self._panels = panels
         self._string = next(panel for panel in panels if isinstance(panel, StringPanel))
         self._asked: RenderRequest | None = None
-        self._play_when_ready = False  # the next take shall sound as soon as it is there
-        self._borrower: HearTrack | None = None
-        mail = self._mail = RenderMail(self.strikes)
+        self._shown = _Shown()
+        self._latest: Note | None = None  # struck last
+        self._next_turn: Note | None = None  # of the loop, handed over and waiting for its frame
+        self._waiting_words = ""
+        mail = self._mail = RenderMail()
         mail.started.connect(self._take_started)
-        mail.replaced.connect(self._track_replaced)
         mail.finished.connect(self._take_finished)
         mail.other_refused.connect(self._other_refused)
         mail.failed.connect(self._render_failed)
-        self._worker = RenderWorker(mail)
+        mail.refused.connect(self._window.notices.tell)
+        self._sources = Sources()
+        self.notes = Notes(sound, self._sources, mail.refused.emit)
+        self._worker = RenderWorker(mail, self._sources.load)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -62,118 +79,184 @@ class Performance(QObject):
         return self._library.find(self._session.choices.preset)
 
     @property
-    def ready(self) -> bool:
-        """Whether what is on stage is what was chosen."""
-        return self.take is not None and motion_key(self.take) == self._wanted_key()
+    def take(self) -> Take | None:
+        """The motion that is shown."""
+        return self._shown.take
 
     @property
-    def starting(self) -> bool:
-        """Whether a pluck waits for its first sound, or has begun and is not on stage yet."""
-        return self._play_when_ready or bool(self.strikes.awaited)
+    def ready(self) -> bool:
+        """Whether what is shown is what was chosen."""
+        return self.take is not None and motion_key(self.take) == self._key(self._session.choices)
 
-    def hurried(self, status: PlayerStatus, comfortable_s: float) -> bool:
-        """Whether what is on stage is heard while little more of it is rendered."""
-        track = self.track
-        if track is None or track.complete or not status.playing:
-            return False
-        return track.ready_frames / track.rate_hz < status.position_s + comfortable_s
+    @property
+    def playing(self) -> bool:
+        """Whether anything rings that has not been told to end."""
+        return self.notes.ringing > 0
 
-    def watch(self, status: PlayerStatus) -> None:
-        """Says so where the playhead waits for rendering: the sound has a gap then."""
-        if status.waiting and status.position_s > AT_FIRST_S and self.track is not None and not self.track.complete:
-            self._window.error_label.setText("rendering, slower than it sounds: gaps …")
+    @property
+    def position_s(self) -> float:
+        """Of what is shown: how far what is heard of it is now."""
+        shown = self._shown
+        if shown.take is None:
+            return 0.0
+        heard_s = shown.parked_s
+        if shown.note is not None:
+            heard_s = shown.note.seconds - self._sound.mixer.output_latency_s
+        return min(max(heard_s, 0.0), shown.take.seconds)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the playhead moves."""
+        note, take = self._shown.note, self._shown.take
+        return note is not None and take is not None and not note.over and note.seconds < take.seconds
+
+    @property
+    def settled(self) -> bool:
+        """Whether the motion that is shown is whole, so that views may rest."""
+        return self.take is None or self.take.complete
+
+    @property
+    def match(self) -> Mapping[str, float] | None:
+        """The gains that bring the sources of the latest note to one level, once they are known."""
+        return None if self._latest is None else self._latest.match
 
     # Intents
 
+    def strike(self, choices: Choices) -> Note | None:
+        """Lets the string go as `choices` say, beside those that ring. From any thread; the picture is told later."""
+        entry = self._library.find(choices.preset)
+        if entry is None or entry.unplayable:
+            return None
+        note = self.notes.strike(stroke_of(choices, entry.path, self._library))
+        self._latest = note
+        return note
+
     def pluck(self) -> None:
-        """Lets the string go: from the start, with sound, beside the plucks that still ring."""
-        if not self.ready or self.track is None:
-            self._play_when_ready = True  # the rendering is on its way, and begins to sound when it starts
-            if (key := self._wanted_key()) is not None:
-                self.strikes.expect(key)
-            self._worker.strike()
-            return
-        self._worker.strike()
-        if self._load(self.track, ring=True):
-            self._begin()
+        """Lets the string go as it is chosen."""
+        self.strike(self._session.choices)
+        self.follow()
+
+    def follow(self) -> None:
+        """Shows the latest note, where its motion is there; otherwise when it comes."""
+        latest = self._latest
+        if self.ready and latest is not None and self._is_of(latest, self._session.choices):
+            self._shown.note, self._shown.parked_s = latest, 0.0
 
     def play_or_stop(self) -> None:
-        if self._player.status().playing:
-            self._play_when_ready = False
-            self.strikes.forget()
-            self._player.stop()
+        if self.playing:
+            self.stop()
         else:
             self.pluck()
 
+    def stop(self) -> None:
+        """Everything fades out; the playhead stays."""
+        self._forget_turn()
+        self._shown.parked_s = self.position_s
+        self._shown.note = None
+        self.notes.stop()
+
+    def seek(self, position_s: float) -> None:
+        """Moves the playhead; what rings goes on from there alone."""
+        if self.take is None:
+            return
+        position_s = min(max(position_s, 0.0), self.take.seconds)
+        self._forget_turn()
+        self._shown.parked_s = position_s
+        if self.playing and (stroke := self._stroke()) is not None:
+            self._latest = self._shown.note = self.notes.strike(stroke, from_s=position_s, alone=True)
+
     def render(self) -> None:
-        """Asks for what is chosen."""
-        self._asked = self._request()
+        """Asks for the motion of what is chosen."""
+        entry = self.entry
+        self._asked = None if entry is None else render_request(self._session.choices, entry.path, self._library)
         if self._asked is None:
             self._window.notices.tell("No preset was found: train one, or get the presets again.")
-        else:
-            self._worker.submit(self._asked)
+            return
+        self.notes.prepare(self._asked.preset, *self._asked.others)
+        self._worker.submit(self._asked)
 
-    def choices_changed(self) -> None:
-        """Asks anew where something else is wanted."""
-        asked, request = self._asked, self._request()
-        if request is not None and request != asked:
-            if not request.same_motion(asked) and not self._string.drawing:
-                self._play_when_ready |= self._player.status().playing
+    def choices_changed(self, names: frozenset[str]) -> None:
+        """Tells the notes what concerns them, and asks for another motion where another is chosen."""
+        choices, entry = self._session.choices, self.entry
+        if names & MIX_FIELDS:
+            self.notes.set_mix(mix_of(choices))
+        if names & EAR_FIELDS:
+            self.notes.listen(ear_of(choices))
+        if "loop" in names and not choices.loop:
+            self._forget_turn()
+        if entry is not None and render_request(choices, entry.path, self._library) != self._asked:
             self.render()
+        self.follow()
 
-    def rate_shown(self, rate_hz: int) -> None:
-        """The rate that the player needs now."""
-        if self._asked is not None and rate_hz != self._asked.sound_rate_hz:
-            self.render()
-
-    def select(self) -> None:
-        """Lets the chosen slot be heard, as soon as there is a track that has what it holds."""
-        if self._borrower is None and self._player.track is not None:
-            with contextlib.suppress(ValueError):
-                self._player.select(self._session.source_heard)
-
-    def lend_player(self, hear: HearTrack) -> None:
-        """Until `take_player_back` the sound on stage, now and when it changes, goes to `hear` instead."""
-        self._borrower = hear
-        self.strikes.held = True
-        if self.track is not None:
-            hear(self.track)
-
-    def take_player_back(self) -> None:
-        self._borrower = None
-        self.strikes.held = False
-        self._play_when_ready = False
-        self._player.set_loop(self._session.choices.loop)
-        if self.track is not None:
-            self._load(self.track)
+    def render_sound(self, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
+        """Model and truth of the chosen pluck as they are heard, (frames, channels), in the background."""
+        entry, choices = self.entry, self._session.choices
+        assert entry is not None
+        stroke = replace(stroke_of(choices, entry.path, self._library), sources=("model", "truth"))
+        return self.notes.render(stroke, rate_hz, choices.seconds)
 
     def close(self) -> None:
-        """Ends the worker; may be called again."""
+        """Ends the threads; may be called again."""
+        self.notes.stop()
         self._worker.close()
+        self.notes.close()
+
+    # Sixty times a second
+
+    def tick(self) -> None:
+        self.notes.poll()
+        if self._session.choices.loop:
+            self._turn()
+        waits = self._waiting()
+        if waits != self._waiting_words:
+            self._waiting_words = waits
+            if waits:
+                self._window.error_label.setText(waits)
+
+    def _waiting(self) -> str:
+        """Of a model that is rendered before it is heard."""
+        latest = self._latest
+        if latest is None or not latest.waits_s:
+            return ""
+        entry = self._library.find(latest.stroke.preset.stem)
+        name = entry.info.model.upper() if entry else "model"
+        return f"{name}: sounds in {latest.waits_s:.1f} s"
+
+    def _turn(self) -> None:
+        """Hands over the next turn of the loop in time."""
+        note, take = self._shown.note, self._shown.take
+        if note is None or take is None or note.pending or (not note.began_frame and not note.seconds):
+            return
+        if self._next_turn is not None:
+            if self._next_turn.seconds > 0:
+                self._latest = self._shown.note = self._next_turn
+                self._next_turn = None
+            return
+        if note.released or note.seconds < take.seconds - LOOP_AHEAD_S or (stroke := self._stroke()) is None:
+            return
+        rate_hz = self._sound.rate_hz
+        begun = self._sound.mixer.seconds - note.seconds
+        frame = round((begun + take.seconds) * rate_hz)
+        note.release_at(frame)
+        self._next_turn = self.notes.strike(stroke, begin_frame=frame)
+
+    def _forget_turn(self) -> None:
+        turn, self._next_turn = self._next_turn, None
+        if turn is not None:
+            turn.release(0.0)
+            if self._shown.note is not None:
+                self._shown.note.release_at(0)
 
     # What the worker says
 
-    def _take_started(self, take: Take, track: Track, sounds: bool) -> None:
-        sounds = sounds or self.strikes.begin(take, track)  # it was struck while this was on its way
-        if motion_key(take) != self._wanted_key():  # a quick pluck, overtaken by the next one: it sounds too
-            self.select()
+    def _take_started(self, take: Take) -> None:
+        if motion_key(take) != self._key(self._session.choices):  # overtaken by the next one
             return
-        self.take, self.track = take, track
-        if sounds:
-            self._play_when_ready = False
-            self.select()
-        # While the string is drawn the last pluck rings on until this one is let go. The sound comes first.
-        elif not self._string.drawing and self._load(track) and self._play_when_ready:
-            self._begin()
+        self._shown = _Shown(take)
         for panel in self._panels:
             panel.take_started(take)
+        self.follow()
         self._window.error_label.setText("rendering …")
-
-    def _track_replaced(self, take: Take, track: Track) -> None:
-        if take is self.take:
-            self.track = track
-            if self._load(track, keep_position=True) and self._play_when_ready and self.ready:
-                self._begin()  # it could not when it started: the device had changed its rate
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
         if take is not self.take:
@@ -194,38 +277,21 @@ class Performance(QObject):
         self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
 
     def _render_failed(self, message: str, detail: str) -> None:
-        self._play_when_ready = False
-        self.strikes.forget()
         self._window.error_label.setText("")
         self._window.notices.tell(message, detail)
 
     # Helpers
 
-    def _begin(self) -> None:
-        self._play_when_ready = False
-        self._player.play()
-
-    def _load(self, track: Track, keep_position: bool = False, ring: bool = False) -> bool:
-        """False where the device changed its rate meanwhile: the sound is then made again at the new one."""
-        if self._borrower is not None:
-            self._borrower(track)
-            return False
-        try:
-            self._player.load(track, keep_position, ring)
-        except ValueError:
-            self.render()
-            return False
-        self.select()
-        return True
-
-    def _request(self) -> RenderRequest | None:
+    def _stroke(self) -> Stroke | None:
         entry = self.entry
-        if entry is None:
-            return None
-        return render_request(self._session.choices, entry.path, self._library, self._player.rate_hz)
+        return None if entry is None else stroke_of(self._session.choices, entry.path, self._library)
 
-    def _wanted_key(self) -> MotionKey | None:
-        entry, choices = self.entry, self._session.choices
+    def _is_of(self, note: Note, choices: Choices) -> bool:
+        entry = self._library.find(choices.preset)
+        return entry is not None and (note.stroke.preset, note.stroke.pluck) == (entry.path, choices.pluck)
+
+    def _key(self, choices: Choices) -> MotionKey | None:
+        entry = self._library.find(choices.preset)
         if entry is None:
             return None
         return entry.name, choices.pluck, round(choices.seconds * entry.info.rate_hz) + 1

@@ -1,36 +1,24 @@
-"""What the render worker says, carried into the window's thread (Qt queues the signals)."""
+"""What the threads of rendering and playing say, carried into the window's thread (Qt queues the signals)."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 
-from app.audio import Track
 from app.rendering import Take
-from app.strikes import Strikes
 from engine.metrics import ErrorSums
 
 
 class RenderMail(QObject):
-    """Its methods are called in the worker's thread; see `RenderListener`."""
+    """Its methods are called in other threads; see `RenderListener`."""
 
-    started = Signal(object, object, bool)  # take, track, whether it sounds already
-    replaced = Signal(object, object)
+    started = Signal(object)  # take
     finished = Signal(object, object)
     other_refused = Signal(str, str)
     failed = Signal(str, str)
+    refused = Signal(str, str)  # a pluck cannot be played
 
-    def __init__(self, strikes: Strikes) -> None:
-        super().__init__()
-        self._strikes = strikes
-
-    def sound_started(self, take: Take, track: Track) -> bool:
-        return self._strikes.begin(take, track)
-
-    def take_started(self, take: Take, track: Track, sounds: bool) -> None:
-        self.started.emit(take, track, sounds)
-
-    def track_replaced(self, take: Take, track: Track) -> None:
-        self.replaced.emit(take, track)
+    def take_started(self, take: Take) -> None:
+        self.started.emit(take)
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self.finished.emit(take, errors)

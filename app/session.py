@@ -96,6 +96,10 @@ class Session:
         if names:
             self.changed.emit(names)
 
+    def play(self, **changes: Any) -> None:
+        """As `update`, of a note that was played: no step of the history."""
+        self.update(**changes)
+
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
         """Takes the nearest allowed pluck: for gestures, which know no limits."""
         self.update(

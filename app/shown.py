@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from app.library import Library
-from app.rendering import DIFFERENCE, Listening
 from app.session import Choices
 from app.slots import source_title
-from app.sound_names import FULL_SCALE_M_S
+from app.sound_names import DIFFERENCE
+from engine.pluck import FULL_SCALE_M_S
 from engine.sources import FULL_SCALE_M
+from engine.voices import Ear
 
 LEGEND_FIELDS = {"heard", "a", "b", "difference_gain_db", "solo", "stereo"}  # of `Choices`: what legends depend on
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
@@ -60,9 +61,9 @@ def _sources(choices: Choices, library: Library) -> Iterator[ShownSource]:
         yield ShownSource(source, slots, source_title(source, library), source == choices.source_heard, gain_db)
 
 
-def ear(choices: Choices) -> Listening:
+def ear(choices: Choices) -> Ear:
     """The listening point that is drawn: in stereo the left one."""
-    return Listening((choices.listen,), choices.pickup, choices.solo)
+    return Ear((choices.listen,), choices.pickup, choices.solo)
 
 
 def part_words(choices: Choices) -> str:

@@ -7,20 +7,14 @@ import math
 import numpy as np
 
 from app.library import Library
-from app.rendering import Listening, Take
+from app.rendering import Take
 from app.session import VOLUME_RANGE_DB, Choices
-from app.slots import other_preset
+from app.slots import ear_of, other_preset
 from engine.preset import outside_training
 from engine.sine_transform import to_modes
 
 FAINT_DB = -70.0  # below full scale nobody hears a thing
 AT_ONCE_S = 0.01  # a model that runs away before this was never a string
-
-
-def listening(choices: Choices) -> Listening:
-    """How the motion is listened to."""
-    points = (choices.listen, choices.listen_right) if choices.stereo else (choices.listen,)
-    return Listening(points, choices.pickup, choices.solo)
 
 
 def why_silent(choices: Choices, library: Library) -> str:
@@ -57,7 +51,7 @@ def why_ran_away(take: Take) -> str:
 
 def why_difference_silent(choices: Choices, take: Take) -> str:
     """The reason that model and truth of a take have no audible difference, or nothing."""
-    ear = listening(choices)
+    ear = ear_of(choices)
     weights = ear.weights(take.info.grid_points).float().numpy()
     signal = (take.motion_m("model") - take.motion_m("truth")) @ weights
     if ear.pickup == "velocity":
@@ -72,7 +66,7 @@ def why_difference_silent(choices: Choices, take: Take) -> str:
 
 
 def _why_points_silent(choices: Choices) -> str:
-    ear = listening(choices)
+    ear = ear_of(choices)
     ends = [point in (0.0, 1.0) for point in ear.points]
     nodes = [ear.is_on_node(point) for point in ear.points]
     if not any(nodes):

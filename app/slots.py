@@ -1,13 +1,15 @@
-"""What the two slots of the A/B comparison hold, in words, and what it takes to render it."""
+"""What the two slots of the A/B comparison hold, in words, and what it takes to hear and to draw it."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from app.audio import Levels, Track
 from app.library import Library
-from app.rendering import DIFFERENCE, OTHER, RenderRequest
+from app.playing import Mix, Stroke
+from app.rendering import RenderRequest
 from app.session import Choices
+from app.sound_names import DIFFERENCE, OTHER
+from engine.voices import Ear
 
 
 def other_preset(source: str) -> str:
@@ -23,36 +25,40 @@ def source_title(source: str, library: Library) -> str:
     return source
 
 
-def render_request(choices: Choices, preset: Path, library: Library, sound_rate_hz: int) -> RenderRequest:
+def ear_of(choices: Choices) -> Ear:
+    """How a string is listened to."""
+    points = (choices.listen, choices.listen_right) if choices.stereo else (choices.listen,)
+    return Ear(points, choices.pickup, choices.solo)
+
+
+def mix_of(choices: Choices) -> Mix:
+    """What is heard of a note."""
+    return Mix(choices.source_heard, choices.level_match, choices.difference_gain_db)
+
+
+def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
+    """What is plucked, with voices for both slots."""
+    others = _others(choices, library)
+    sources: list[str] = []
+    for held in (choices.source_heard, choices.a, choices.b):
+        sources += ("model", "truth") if held == DIFFERENCE else (held,)
+    known = dict.fromkeys(source for source in sources if source in ("model", "truth") or source in others)
+    return Stroke(preset, choices.pluck, ear_of(choices), choices.seconds, tuple(known) or ("model",), others)
+
+
+def render_request(choices: Choices, preset: Path, library: Library) -> RenderRequest:
     """What the worker is asked for, other presets in the slots among it."""
-    entries = [library.find(other_preset(source)) for source in (choices.a, choices.b)]
-    others = tuple(dict.fromkeys(entry.path for entry in entries if entry is not None))
     return RenderRequest(
-        preset,
-        choices.pluck,
-        choices.seconds,
-        choices.listen,
-        sound_rate_hz,
-        listen_right=choices.listen_right if choices.stereo else None,
-        pickup=choices.pickup,
-        solo=choices.solo,
-        others=others,
+        preset, choices.pluck, choices.seconds, tuple(dict.fromkeys(_others(choices, library).values()))
     )
-
-
-def levels(choices: Choices) -> Levels:
-    """How loud each source is played."""
-    return Levels(choices.level_match, {DIFFERENCE: choices.difference_gain_db})
-
-
-def gain_db(choices: Choices, track: Track | None, source: str) -> float | None:
-    """The gain with which a source is heard; None while that is not known."""
-    if track is None or (choices.level_match and source != DIFFERENCE and track.match_gains is None):
-        return None
-    return levels(choices).gain_db(track, source)
 
 
 def missing_presets(choices: Choices, library: Library) -> dict[str, str]:
     """By slot, the preset that it holds and that is not there any more."""
     held = {"a": other_preset(choices.a), "b": other_preset(choices.b)}
     return {slot: name for slot, name in held.items() if name and library.find(name) is None}
+
+
+def _others(choices: Choices, library: Library) -> dict[str, Path]:
+    entries = {source: library.find(other_preset(source)) for source in (choices.a, choices.b)}
+    return {source: entry.path for source, entry in entries.items() if entry is not None}

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from app.rendering.velocity import Differentiator
-from app.sound_names import FULL_SCALE_M_S, PICKUPS, Pickup, Source
-from engine.pluck import Pluck
+from app.sound_names import PICKUPS, Pickup, Source
+from engine.pluck import FULL_SCALE_M_S, Pluck
 from engine.preset import Preset
 from engine.sine_transform import listening_weights
 from engine.sources import FULL_SCALE_M, ModelSource, Runaway, StringSource, TruthSource, project

@@ -7,4 +7,5 @@ from typing import Literal, get_args
 Source = Literal["model", "truth", "difference", "both"]
 Pickup = Literal["displacement", "velocity"]
 PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
-FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
+OTHER = "preset:"  # before the name of another preset whose model is a source
+DIFFERENCE = "difference"  # model minus truth

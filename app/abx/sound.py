@@ -6,18 +6,19 @@ A limiter that acts on one of the two, or a level that differs, would give X awa
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from app.audio import Track
-from app.audio.limiter import CEILING
+from app.abx.trials import Identity
+from engine.kernels.mixer import CEILING
 from engine.spectra import spectral_distances
 
 LARGEST_PEAK = CEILING / 2  # where a sound begins anew, the end of the old one is still under it
+END_S = 0.008  # the fade at the end of each turn
 TRIVIAL_CONVERGENCE = 0.5  # half of the spectrum differs: nobody needs a test to hear that
 
 
@@ -42,30 +43,33 @@ class Stimuli:
     """A and B, ready to be played.
 
     Attributes:
-        track: with the sources "A" and "B".
+        rate_hz: of the samples.
+        samples: of "A" and "B", (frames, channels).
         gains_db: of A and B, ≤ 0: what they were turned down by.
         same: not one sample differs.
         trivial: the spectra differ so much that the test would say nothing.
     """
 
-    track: Track
+    rate_hz: int
+    samples: Mapping[Identity, NDArray[np.float32]]
     gains_db: tuple[float, float]
     same: bool
     trivial: bool
 
 
-def make_stimuli(track: Track, sources: Sequence[str], volume_db: float = 0.0) -> Stimuli:
-    """Two sources of a finished track, levelled by their RMS over all of it.
+def make_stimuli(
+    sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, sources: Sequence[str], volume_db: float = 0.0
+) -> Stimuli:
+    """Two sources of a pluck, levelled by their RMS over all of it, and faded at their ends: they are looped.
 
     Args:
-        volume_db: of the player, which comes after the track and counts for the limiter.
+        sounds: samples by source, (frames, channels), of one length.
+        volume_db: with which they are played; it counts for the limiter.
 
     Raises:
-        ValueError: one of them is silent, or the track is not finished.
+        ValueError: one of them is silent.
     """
-    if not track.complete:
-        raise ValueError("The sound is still being rendered.")
-    a, b = (track.read(source, 0, track.ready_frames).astype(np.float64) for source in sources)
+    a, b = (sounds[source].astype(np.float64) for source in sources)
     rms = [math.sqrt(float(np.mean(np.square(samples)))) if samples.size else 0.0 for samples in (a, b)]
     if min(rms) == 0:
         raise ValueError(f"{sources[rms.index(0)].capitalize()} is silent with this pluck and listening point.")
@@ -74,15 +78,20 @@ def make_stimuli(track: Track, sources: Sequence[str], volume_db: float = 0.0) -
     peak *= 10 ** (volume_db / 20)
     room = min(1.0, LARGEST_PEAK / peak)
     gains = [gain * room for gain in gains]
-    levelled = {"A": gains[0] * a, "B": gains[1] * b}
-    frames = len(a)
-    made = Track(track.rate_hz, frames, ("A", "B"), track.channels)
-    made.append(levelled)
+    fade = min(round(END_S * rate_hz), len(a))
+    falling = (0.5 + 0.5 * np.cos(np.pi * (np.arange(fade) + 0.5) / fade))[:, None]
+    made: dict[Identity, NDArray[np.float32]] = {}
+    identities: tuple[Identity, Identity] = ("A", "B")
+    for identity, gain, samples in zip(identities, gains, (a, b), strict=True):
+        levelled = gain * samples
+        levelled[len(levelled) - fade :] *= falling
+        made[identity] = levelled.astype(np.float32)
     return Stimuli(
+        rate_hz,
         made,
         (min(0.0, 20 * math.log10(gains[0])), min(0.0, 20 * math.log10(gains[1]))),  # not a rounding above 0
-        same=bool(np.array_equal(made.read("A", 0, frames), made.read("B", 0, frames))),
-        trivial=_convergence(_mono(levelled["A"]), _mono(levelled["B"])) > TRIVIAL_CONVERGENCE,
+        same=bool(np.array_equal(made["A"], made["B"])),
+        trivial=_convergence(_mono(gains[0] * a), _mono(gains[1] * b)) > TRIVIAL_CONVERGENCE,
     )
 
 

@@ -12,9 +12,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering import DIFFERENCE, SOURCES, Listening, Take
+from app.rendering import SOURCES, Take
 from app.rendering.take import Motion
 from app.rendering.velocity import REACH_FRAMES, Differentiator
+from app.sound_names import DIFFERENCE
+from engine.voices import Ear
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class HeardSignal:
     """What a pick-up senses of a motion at the first of its points, in m or m/s."""
 
     motion: HeardMotion
-    listening: Listening
+    listening: Ear
 
     @property
     def ready(self) -> int:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.heard import HeardMotion, HeardSignal
-from app.rendering import SOURCES, Listening, Take
+from app.rendering import SOURCES, Take
+from engine.voices import Ear
 
 FLOOR_DB = -150.0
 WINDOW_PERIODS = 7.0  # of the fundamental: the fewest that tell partials apart with a Hann window, and some more
@@ -27,7 +28,7 @@ class Spectrogram:
         levels_db: (columns, bins) each, for "model", "truth" and "error": model − truth, of the signals.
     """
 
-    def __init__(self, take: Take, listening: Listening) -> None:
+    def __init__(self, take: Take, listening: Ear) -> None:
         self.take, self.listening = take, listening
         self._heard = {name: HeardSignal(HeardMotion(take, name), listening) for name in SOURCES}
         rate_hz = take.info.rate_hz

@@ -1,25 +1,18 @@
-"""Playback: tracks that grow, a mixer that never clicks, and a player that also runs without a device."""
+"""The sound output: devices, what can go wrong with them, and the thread that looks after the one that plays."""
 
 from app.audio.devices import AudioDevice, default_device, find, output_devices
-from app.audio.levels import Levels
-from app.audio.mixer import Mixer, MixerStatus
-from app.audio.player import Player
-from app.audio.player_status import DEFAULT_RATE_HZ, PlayerStatus
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
-from app.audio.track import Track
+from app.audio.sound import BUFFER_S, DEFAULT_RATE_HZ, Sound, SoundStatus
 
 __all__ = [
+    "BUFFER_S",
     "DEFAULT_RATE_HZ",
     "AudioDevice",
     "AudioProblem",
     "AudioUnavailable",
-    "Levels",
-    "Mixer",
-    "MixerStatus",
-    "Player",
-    "PlayerStatus",
     "ProblemKind",
-    "Track",
+    "Sound",
+    "SoundStatus",
     "default_device",
     "find",
     "output_devices",

@@ -5,18 +5,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from app.audio.problems import no_device, not_started, portaudio_missing, refused, vanished
+from engine.voices.mixer import Mixer
 
-SHORT_BUFFER_S = 0.02
+SMALLEST_BLOCK = 64
 
 
 @dataclass(frozen=True)
@@ -30,16 +29,17 @@ class AudioDevice:
     is_default: bool = False
 
 
-Callback = Callable[[NDArray[np.float32], int, Any, Any], None]
-
-
 class RawStream(Protocol):
-    """The part of `sounddevice.OutputStream` that is used here."""
+    """The part of `sounddevice`'s streams that is used here."""
 
     @property
     def active(self) -> bool: ...
     @property
     def latency(self) -> float: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def cpu_load(self) -> float: ...
     def start(self) -> None: ...
     def abort(self) -> None: ...
     def close(self) -> None: ...
@@ -49,8 +49,8 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
     """All sound outputs, the system's default first.
 
     Args:
-        rescan: PortAudio looks for devices only once, when it starts. True starts it anew, which ends every
-            open stream: only while none is open.
+        rescan: PortAudio looks for devices only once, when it starts. True starts it anew, which would end every
+            open stream: it counts only while none is open.
 
     Raises:
         AudioUnavailable: If PortAudio is missing. No output at all is an empty list.
@@ -71,35 +71,53 @@ def find(name: str, host_api: str, rescan: bool = False) -> AudioDevice:
     return _find(name, host_api, rescan)[1]
 
 
-def open_device(device: AudioDevice, buffer_s: float, block_frames: int, callback: Callback) -> RawStream:
+def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream:
     """Opens, but does not start, a float32 stream at the device's own rate, so that no rate is forced on it.
 
-    The device's buffer is PortAudio's safe choice ("high latency"), or `buffer_s` where that is longer: a
-    callback in Python has to wait for the interpreter lock now and then. A buffer below `SHORT_BUFFER_S` is a wish
-    for promptness: then it is what the device itself calls low latency.
+    The device calls the compiled mixer itself, in its own thread: the interpreter has no part in it. Its buffer is
+    `buffer_s`, or what it calls low latency where that is longer; half of it is asked for at a time.
 
     Raises:
         AudioUnavailable: With the reason in plain words.
     """
+    from engine.kernels.mixer import call  # compiled, or loaded: only when it is needed
+
     sounddevice = _sounddevice()
-    index, _ = _find(device.name, device.host_api)
-    safe = "default_high_output_latency" if buffer_s >= SHORT_BUFFER_S else "default_low_output_latency"
-    try:
-        stream: RawStream = sounddevice.OutputStream(
-            samplerate=device.default_rate_hz,
-            blocksize=block_frames,
-            device=index,
-            channels=min(device.channels, 2),
-            dtype="float32",
-            latency=max(buffer_s, sounddevice.query_devices(index)[safe]),
-            callback=callback,
-        )
-    except (sounddevice.PortAudioError, OSError, ValueError) as error:
-        raise refused(error, device.name, device.default_rate_hz) from error
+    with _lock:
+        index, _ = _find(device.name, device.host_api)
+        ffi, channels = sounddevice._ffi, min(device.channels, 2)
+        low_s = sounddevice.query_devices(index)["default_low_output_latency"]
+        frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / 2))
+        try:
+            # made for other libraries to hand over a callback of their own, as rtmixer does
+            stream: RawStream = sounddevice._StreamBase(
+                kind="output",
+                samplerate=device.default_rate_hz,
+                blocksize=frames,
+                device=index,
+                channels=channels,
+                dtype="float32",
+                latency=max(buffer_s, low_s),
+                callback=ffi.cast("PaStreamCallback*", call.address),
+                userdata=ffi.cast("void*", mixer.address),
+            )
+        except (sounddevice.PortAudioError, OSError, ValueError) as error:
+            raise refused(error, device.name, device.default_rate_hz) from error
+        _streams.add(stream)
     return stream
 
 
-_lock = threading.Lock()  # PortAudio's listing is not made for two threads
+def close_device(stream: RawStream) -> None:
+    """Stops at once and frees the device; nothing can be done about one that cannot even stop."""
+    with _lock:
+        for end in (stream.abort, stream.close):
+            with contextlib.suppress(Exception):
+                end()
+        _streams.discard(stream)
+
+
+_lock = threading.RLock()  # PortAudio's listing and opening are not made for two threads
+_streams: set[RawStream] = set()  # open ones: PortAudio must not be started anew under them
 
 
 def _find(name: str, host_api: str, rescan: bool = False) -> tuple[int, AudioDevice]:
@@ -113,7 +131,7 @@ def _list(rescan: bool = False) -> list[tuple[int, AudioDevice]]:
     sounddevice = _sounddevice()
     with _lock:
         try:
-            if rescan:
+            if rescan and not _streams:
                 sounddevice._terminate()
                 sounddevice._initialize()
             apis: list[Mapping[str, Any]] = list(sounddevice.query_hostapis())

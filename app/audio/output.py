@@ -1,74 +1,125 @@
-"""Where the player's blocks go: what an output is, and which one is asked for."""
+"""Where the mixer's frames go: a device that calls for them, or a clock that takes them where there is none."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import contextlib
+import threading
+import time
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from app.audio.devices import AudioDevice, close_device, open_device
+from app.audio.problems import refused
+from engine.voices.mixer import Mixer
 
-from app.audio.devices import AudioDevice, default_device, find
-from app.audio.stream import BUFFER_S
+STALLED_AFTER_S = 2.5  # without a call: longer than any start of a sound server that was seen
+LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
+CLOCK_FRAMES = 512
+LONGEST_LAG_S = 0.1  # further behind than this, the clock goes on from now instead of racing to catch up
 
 
 class Output(Protocol):
-    """Where blocks go: an `OutputStream` or a `SilentOutput`."""
+    """What takes the mixer's frames.
 
-    @property
-    def device(self) -> AudioDevice | None: ...
-    @property
-    def rate_hz(self) -> int: ...
-    @property
-    def block_frames(self) -> int: ...
-    @property
-    def latency_s(self) -> float: ...
-    @property
-    def underruns(self) -> int: ...
-    @property
-    def frames_written(self) -> int: ...
-    @property
-    def frames_queued(self) -> int: ...
-    @property
-    def prompt_blocks(self) -> int: ...
-    @property
-    def queued_blocks(self) -> int: ...
-    @property
-    def changeable_blocks(self) -> int: ...
-    @property
-    def mendable_blocks(self) -> int: ...
-    @property
-    def replaced_blocks(self) -> int: ...
-    def wait_for_space(self, timeout_s: float, ahead: bool = False) -> bool: ...
-    def stop_waiting(self) -> None: ...
-    def write(self, block: NDArray[np.float32]) -> None: ...
-    def replace(self, count: int, blocks: Sequence[NDArray[np.float32]] = ()) -> bool: ...
-    def stalled(self) -> bool: ...
-    def lost(self) -> bool: ...
+    Attributes:
+        device: None where there is none.
+        latency_s: of the output, as it said when it was opened: its buffer.
+    """
+
+    device: AudioDevice | None
+    rate_hz: int
+    latency_s: float
+
+    def now_s(self) -> float:
+        """The clock by which voices say when they began."""
+
+    def load(self) -> float:
+        """The share of its time that the mixer takes, 0 … 1."""
+
+    def stalled(self) -> bool:
+        """Whether it takes nothing at the moment."""
+
+    def lost(self) -> bool:
+        """Whether it has gone."""
+
     def close(self) -> None: ...
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """An output as it was asked for; see `Player.open`."""
+class DeviceOutput:
+    """A device that plays, at its own rate. Raises AudioUnavailable where it cannot be opened or started."""
+
+    def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
+        self.device: AudioDevice | None = device
+        self.rate_hz = device.default_rate_hz
+        self._mixer = mixer
+        self._stream = open_device(device, buffer_s, mixer)
+        self.latency_s = float(self._stream.latency)
+        self._calls, self._called_s = mixer.calls, time.monotonic()
+        try:
+            self._stream.start()
+        except Exception as error:
+            self.close()
+            raise refused(error, device.name, self.rate_hz) from error
+
+    def now_s(self) -> float:
+        return float(self._stream.time)
+
+    def load(self) -> float:
+        return float(self._stream.cpu_load)
+
+    def stalled(self) -> bool:
+        return self._silent_s() > STALLED_AFTER_S
+
+    def lost(self) -> bool:
+        try:
+            active = self._stream.active
+        except Exception:  # PortAudio itself has already given up the stream
+            active = False
+        return not active or self._silent_s() > LOST_AFTER_S
+
+    def close(self) -> None:
+        close_device(self._stream)
+
+    def _silent_s(self) -> float:
+        """Since the last call. To be asked again and again, by one thread."""
+        now_s, calls = time.monotonic(), self._mixer.calls
+        if calls != self._calls:
+            self._calls, self._called_s = calls, now_s
+        return now_s - self._called_s
+
+
+class ClockOutput:
+    """Takes frames at the pace of time and drops them, so that pictures move without a device."""
 
     device: AudioDevice | None = None
-    buffer_s: float = BUFFER_S
-    rate_hz: int = 0
-    buffer_frames: int = 0
+    latency_s = 0.0
 
-    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
-        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
+    def __init__(self, mixer: Mixer) -> None:
+        self.rate_hz = mixer.rate_hz
+        self._mixer = mixer
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="sound-clock", daemon=True)
+        self._thread.start()
 
-    def buffer_s_at(self, rate_hz: int) -> float:
-        return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
+    def now_s(self) -> float:
+        return self._mixer.seconds
 
+    def load(self) -> float:
+        return 0.0
 
-def same_device(one: AudioDevice, other: AudioDevice) -> bool:
-    return (one.name, one.host_api) == (other.name, other.host_api)
+    def stalled(self) -> bool:
+        return False
 
+    def lost(self) -> bool:
+        return False
 
-def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
-    """The device as it is now, or, for None, the system's default."""
-    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
+    def close(self) -> None:
+        self._closing.set()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(2)
+
+    def _run(self) -> None:
+        next_s, block_s = time.monotonic(), CLOCK_FRAMES / self.rate_hz
+        while not self._closing.wait(max(0.0, next_s - time.monotonic())):
+            with contextlib.suppress(MemoryError):
+                self._mixer.render(CLOCK_FRAMES)
+            next_s = max(next_s + block_s, time.monotonic() - LONGEST_LAG_S)

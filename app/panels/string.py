@@ -9,10 +9,11 @@ from app.library import Library
 from app.motion import Envelope, Strobe, frame_at
 from app.panels.base import Moment, Panel
 from app.preset_words import shape_word
-from app.rendering import DIFFERENCE, Take
+from app.rendering import Take
 from app.session import Choices, Session
 from app.shown import LEGEND_FIELDS, shown_sources
 from app.silence import why_difference_silent, why_silent
+from app.sound_names import DIFFERENCE
 from app.views.string_ground import TrainedPlucks
 from app.views.string_ink import ShownPluck
 from app.views.string_view import StringView

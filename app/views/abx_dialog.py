@@ -7,9 +7,12 @@ would give X away.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
 
@@ -17,7 +20,9 @@ from app.abx.record import AbxRecord, HeardSource, HeardThrough, default_folder,
 from app.abx.sound import Stimuli, make_stimuli
 from app.abx.subject import Subject
 from app.abx.trials import Identity, Run, Sound, new_seed
-from app.audio import Player, PlayerStatus, Track
+from app.audio import Sound as SoundOutput
+from app.audio import SoundStatus
+from app.playing.pair import Pair
 from app.settings import AbxChoices
 from app.views.abx_records import RecordsPage
 from app.views.abx_result import ResultPage
@@ -25,7 +30,10 @@ from app.views.abx_setup import SetupPage
 from app.views.abx_trial import TrialPage
 from app.whole_file import WriteError
 
+Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
+
 WATCH_MS = 200
+RENDERING = "The sound is still being rendered."
 NO_DEVICE = "There is no sound device: connect one, or choose another in the window. The test needs ears."
 SAME = "A and B are the same, sample by sample: there is nothing to tell apart."
 TRIVIAL = (
@@ -37,28 +45,31 @@ CLOSED = "The window was closed during the test."
 
 
 class AbxDialog(QDialog):
-    """See the module. `set_track` gives it something to play.
+    """See the module.
 
     Args:
+        render: starts the rendering of model and truth of the pluck at a rate, and gives what will hold the samples.
         seed: draws a seed for each test.
     """
 
     def __init__(
         self,
-        player: Player,
+        output: SoundOutput,
         subject: Subject,
         choices: AbxChoices,
+        render: Render,
         parent: QWidget | None = None,
         seed: Callable[[], int] = new_seed,
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
         self.resize(680, 470)
-        self._player, self._subject, self._seed = player, subject, seed
-        self._track: Track | None = None
+        self._output, self._subject, self._seed, self._render = output, subject, seed, render
+        self._rendering: Future[Mapping[str, NDArray[np.float32]]] | None = None
+        self._rate_hz = 0  # at which it is, or was, rendered
+        self._pair: Pair | None = None
         self._stimuli: Stimuli | None = None
         self._silence = ""  # why there are no stimuli
-        self._incomplete = False  # the track was still growing at the last look
         self._run: Run | None = None
         self._sounding: Sound | None = None
         self._trial_began_s = 0.0
@@ -77,6 +88,7 @@ class AbxDialog(QDialog):
         self._watch = QTimer(self, interval=WATCH_MS)
         self._watch.timeout.connect(self._look_at_device)
         self._watch.start()
+        self._ask_for_sound()
         self._show_state()
         self._setup.start.setFocus()
 
@@ -88,12 +100,6 @@ class AbxDialog(QDialog):
         """The dialog's state, to be remembered."""
         folder = "" if self._setup.folder == default_folder() else str(self._setup.folder)
         return AbxChoices(trials=self._setup.trials, restart=self._setup.restart, folder=folder)
-
-    def set_track(self, track: Track) -> None:
-        """What is on stage, finished or not; it comes again where the device has got another rate."""
-        self._track = track
-        if not self.testing:  # otherwise the device is another, and the test about to be ended
-            self._prepare()
 
     def abandon(self) -> None:
         """Closes without a question; a test under way is recorded as incomplete."""
@@ -120,46 +126,50 @@ class AbxDialog(QDialog):
 
     # Sound
 
+    def _ask_for_sound(self) -> None:
+        """At the rate of the device as it is now."""
+        self._rate_hz = self._output.rate_hz
+        self._rendering = self._render(self._rate_hz)
+
     def _prepare(self) -> None:
-        """Makes A and B of the track and gives them to the player."""
+        """Makes A and B, where the pluck is rendered."""
         self._hush()
-        self._stimuli = None
-        self._incomplete = self._track is not None and not self._track.complete
-        if self._track is not None:
+        self._stimuli = self._pair = None
+        self._silence = RENDERING
+        rendering = self._rendering
+        if rendering is not None and rendering.done() and self._rate_hz == self._output.rate_hz:
             sources = [candidate.source for candidate in self._setup.pair]
             try:
-                made = make_stimuli(self._track, sources, self._subject.volume_db)
-                self._player.load(made.track)
-            except ValueError as error:
+                made = make_stimuli(rendering.result(), self._rate_hz, sources, self._subject.volume_db)
+            except Exception as error:  # a model that ran away, or silence
                 self._silence = str(error)
             else:
-                self._stimuli = made
-                self._player.set_loop(True)
+                self._stimuli, self._silence = made, ""
+                self._pair = Pair(self._output.mixer, {str(name): each for name, each in made.samples.items()})
         self._show_state()
 
     def _audition(self, sound: Sound, again: bool = False) -> None:
-        if self._stimuli is None:
+        if self._pair is None:
             return
         identity: Identity = "A" if sound == "A" else "B"
         if self._run is not None:
             identity = self._run.heard_as(sound)
             self._run = self._run.auditioned(sound)
-        self._player.select(identity)
-        if again or self._setup.restart or self._sounding is None:
-            self._player.seek(0.0)
-        self._player.play()
+        self._pair.select(identity)
+        self._pair.play(anew=again or self._setup.restart or self._sounding is None)
         self._sounding = sound
         if self._run is not None:
             self._trial.show_sounding(sound, self._run.x_heard)
 
     def _hush(self) -> None:
-        self._player.stop()
+        if self._pair is not None:
+            self._pair.stop()
         self._sounding = None
 
     # The test
 
     def _start(self) -> None:
-        status = self._player.status()
+        status = self._output.status()
         if self._obstacle(status) or status.device is None:
             return
         self._heard_through = HeardThrough(
@@ -240,7 +250,7 @@ class AbxDialog(QDialog):
         self._records.show_folder(self._setup.folder)
         self._pages.setCurrentWidget(self._records)
 
-    def _obstacle(self, status: PlayerStatus) -> str:
+    def _obstacle(self, status: SoundStatus) -> str:
         """Why the test cannot start now, or nothing."""
         if status.device is None:
             return NO_DEVICE
@@ -250,12 +260,15 @@ class AbxDialog(QDialog):
 
     def _show_state(self) -> None:
         advice = TRIVIAL if self._stimuli is not None and self._stimuli.trivial else ""
-        self._setup.show_state(self._obstacle(self._player.status()), advice)
+        self._setup.show_state(self._obstacle(self._output.status()), advice)
 
     def _look_at_device(self) -> None:
-        status = self._player.status()
+        status = self._output.status()
         if self._run is None or self._heard_through is None:
-            if self._incomplete:
+            if self._rate_hz != self._output.rate_hz:
+                self._ask_for_sound()
+                self._prepare()
+            elif self._stimuli is None and self._silence == RENDERING:
                 self._prepare()
             else:
                 self._show_state()

@@ -46,9 +46,10 @@ class AudioState:
     """What the dialog says of the present output."""
 
     playing_on: str  # a device with its host API, or nothing
-    facts: str  # its rate and latency
+    facts: str  # its rate, its buffer, and the latency that was measured
     problem: str
-    underruns: int
+    gaps: tuple[str, ...]  # silences that nobody asked for: when and why
+    load: float  # share of the device's time that the mixer takes
 
 
 class AudioDialog(QDialog):
@@ -57,7 +58,7 @@ class AudioDialog(QDialog):
     choice_made = Signal(object, object)  # DeviceChoice or None, SoundChoice
     rescan_asked = Signal()
     tone_asked = Signal(str)  # left, right or both
-    underruns_reset = Signal()
+    gaps_reset = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -78,9 +79,10 @@ class AudioDialog(QDialog):
         self._buffer.setToolTip("How much sound is kept ready: more is safer, less is more prompt")
         for box in (self._device, self._rate, self._buffer):
             box.activated.connect(self._choose)
-        self._underruns = QLabel("0")
-        self._underruns.setMinimumWidth(40)
-        self._underruns.setToolTip("How often the device wanted sound that was not ready")
+        self._gaps = QLabel("0")
+        self._gaps.setMinimumWidth(40)
+        self._load = QLabel("0 %")
+        self._load.setToolTip("Share of the sound device's time that the voices take")
         self._lay_out()
 
     @property
@@ -117,7 +119,12 @@ class AudioDialog(QDialog):
             self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if heard else "There is no sound."
         )
         _set(self._problem_label, state.problem)
-        _set(self._underruns, f"{state.underruns}")
+        latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
+        _set(self._gaps, f"{len(state.gaps)}{latest}")
+        tip = "Silences while a voice should have sounded, wherever they arose\n" + "\n".join(state.gaps[-12:])
+        if self._gaps.toolTip() != tip:
+            self._gaps.setToolTip(tip)
+        _set(self._load, f"{100 * state.load:.0f} %")
         if self._problem.isHidden() == bool(state.problem):
             self._problem.setVisible(bool(state.problem))
             self.adjustSize()
@@ -139,7 +146,7 @@ class AudioDialog(QDialog):
         ]
         for button, side in zip(self._tones, ("left", "both", "right"), strict=True):
             button.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
-        reset = _button("Reset", "Count underruns from zero", self.underruns_reset)
+        reset = _button("Reset", "Count gaps from zero", self.gaps_reset)
         advice = QLabel(ADVICE)
         advice.setObjectName("faint")
         advice.setWordWrap(True)
@@ -150,7 +157,8 @@ class AudioDialog(QDialog):
         form.addRow("Sample rate", self._rate)
         form.addRow("Buffer", self._buffer)
         form.addRow("Test tone", _row(*self._tones, None))
-        form.addRow("Underruns", _row(self._underruns, reset, None))
+        form.addRow("Gaps", _row(self._gaps, reset, None))
+        form.addRow("Load", self._load)
         close = _button("Close", "Close; every choice already counts")
         close.setDefault(True)
         close.clicked.connect(self.accept)

@@ -14,12 +14,19 @@ from PySide6.QtWidgets import (
 )
 
 from app.session import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
-from app.sound_names import FULL_SCALE_M_S
 from app.views.knob import Knob, KnobRange
 from app.views.meter import Meter
 from app.views.parts import combo_box, tool_button, vertical_rule
 from app.views.slot_buttons import SlotButtons
-from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
+from engine.pluck import (
+    DEFAULT_LISTEN,
+    FULL_SCALE_M,
+    FULL_SCALE_M_S,
+    LARGEST_AMPLITUDE_MM,
+    POSITION_RANGE,
+    SHAPES,
+    WIDTH_RANGE,
+)
 
 SHAPE_WIDTH = 106  # of the longest name, with
 TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"

@@ -40,7 +40,9 @@ def _turn(angle: float) -> tuple[float, float]:
 def _exp(x: float) -> float:
     """e^x to 1e-9 for -64 … 64, the same way; below it is as good as nothing."""
     y = max(x, -64.0) / 64
-    e = 1 + y * (1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320)))))))
+    e = 1 + y * (
+        1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320))))))
+    )
     e *= e
     e *= e
     e *= e
@@ -74,7 +76,7 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
     """f(E) - K E, (2 modes,)."""
     whole = program.view(np.int64)
     n = whole[at.P_MODES]
-    omega, coupling = program[whole[at.O_OMEGA] :], program[whole[at.O_COUPLING] :]
+    omega = program[whole[at.O_OMEGA] :]
     out[: 2 * n] = 0.0
     units = program[whole[at.O_ENERGY_UNITS] :]
     told = 0.0
@@ -85,7 +87,10 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
     layers = whole[at.P_LAYERS]
     if layers > 0:
         single = program.view(np.float32)
-        values, results = scratch[: at.MOST_MODES].view(np.float32), scratch[at.MOST_MODES : 2 * at.MOST_MODES].view(np.float32)
+        values, results = (
+            scratch[: at.MOST_MODES].view(np.float32),
+            scratch[at.MOST_MODES : 2 * at.MOST_MODES].view(np.float32),
+        )
         for m in range(n):
             values[m] = units[m] * energy[m]
         slot = 2 * whole[at.O_NETWORK]
@@ -114,7 +119,11 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
     if whole[at.P_ADIABATIC]:
         shares = program[whole[at.O_SHARES] :]
         largest = program[whole[at.O_LARGEST] :]
-        linear, share, found = scratch[: n], scratch[at.MOST_MODES : at.MOST_MODES + n], scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + n]
+        linear, share, found = (
+            scratch[:n],
+            scratch[at.MOST_MODES : at.MOST_MODES + n],
+            scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + n],
+        )
         for step in range(3):
             found[:] = 0.0
             for m in range(n):
@@ -277,7 +286,9 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
 
 
 @njit(**COMPILED)
-def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+def generate(
+    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+) -> None:
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
     Args:
@@ -340,7 +351,9 @@ def _keep_end(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.n
 
 
 @njit(**COMPILED)
-def _segment(voice: np.ndarray, program: np.ndarray, first: int, length: int, z: np.ndarray, scratch: np.ndarray) -> None:
+def _segment(
+    voice: np.ndarray, program: np.ndarray, first: int, length: int, z: np.ndarray, scratch: np.ndarray
+) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
     whole = program.view(np.int64)
     n = whole[at.P_MODES]
@@ -353,7 +366,7 @@ def _segment(voice: np.ndarray, program: np.ndarray, first: int, length: int, z:
     width, count = length * ratio, float(length)
     level, phase = voice[rows + at.LEVEL * n :], voice[rows + at.PHASE * n :]
     level_rate, phase_rate = voice[rows + at.LEVEL_RATE * n :], voice[rows + at.PHASE_RATE * n :]
-    change, next_change = voice[rows + at.CHANGE * n :], voice[rows + (at.CHANGE + 1) * n :]
+    next_change = voice[rows + (at.CHANGE + 1) * n :]
     turns = scratch[16 * at.MOST_MODES :].view(np.float32)
     zr, zi, rr, ri = turns[:n], turns[n : 2 * n], turns[2 * n : 3 * n], turns[3 * n : 4 * n]
     sr, si, cr, ci = turns[4 * n : 5 * n], turns[5 * n : 6 * n], turns[6 * n : 7 * n], turns[7 * n : 8 * n]
@@ -416,7 +429,10 @@ def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.nda
     n = whole[at.P_MODES]
     rows = at.state(n)
     matrix, largest = program[whole[at.O_M] :], program[whole[at.O_M_LARGEST] :]
-    squares, loud = scratch[20 * at.MOST_MODES : 20 * at.MOST_MODES + n], scratch[21 * at.MOST_MODES : 21 * at.MOST_MODES + n]
+    squares, loud = (
+        scratch[20 * at.MOST_MODES : 20 * at.MOST_MODES + n],
+        scratch[21 * at.MOST_MODES : 21 * at.MOST_MODES + n],
+    )
     loudest = 0.0
     for m in range(n):
         squares[m] = z[m] * z[m] + z[n + m] * z[n + m]
@@ -453,7 +469,13 @@ def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.nda
 
 @njit(**COMPILED)
 def _modulate(
-    voice: np.ndarray, program: np.ndarray, z: np.ndarray, fading: bool, points: int, out: np.ndarray, scratch: np.ndarray
+    voice: np.ndarray,
+    program: np.ndarray,
+    z: np.ndarray,
+    fading: bool,
+    points: int,
+    out: np.ndarray,
+    scratch: np.ndarray,
 ) -> None:
     """Adds what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
     whole = program.view(np.int64)

@@ -55,6 +55,9 @@ BEGAN_FRAME = 32  # W the mixer's frame at which it began
 REFRESH = 33  # W quanta until a bank looks again which of its modulation can be heard
 ROWS = 34  # W latents whose modulation can be heard
 COLUMNS = 35  # W latents that can be heard in others' modulation
+BEGIN_AT = 36  # W the mixer's frame before which it waits
+RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
+LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins anew after its last sample
 HEADER = 40
 
 SETS = 2  # of weights
@@ -173,6 +176,7 @@ M_GAPS = 20  # W gaps so far
 M_CHANNELS = 21  # W of the device, 1 or 2
 M_SMOOTHING = 22  # R what is left a frame of a change of volume
 M_OVERRUNS = 23  # W voices that were refused because all places were taken
+M_LIMITING = 24  # W whether the limiter is at work: not where a file is made
 M_VOICES = 32  # W addresses
 M_RING = M_VOICES + MOST_VOICES  # W addresses
 M_GAP_LIST = M_RING + RING  # R

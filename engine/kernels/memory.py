@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 
 
 @intrinsic
-def pointer(typing_context: Any, address: Any):  # noqa: ANN201
+def pointer(typing_context: Any, address: Any):
     """A `void *` from an address (int64)."""
 
     def generate(_context, builder, _signature, arguments):
@@ -22,7 +22,7 @@ def pointer(typing_context: Any, address: Any):  # noqa: ANN201
 
 
 @intrinsic
-def fence(typing_context: Any):  # noqa: ANN201
+def fence(typing_context: Any):
     """What was written before is seen by other threads before what is written after."""
 
     def generate(context, builder, _signature, _arguments):

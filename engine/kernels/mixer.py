@@ -12,9 +12,9 @@ import numpy as np
 from numba import carray, cfunc, njit, types
 
 from engine.kernels import layout as at
+from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.voice import add, note_gap
-from engine.kernels.compiled import COMPILED
 
 CEILING = 10 ** (-0.3 / 20)
 BELIEVED = 100.0  # +40 dBFS: the level that the limiter believes at most, so that one wild sample is soon forgotten
@@ -60,7 +60,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
         voice = carray(pointer(address), (1 << 40,), np.float64)
         add(voice, mixer, now_s)
         state = voice.view(np.int64)[at.STATE]
-        if state == at.SOUNDING:
+        if state == at.SOUNDING or state == at.WAITING:
             counts[at.M_VOICES + kept] = address
             kept += 1
     fence()
@@ -114,7 +114,7 @@ def _finish(mixer: np.ndarray) -> None:
             counts[at.M_NON_FINITE] += 1
         loudest = min(max(abs(left), abs(right)), BELIEVED)
         level = max(loudest, release * level)
-        if level > CEILING:
+        if level > CEILING and counts[at.M_LIMITING]:
             gain = CEILING / level
             reduction = min(reduction, gain)
             left = min(max(left * gain, -CEILING), CEILING)
@@ -131,7 +131,7 @@ def _finish(mixer: np.ndarray) -> None:
     cache=True,
     error_model="numpy",
 )
-def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
+def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped-def]
     """PaStreamCallback; `user` is the mixer."""
     mixer = carray(user, (at.MIXER_SLOTS,), np.float64)
     counts = mixer.view(np.int64)

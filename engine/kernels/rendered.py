@@ -6,8 +6,8 @@ import numpy as np
 from numba import carray, njit
 
 from engine.kernels import layout as at
-from engine.kernels.memory import fence, pointer
 from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import fence, pointer
 
 
 @njit(**COMPILED)
@@ -30,8 +30,9 @@ def generate(voice: np.ndarray, program: np.ndarray, out: np.ndarray) -> None:
         out[:] = 0.0
         counts[at.STARVED] += at.QUANTUM
         return
+    looped = counts[at.LOOPED]
     for frame in range(at.QUANTUM):
-        place = (first + frame) * ratio
+        place = float((first + frame) % length) if looped else (first + frame) * ratio
         before = int(place)
         phase = (place - before) * phases
         row = int(phase)
@@ -46,10 +47,12 @@ def generate(voice: np.ndarray, program: np.ndarray, out: np.ndarray) -> None:
             total = 0.0
             for tap in range(2 * taps):
                 index = abs(before - taps + 1 + tap)  # before the pluck lies its mirror
+                if looped:
+                    index %= length
                 if index < ready:
                     total += (low[tap] * (1 - share) + high[tap] * share) * samples[index * points + point]
             out[point, frame] = gain * total
     counts[at.DRY] = 1 if dry else 0
     counts[at.GENERATED] = first + at.QUANTUM
-    over = ready == length and (first + at.QUANTUM) * ratio >= length
+    over = not looped and ready == length and (first + at.QUANTUM) * ratio >= length
     voice[at.LOUDNESS] = -1e9 if over else 0.0

@@ -9,8 +9,8 @@ from numba import carray, njit
 
 from engine.kernels import bank, rendered, truth
 from engine.kernels import layout as at
-from engine.kernels.memory import fence, pointer
 from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import fence, pointer
 
 MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
 _END = 960  # frames of the fade of a voice that has become silent
@@ -85,6 +85,12 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> None:
     out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
+    now = mix_counts[at.M_FRAMES]
+    if counts[at.BEGIN_AT] > now and counts[at.FRAME] == 0:
+        counts[at.STATE] = at.OVER if counts[at.RELEASE] > 0 else at.WAITING
+        return
+    if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
+        counts[at.RELEASE] = counts[at.FADE_FRAMES]
     release = counts[at.RELEASE]
     wanted = 0.0 if release > 0 else voice[at.WANTED_GAIN]
     if wanted != voice[at.GAIN_TO]:
@@ -111,7 +117,12 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> None:
                     note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_RUNAWAY)
                     return
         first, attack = counts[at.FRAME], counts[at.ATTACK]
-        source, goal, done, length = voice[at.GAIN_FROM], voice[at.GAIN_TO], counts[at.GAIN_DONE], counts[at.FADE_FRAMES]
+        source, goal, done, length = (
+            voice[at.GAIN_FROM],
+            voice[at.GAIN_TO],
+            counts[at.GAIN_DONE],
+            counts[at.FADE_FRAMES],
+        )
         for frame in range(quantum):
             gain = goal
             if done + frame < length:

@@ -1,14 +1,27 @@
 """Voices: plucks of a model or of the truth as they ring, and the mixer that sums them; compiled in `engine.kernels`.
 
-    programs   what all voices of a source share, made from a preset for one sample rate
-    ear        where and how a string is heard
-    voice      one pluck of a program
-    mixer      the sum: what a device plays, what a file holds
+programs   what all voices of a source share, made from a preset for one sample rate
+ear        where and how a string is heard
+voice      one pluck of a program
+mixer      the sum: what a device plays
+offline    a voice for a file
 """
 
 from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
-from engine.voices.programs import Program, bank_program, rendered_program, truth_program
+from engine.voices.offline import render_voice
+from engine.voices.programs import Program, bank_program, plain_program, rendered_program, truth_program
 from engine.voices.voice import Voice
 
-__all__ = ["Ear", "Gap", "Mixer", "Program", "Voice", "bank_program", "rendered_program", "truth_program"]
+__all__ = [
+    "Ear",
+    "Gap",
+    "Mixer",
+    "Program",
+    "Voice",
+    "bank_program",
+    "plain_program",
+    "render_voice",
+    "rendered_program",
+    "truth_program",
+]

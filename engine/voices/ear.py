@@ -10,10 +10,8 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from engine.pluck import FULL_SCALE_M
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.sine_transform import analysis_matrix, listening_weights
-
-FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels import layout as at
-from engine.pluck import FULL_SCALE_M
-from engine.voices.ear import FULL_SCALE_M_S
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.voice import Voice
 
 LIMITER_RELEASE_S = 0.08
@@ -30,9 +29,13 @@ class Gap:
 
 
 class Mixer:
-    """Its memory is what the kernels work on; commands come from any thread, frames are taken by one."""
+    """Its memory is what the kernels work on; commands come from any thread, frames are taken by one.
 
-    def __init__(self, rate_hz: int, channels: int = 2) -> None:
+    Args:
+        limited: whether the safety limiter is at work: for ears, not for files.
+    """
+
+    def __init__(self, rate_hz: int, channels: int = 2, limited: bool = True) -> None:
         self.rate_hz = rate_hz
         self.memory = memory = np.zeros(at.MIXER_SLOTS)
         self._counts = counts = memory.view(np.int64)
@@ -40,12 +43,16 @@ class Mixer:
         self._voices: list[Voice] = []  # handed over and not over yet: their memory is in use
         self._gaps_read = 0
         memory[at.M_RATE] = rate_hz
-        counts[at.M_CHANNELS] = channels
+        counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
         memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
         memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
         memory[at.M_SMOOTHING] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
         counts[at.M_TONE_FRAME] = counts[at.M_TONE_LENGTH] = 0
         memory[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1] = _differentiator(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
+
+    @property
+    def channels(self) -> int:
+        return int(self._counts[at.M_CHANNELS])
 
     @property
     def address(self) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -19,8 +20,8 @@ from engine.kernels import layout as at
 from engine.models.base import StringModel
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
-from engine.preset import PresetInfo
 from engine.pluck import FULL_SCALE_M
+from engine.preset import PresetInfo
 from engine.reference import SplittingSolver, default_substeps
 from engine.sine_transform import synthesis_matrix, to_modes
 
@@ -218,13 +219,25 @@ def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) 
 
 
 def rendered_program(info: PresetInfo, rate_hz: int) -> Program:
-    """For samples that are rendered ahead at the preset's own rate: a Kaiser-windowed sinc in `FILTER_PHASES` phases."""
-    ratio = info.rate_hz / rate_hz
+    """For samples that are rendered ahead at the preset's own rate."""
+    return _samples_program(info.rate_hz, rate_hz, info.grid_points)
+
+
+@lru_cache(maxsize=4)
+def plain_program(rate_hz: int) -> Program:
+    """For samples of the device's own rate, which are played as they are."""
+    return _samples_program(rate_hz, rate_hz, 0)
+
+
+def _samples_program(source_rate_hz: int, rate_hz: int, grid_points: int) -> Program:
+    """Converts by a Kaiser-windowed sinc in `FILTER_PHASES` phases; equal rates leave every sample as it is."""
+    ratio = source_rate_hz / rate_hz
     cutoff = min(1.0, 1 / ratio)
     phase = np.arange(FILTER_PHASES + 1)[:, None] / FILTER_PHASES
     place = np.arange(-FILTER_TAPS + 1, FILTER_TAPS + 1)[None] - phase
     window = np.i0(FILTER_BETA * np.sqrt(np.clip(1 - (place / FILTER_TAPS) ** 2, 0, 1))) / np.i0(FILTER_BETA)
-    table = cutoff * np.sinc(cutoff * place) * window
+    sinc = np.sinc(cutoff * place)
+    table = cutoff * np.where(np.abs(sinc) < 1e-15, 0.0, sinc) * window
     memory = _packed(
         at.R_HEADER,
         {at.R_RATIO: ratio},
@@ -238,7 +251,7 @@ def rendered_program(info: PresetInfo, rate_hz: int) -> Program:
     def read(weights: Tensor) -> tuple[Array, Array]:
         return np.zeros((weights.shape[1], 0)), np.zeros(weights.shape[1])
 
-    return Program(at.RENDERED, memory, 0, rate_hz, info.grid_points, start, read)
+    return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read)
 
 
 def _flat(layer: nn.Linear) -> NDArray[np.float32]:

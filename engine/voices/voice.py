@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
+from engine.pluck import FULL_SCALE_M
 from engine.voices.ear import Ear
 from engine.voices.programs import Program
 
@@ -28,7 +30,12 @@ class Voice:
     """
 
     def __init__(
-        self, program: Program, displacement_m: Tensor, ear: Ear, gain: float = 1.0, seconds: float = 0.0,
+        self,
+        program: Program,
+        displacement_m: Tensor,
+        ear: Ear,
+        gain: float = 1.0,
+        seconds: float = 0.0,
         source_rate_hz: int = 0,
     ) -> None:
         n = program.modes
@@ -58,7 +65,19 @@ class Voice:
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
             counts[at.SAMPLES], counts[at.LENGTH] = self._samples.ctypes.data, length
-        self._set_weights(0, ear)
+        if program.grid_points:
+            self._set_weights(0, ear)
+
+    @classmethod
+    def of_samples(cls, program: Program, samples: NDArray[np.float32]) -> Voice:
+        """Of samples (frames, points) of full scale at the program's own rate, all of which are there."""
+        ear = Ear((0.5,) * samples.shape[1])
+        voice = cls(
+            program, torch.full((3,), FULL_SCALE_M), ear, 1.0, len(samples) / program.rate_hz, program.rate_hz
+        )
+        voice.append(samples)
+        voice.end_here()
+        return voice
 
     @property
     def address(self) -> int:
@@ -107,6 +126,24 @@ class Voice:
         """Fades to another gain."""
         self.memory[at.WANTED_GAIN] = gain
 
+    def start_with_gain(self, gain: float) -> None:
+        """Before it is handed over: it begins with this gain, without a fade."""
+        self.memory[at.WANTED_GAIN] = self.memory[at.GAIN] = gain
+        self.memory[at.GAIN_FROM] = self.memory[at.GAIN_TO] = gain
+
+    def begin_at(self, frame: int) -> None:
+        """Before it is handed over: it waits for this frame of the mixer."""
+        self._counts[at.BEGIN_AT] = frame
+
+    def release_at(self, frame: int) -> None:
+        """It fades out from this frame of the mixer on; 0: it does not."""
+        self._counts[at.RELEASE_AT] = frame
+
+    @property
+    def began_frame(self) -> int:
+        """Of the mixer."""
+        return int(self._counts[at.BEGAN_FRAME])
+
     def release(self, seconds: float) -> None:
         """Fades to silence and ends; a release under way goes on."""
         if self._counts[at.RELEASE] == 0:
@@ -140,6 +177,14 @@ class Voice:
     def room(self) -> int:
         """Samples that a rendered voice still lacks."""
         return 0 if self._samples is None else len(self._samples) - int(self._counts[at.READY])
+
+    def loop(self) -> None:
+        """A rendered voice of the device's own rate begins anew after its last sample."""
+        self._counts[at.LOOPED] = 1
+
+    def never_ends(self) -> None:
+        """It goes on when it has become silent: whoever renders it knows how long."""
+        self.memory[at.SILENT] = -math.inf
 
     def end_here(self) -> None:
         """A rendered voice has no more samples than it was given."""

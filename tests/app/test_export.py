@@ -26,7 +26,7 @@ from app.export import (
     write_wav,
 )
 from app.recipe import Recipe
-from app.sound_names import FULL_SCALE_M_S
+from engine.pluck import FULL_SCALE_M_S
 from app.wav_chunks import Marker, read_markers
 from engine.pluck import Pluck
 from engine.preset import load_preset

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.analysis.heard import HeardMotion, HeardSignal
-from app.rendering import DIFFERENCE, Listening, Take
+from app.rendering import DIFFERENCE, Take
+from engine.voices import Ear
 from app.rendering.take import Motion
 from app.rendering.velocity import Differentiator
 from engine.pluck import Pluck
@@ -30,7 +31,7 @@ def take() -> Take:
 
 
 def test_displacement_is_the_takes_own_signal(take: Take) -> None:
-    heard = HeardSignal(HeardMotion(take, "truth"), Listening((0.37,)))
+    heard = HeardSignal(HeardMotion(take, "truth"), Ear((0.37,)))
     assert heard.ready == take.frames
     assert heard.read(100, 300) == pytest.approx(take.signal_m("truth", 0.37, 100, 300), abs=1e-9)
     assert len(heard.read(take.frames - 3, take.frames + 50)) == 3
@@ -39,7 +40,7 @@ def test_displacement_is_the_takes_own_signal(take: Take) -> None:
 
 @pytest.mark.parametrize("split", [1, 31, 64, 777])
 def test_any_part_of_a_velocity_is_a_part_of_the_whole(take: Take, split: int) -> None:
-    heard = HeardSignal(HeardMotion(take, "truth"), Listening((0.37,), "velocity"))
+    heard = HeardSignal(HeardMotion(take, "truth"), Ear((0.37,), "velocity"))
     whole = Differentiator(INFO.rate_hz).feed(take.signal_m("truth", 0.37)[:, None], last=True)[:, 0]
     parts = [heard.read(first, first + split) for first in range(0, take.frames, split)]
     assert np.concatenate(parts) == pytest.approx(whole, abs=1e-5)
@@ -51,7 +52,7 @@ def test_a_velocity_waits_for_what_follows(take: Take) -> None:
     growing = Take("t", INFO, Pluck(), 0.5)
     motion = take.motion_m("truth")
     growing.append(motion[:200], motion[:200])
-    ears = Listening((0.37,), "velocity")
+    ears = Ear((0.37,), "velocity")
     early = HeardSignal(HeardMotion(growing, "truth"), ears)
     assert 100 < early.ready < 200
     whole = HeardSignal(HeardMotion(take, "truth"), ears)
@@ -60,11 +61,11 @@ def test_a_velocity_waits_for_what_follows(take: Take) -> None:
 
 def test_the_difference_has_its_gain_and_solo_is_one_mode(take: Take) -> None:
     at = 0.25  # where the second mode is largest
-    difference = HeardSignal(HeardMotion(take, DIFFERENCE, 10.0), Listening((at,))).read(0, 9_999)
-    alone = HeardSignal(HeardMotion(take, "truth"), Listening((at,), solo=2)).read(0, 9_999)
+    difference = HeardSignal(HeardMotion(take, DIFFERENCE, 10.0), Ear((at,))).read(0, 9_999)
+    alone = HeardSignal(HeardMotion(take, "truth"), Ear((at,), solo=2)).read(0, 9_999)
     assert np.abs(alone).max() == pytest.approx(1e-4, rel=1e-3)
     assert difference == pytest.approx(alone, abs=1e-7)  # a tenth, ten times as loud
-    assert not HeardSignal(HeardMotion(take, "truth"), Listening((at,), solo=200)).read(0, 9).any()
+    assert not HeardSignal(HeardMotion(take, "truth"), Ear((at,), solo=200)).read(0, 9).any()
 
 
 def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Take) -> None:
@@ -75,4 +76,4 @@ def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Ta
     take.others["preset:other"].append(np.ones((40, 11), np.float32))
     assert other.there
     assert (other.rate_hz, other.frames, other.ready, other.grid_points) == (1_000, 501, 40, 11)
-    assert len(HeardSignal(other, Listening((0.5,))).read(0, 501)) == 40
+    assert len(HeardSignal(other, Ear((0.5,))).read(0, 501)) == 40

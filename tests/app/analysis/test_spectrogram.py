@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from app.analysis.spectrogram import FLOOR_DB, FrequencyRows, Spectrogram
-from app.rendering import Listening, Take
+from app.rendering import Take
+from engine.voices import Ear
 
 RATE_HZ = 4000
 
@@ -22,7 +23,7 @@ def tone(frequency_hz: float, amplitude_m: float) -> NDArray[np.float32]:
 
 
 def grown(take: Take, listen: float = 0.5) -> Spectrogram:
-    made = Spectrogram(take, Listening((listen,)))
+    made = Spectrogram(take, Ear((listen,)))
     while made.advance():
         pass
     return made
@@ -39,13 +40,13 @@ def test_a_sine_has_its_level_at_its_frequency_from_the_first_column(make_take: 
 
 def test_a_velocity_is_louder_by_its_frequency_from_the_first_column(make_take: Callable[..., Take]) -> None:
     take = make_take(tone(750, 1e-3), tone(750, 2e-3))
-    made = Spectrogram(take, Listening((0.5,), "velocity"))
+    made = Spectrogram(take, Ear((0.5,), "velocity"))
     while made.advance():
         pass
     assert made.complete
     full_db = 20 * np.log10(2e-3 * 2 * np.pi * 750 / 30)
     assert made.levels_db["truth"].max(axis=1) == pytest.approx(np.full(made.columns, full_db), abs=0.3)
-    alone = Spectrogram(take, Listening((0.5,), solo=2))
+    alone = Spectrogram(take, Ear((0.5,), solo=2))
     while alone.advance():
         pass
     assert alone.levels_db["truth"].max() < -120  # there is the first mode alone
@@ -62,7 +63,7 @@ def test_growing_in_pieces_is_the_same(make_take: Callable[..., Take]) -> None:
     motion = np.random.default_rng(2).standard_normal((2001, 101)).astype(np.float32)
     whole = grown(make_take(motion, motion[::-1].copy()))
     take = make_take(motion, motion[::-1].copy(), 30)
-    made = Spectrogram(take, Listening((0.5,)))
+    made = Spectrogram(take, Ear((0.5,)))
     counts = []
     for stop in (31, 130, 131, 777, 2001):
         take.append(motion[take.ready_frames : stop], motion[::-1][take.ready_frames : stop])

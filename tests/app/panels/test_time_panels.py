@@ -27,7 +27,8 @@ from app.panels import (
     WaveformPanel,
 )
 from app.panels.spectrum import EVERY
-from app.rendering import Listening, Take
+from app.rendering import Take
+from engine.voices import Ear
 from app.rendering.take import Motion
 from app.session import Choices, Session
 from app.shown import ShownSource
@@ -174,7 +175,7 @@ def test_the_spectrogram_follows_the_listening_point(qtbot: QtBot, make: Make, t
 
         def drawn(listen: float = listen) -> bool:
             made = panel._drawn_of[0] if panel._drawn_of else None
-            return made is not None and made.listening == Listening((listen,)) and panel._drawn == made.columns
+            return made is not None and made.listening == Ear((listen,)) and panel._drawn == made.columns
 
         watch(qtbot, panel, take, drawn)
         peaks_db.append(panel.view._levels_db[10].max())
@@ -296,7 +297,7 @@ def test_the_waveform_is_that_of_the_listening_point(qtbot: QtBot, make: Make, t
     panel = make(WaveformPanel)
     for listen in (0.37, 0.8):
         panel.session.update(listen=listen)
-        ears = Listening((listen,))
+        ears = Ear((listen,))
         watch(qtbot, panel, take, lambda ears=ears: panel._shown[1:3] == ({"model": FRAMES, "truth": FRAMES}, ears))
         time_s, drawn_mm = panel.view._curves["model"].getData()
         signal_mm = 1000 * take.signal_m("model", listen)
@@ -333,7 +334,7 @@ def test_a_velocity_is_drawn_in_m_s(qtbot: QtBot, make: Make, take: Take) -> Non
     assert spectrum.view._levels_db["truth"].max() == pytest.approx(expected_db, abs=2.5)
     assert "30 m/s" in spectrum.view.plot.getPlotItem().getAxis("left").labelText
     choose(spectrum, pickup="displacement")
-    watch(qtbot, spectrum, take, lambda: spectrum._shown[3:] == (Listening((0.5,)),))
+    watch(qtbot, spectrum, take, lambda: spectrum._shown[3:] == (Ear((0.5,)),))
     assert spectrum.view._levels_db["truth"].max() == pytest.approx(
         20 * np.log10(0.004 * np.exp(-1.5) / 0.01), abs=2.5
     )

@@ -1,0 +1,293 @@
+"""The sound of the app: a mixer, the output that takes its frames, and a thread that looks after the output.
+
+any thread ── voices, gains ──► Mixer ◄── device's own thread (compiled, without the interpreter) ──► loudspeaker
+caretaker thread: opens and changes devices, finds lost ones again, frees what has rung out
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from queue import Empty, SimpleQueue
+
+from app.audio.devices import AudioDevice, default_device, find
+from app.audio.output import ClockOutput, DeviceOutput, Output
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, stalled, vanished
+from engine.voices.mixer import Gap, Mixer
+
+DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
+BUFFER_S = 0.012
+TRY_AGAIN_S = 1.0  # between two looks for a device that vanished
+LOOK_EVERY_S = 0.05
+MOST_GAPS = 200  # that are remembered
+JOIN_TIMEOUT_S = 5.0
+
+LookUp = Callable[[AudioDevice | None, bool], AudioDevice]
+Open = Callable[[AudioDevice, float, Mixer], Output]
+
+
+@dataclass(frozen=True)
+class SoundStatus:
+    """A snapshot, some 50 ms old at most.
+
+    Attributes:
+        device: None: silent.
+        rate_hz: of the mixer; opening a device may change it, and all voices end then.
+        latency_s: the device's buffer.
+        gaps: silences that nobody asked for, of this run.
+        load: the share of the device's time that the mixer takes.
+        changes_done: how many calls of `open` have been obeyed, or refused.
+        problem: why there is no sound, or why the last device could not be opened.
+    """
+
+    device: AudioDevice | None = None
+    rate_hz: int = DEFAULT_RATE_HZ
+    latency_s: float = 0.0
+    gaps: tuple[Gap, ...] = ()
+    load: float = 0.0
+    changes_done: int = 0
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
+class _Wish:
+    """An output as it was asked for; see `Sound.open`."""
+
+    device: AudioDevice | None = None
+    buffer_s: float = BUFFER_S
+    rate_hz: int = 0
+    buffer_frames: int = 0
+    rescan: bool = False
+
+    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
+        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
+
+    def buffer_s_at(self, rate_hz: int) -> float:
+        return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
+
+
+def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
+    """The device as it is now, or, for None, the system's default."""
+    return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
+
+
+class Sound:
+    """Every public method may be called from any thread and returns at once.
+
+    Args:
+        on_problem: Called once for each fault of a device, from the caretaker thread.
+        look_up, open_output: Find and open a device; tests put others in.
+    """
+
+    def __init__(
+        self,
+        on_problem: Callable[[AudioProblem], None] | None = None,
+        rate_hz: int = DEFAULT_RATE_HZ,
+        look_up: LookUp = look_up,
+        open_output: Open = DeviceOutput,
+    ) -> None:
+        self._on_problem, self._look_up, self._open_output = on_problem, look_up, open_output
+        self.mixer = Mixer(rate_hz)
+        self._output: Output = ClockOutput(self.mixer)
+        self._volume_db = 0.0
+        self._wish = _Wish()
+        self._wishes: SimpleQueue[_Wish] = SimpleQueue()
+        self._woken = threading.Event()
+        self._closing = threading.Event()
+        self._lost: _Wish | None = None  # its device vanished while it was ours: tried again now and then
+        self._try_again_s = 0.0
+        self._stalled = False  # and told
+        self._gaps: deque[Gap] = deque(maxlen=MOST_GAPS)
+        self._status = SoundStatus(rate_hz=rate_hz)
+        self._caretaker = threading.Thread(target=self._take_care, name="sound-caretaker", daemon=True)
+        self._caretaker.start()
+
+    def open(
+        self,
+        device: AudioDevice | None = None,
+        buffer_s: float = BUFFER_S,
+        rate_hz: int = 0,
+        buffer_frames: int = 0,
+        rescan: bool = False,
+    ) -> None:
+        """Changes to another device, known by name and host API, or, for None, to the system's default.
+
+        The present one is taken again if a new one, or a new rate or buffer, is refused; then `on_problem` hears of
+        it. What rings goes on where the rate stays, and ends where it changes.
+
+        Args:
+            buffer_s: the device's buffer: longer is safer, shorter more prompt.
+            rate_hz: 0 for the device's own.
+            buffer_frames: the buffer in frames at that rate; 0 for `buffer_s`.
+            rescan: looks for devices that were plugged in meanwhile, which interrupts the present one.
+        """
+        self._wishes.put(_Wish(device, buffer_s, rate_hz, buffer_frames, rescan))
+        self._woken.set()
+
+    @property
+    def rate_hz(self) -> int:
+        return self.mixer.rate_hz
+
+    def now_s(self) -> float:
+        """The clock of the output, by which a gesture is timed."""
+        try:
+            return self._output.now_s()
+        except Exception:  # the output is being changed
+            return 0.0
+
+    def set_volume_db(self, volume_db: float) -> None:
+        """0 dB leaves the samples as they are, minus infinity mutes."""
+        if math.isnan(volume_db) or volume_db == math.inf:
+            raise ValueError(f"The volume cannot be {volume_db} dB.")
+        self._volume_db = volume_db
+        self.mixer.set_volume(10 ** (volume_db / 20))
+
+    def sound_tone(self, side: str) -> None:
+        """A soft tone for a second on "left", "right" or "both" sides, whatever else is playing."""
+        self.mixer.sound_tone(side)
+
+    def status(self) -> SoundStatus:
+        return self._status
+
+    def close(self) -> None:
+        """Cuts the sound, ends the thread and frees the device; may be called again."""
+        self._closing.set()
+        self._woken.set()
+        if threading.current_thread() is not self._caretaker:
+            self._caretaker.join(JOIN_TIMEOUT_S)
+
+    def __enter__(self) -> Sound:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # All below runs in the caretaker's thread.
+
+    def _take_care(self) -> None:
+        try:
+            while not self._closing.is_set():
+                self._woken.wait(LOOK_EVERY_S)
+                self._woken.clear()
+                self._obey()
+                if self._closing.is_set():
+                    break
+                self._look_at_output()
+                self.mixer.forget_ended()
+                self._gaps.extend(self.mixer.new_gaps())
+                self._publish()
+        except Exception:
+            self._report(
+                AudioProblem(
+                    ProblemKind.OTHER,
+                    "Playback has stopped because of a fault in this program.",
+                    "Start the app again, and please report the details.",
+                    traceback.format_exc(),
+                )
+            )
+        finally:
+            self._output.close()
+
+    def _obey(self) -> None:
+        while True:
+            try:
+                wish = self._wishes.get_nowait()
+            except Empty:
+                return
+            self._change(wish)
+            self._status = replace(self._status, changes_done=self._status.changes_done + 1)
+
+    def _change(self, wish: _Wish) -> None:
+        before = self._wish if self._output.device is not None else None
+        present = self._output.device
+        self._lost = None
+        try:
+            if wish.rescan or present is None:
+                self._be_silent()
+            device = wish.at_its_rate(self._look_up(wish.device, wish.rescan or present is None))
+            if device == present and self._wish == wish:
+                return
+            self._be_silent()  # it might refuse to be opened twice
+            self._adopt(device, wish)
+        except AudioUnavailable as error:
+            if before is not None and present is not None:
+                self._reopen(present, before)
+            elif error.kind is ProblemKind.VANISHED:  # it may still be plugged in
+                self._lose(wish)
+            self._report(error.problem)
+
+    def _adopt(self, device: AudioDevice, wish: _Wish) -> None:
+        """Opens a device; its mixer is the present one where the rate stays."""
+        rate_hz, channels = device.default_rate_hz, min(device.channels, 2)
+        mixer = self.mixer
+        if rate_hz != mixer.rate_hz or channels != mixer.channels:
+            mixer = Mixer(rate_hz, channels)
+            mixer.set_volume(10 ** (self._volume_db / 20))
+        old = self._output
+        old.close()
+        try:
+            self._output = self._open_output(device, wish.buffer_s_at(rate_hz), mixer)
+        except AudioUnavailable:
+            self._output = ClockOutput(self.mixer)
+            raise
+        self.mixer, self._wish, self._stalled = mixer, wish, False
+        self._status = replace(self._status, problem=None)
+
+    def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
+        """The device as it was before a change that was refused; if it is gone too, it is looked for."""
+        try:
+            self._adopt(device, wish)
+        except AudioUnavailable:
+            self._lose(wish)
+
+    def _be_silent(self) -> None:
+        if self._output.device is not None:
+            self._output.close()
+            self._output = ClockOutput(self.mixer)
+
+    def _look_at_output(self) -> None:
+        output = self._output
+        if output.device is not None and output.lost():
+            device = output.device
+            self._be_silent()
+            self._lose(replace(self._wish, device=self._wish.device or device))
+            self._report(vanished(device.name).problem)
+        elif output.stalled() and not self._stalled and output.device is not None:
+            self._stalled = True
+            self._report(stalled(output.device.name))
+        elif self._stalled and not output.stalled():
+            self._stalled = False
+            self._status = replace(self._status, problem=None)
+        if self._lost is not None and time.monotonic() >= self._try_again_s:
+            self._try_again_s = time.monotonic() + TRY_AGAIN_S
+            try:
+                self._adopt(self._lost.at_its_rate(self._look_up(self._lost.device, True)), self._lost)
+                self._lost = None
+            except AudioUnavailable:
+                pass
+
+    def _lose(self, wish: _Wish) -> None:
+        """It is taken again when it is back; until then nothing more is said of it."""
+        self._lost, self._try_again_s = wish, time.monotonic() + TRY_AGAIN_S
+
+    def _report(self, problem: AudioProblem) -> None:
+        # who hears of it may look at once
+        self._status = replace(self._status, problem=str(problem), device=self._output.device)
+        if self._on_problem is not None:
+            self._on_problem(problem)
+
+    def _publish(self) -> None:
+        output = self._output
+        self._status = replace(
+            self._status,
+            device=output.device,
+            rate_hz=self.mixer.rate_hz,
+            latency_s=output.latency_s,
+            gaps=tuple(self._gaps),
+            load=output.load(),
+        )

@@ -1,0 +1,180 @@
+"""Models that are no compiled voice: their samples are rendered ahead of the playhead, by one thread.
+
+Where a model is slower than it sounds it begins only when what is left will be ready in time. It never makes holes in
+others: whoever reads samples that are not there stands still by itself.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.precedence import Rank, step_back
+from engine.pluck import FULL_SCALE_M
+from engine.sources import ModelSource, Runaway, SourceState
+from engine.voices import Voice
+
+FIRST_FRAMES, BLOCK_FRAMES = 256, 1024
+LEAST_S = 0.06  # rendered before it begins
+CARE = 0.9  # of its speed that is counted on
+SILENT = 1e-5  # of full scale
+KEPT = 32  # plucks that need not be rendered again
+
+
+@dataclass
+class AheadVoice:
+    """A voice with the source that renders it.
+
+    Attributes:
+        begin: hands the note over; called once, when enough is rendered.
+        ends_s: where the model ran away.
+    """
+
+    voice: Voice
+    source: ModelSource
+    initial_m: torch.Tensor
+    weights: torch.Tensor
+    key: tuple[object, ...]
+    begin: Callable[[], None]
+    failed: Callable[[Exception], None]
+    ends_s: float | None = None
+    _state: SourceState | None = None
+    _frames: list[NDArray[np.float32]] = field(default_factory=list)
+    _spent_s: float = 0.0
+    done: int = 0
+    finished: bool = False
+    begun: bool = False
+
+    @property
+    def rendered_s(self) -> float:
+        return self.done / self.source.rate_hz
+
+    @property
+    def speed(self) -> float:
+        """Seconds of sound in a second of rendering; 0 before the first block."""
+        return self.rendered_s / self._spent_s if self._spent_s > 0 else 0.0
+
+    @property
+    def wanted_s(self) -> float:
+        """So much must be there before it begins."""
+        total_s = self.done / self.source.rate_hz + self.voice.room / self.source.rate_hz
+        return max(LEAST_S, total_s * (1 - CARE * self.speed)) if self.speed else LEAST_S
+
+    @property
+    def waits_s(self) -> float:
+        """How long until then, as far as is known."""
+        if self.begun or not self.speed:
+            return 0.0
+        return max(0.0, (self.wanted_s - self.rendered_s) / self.speed)
+
+    @property
+    def may_begin(self) -> bool:
+        return self.finished or self.rendered_s >= self.wanted_s
+
+    @property
+    def lead_s(self) -> float:
+        """How far the rendering is ahead of what is heard."""
+        return self.rendered_s - (self.voice.seconds if self.begun else -1.0)
+
+    def advance(self) -> None:
+        began_s = time.monotonic()
+        if self._state is None:
+            self._state = self.source.start(self.initial_m[None])
+            block = (self.initial_m.double() @ self.weights)[None]
+        else:
+            steps = min(BLOCK_FRAMES if self.done > FIRST_FRAMES else FIRST_FRAMES, self.voice.room)
+            try:
+                frames, self._state = self.source.advance(self._state, steps, self.weights)
+                block = frames[0].double()
+            except Runaway as error:
+                self.ends_s, self.finished = error.time_s, True
+                self.voice.end_here()
+                return
+        samples = (block / FULL_SCALE_M).float().numpy()
+        self._take(samples)
+        self._frames.append(samples)
+        self._spent_s += time.monotonic() - began_s
+        if self.voice.room == 0 or (self.done > FIRST_FRAMES and float(np.abs(samples).max()) < SILENT):
+            self.voice.end_here()
+            self.finished = True
+
+    def take_known(self, samples: NDArray[np.float32]) -> None:
+        """All of it, from an earlier pluck."""
+        self._take(samples)
+        self.voice.end_here()
+        self.finished = True
+
+    @property
+    def samples(self) -> NDArray[np.float32]:
+        return np.concatenate(self._frames)
+
+    def _take(self, samples: NDArray[np.float32]) -> None:
+        self.voice.append(samples)
+        self.done += len(samples)
+
+
+class Ahead:
+    """The thread. `close` ends it."""
+
+    def __init__(self) -> None:
+        self._mailbox = threading.Condition()
+        self._voices: list[AheadVoice] = []
+        self._known: OrderedDict[tuple[object, ...], NDArray[np.float32]] = OrderedDict()
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def render(self, voice: AheadVoice) -> None:
+        """Begins, or, where this very pluck is known, has it at once."""
+        with self._mailbox:
+            known = self._known.get(voice.key)
+            if known is None:
+                self._voices.append(voice)
+                self._mailbox.notify()
+                if self._thread is None:
+                    self._thread = threading.Thread(target=self._run, name="render-ahead", daemon=True)
+                    self._thread.start()
+                return
+        voice.take_known(known)
+        voice.begun = True
+        voice.begin()
+
+    def close(self) -> None:
+        """May be called again."""
+        with self._mailbox:
+            self._closing = True
+            self._mailbox.notify()
+        if self._thread is not None:
+            self._thread.join(10)
+
+    def _run(self) -> None:
+        step_back(Rank.RENDERING)
+        while True:
+            with self._mailbox:
+                self._voices = [each for each in self._voices if not each.finished and not each.voice.over]
+                self._mailbox.wait_for(lambda: bool(self._voices) or self._closing)
+                if self._closing:
+                    return
+                voice = min(self._voices, key=lambda each: each.lead_s)
+            try:
+                voice.advance()
+                if voice.finished and voice.ends_s is None:
+                    self._keep(voice)
+                if not voice.begun and voice.may_begin:
+                    voice.begun = True
+                    voice.begin()
+            except Exception as error:
+                voice.finished = True
+                voice.failed(error)
+
+    def _keep(self, voice: AheadVoice) -> None:
+        with self._mailbox:
+            self._known[voice.key] = voice.samples
+            while len(self._known) > KEPT:
+                self._known.popitem(last=False)

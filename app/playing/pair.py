@@ -1,0 +1,45 @@
+"""Two sounds side by side, one of which is heard: looped, and switched without a click."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.voices import Mixer, Voice, plain_program
+
+STOP_S = 0.012
+
+
+class Pair:
+    """Samples of the mixer's own rate, by name, (frames, channels) of one length. Begun, told and ended by one thread."""
+
+    def __init__(self, mixer: Mixer, samples: Mapping[str, NDArray[np.float32]]) -> None:
+        self._mixer, self._samples = mixer, samples
+        self._voices: dict[str, Voice] = {}
+        self._heard = ""
+
+    def select(self, name: str) -> None:
+        """Which one is heard, from now on: a cross-fade where they sound."""
+        self._heard = name
+        for each, voice in self._voices.items():
+            voice.set_gain(float(each == name))
+
+    def play(self, anew: bool = False) -> None:
+        """Begins where nothing sounds, or `anew`; otherwise both go on."""
+        if self._voices and not anew:
+            return
+        self.stop()
+        for name, samples in self._samples.items():
+            voice = Voice.of_samples(plain_program(self._mixer.rate_hz), samples)
+            voice.loop()
+            voice.start_with_gain(float(name == self._heard))
+            self._voices[name] = voice
+        self._mixer.add(*self._voices.values())
+
+    def stop(self) -> None:
+        """Fades out."""
+        for voice in self._voices.values():
+            voice.release(STOP_S)
+        self._voices = {}

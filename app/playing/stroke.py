@@ -1,0 +1,71 @@
+"""What is plucked, and how loud each of its sources is heard: values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.sound_names import DIFFERENCE
+from engine.pluck import Pluck
+from engine.voices.ear import Ear
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A pluck of a preset's string.
+
+    Attributes:
+        seconds: how long a model that is rendered ahead lasts at most; all others ring until they are silent.
+        sources: voices that are wanted: "model", "truth", and others' names.
+        others: paths of other presets by source name, `OTHER` and their name.
+    """
+
+    preset: Path
+    pluck: Pluck
+    ear: Ear
+    seconds: float
+    sources: tuple[str, ...]
+    others: Mapping[str, Path] = field(default_factory=dict)
+
+    def path(self, source: str) -> Path:
+        """Of the preset that a source belongs to."""
+        return self.others.get(source, self.preset)
+
+    @property
+    def matching_key(self) -> tuple[object, ...]:
+        """What the levels of its sources depend on."""
+        return (self.preset, self.pluck, self.ear, self.sources, tuple(self.others.values()))
+
+
+@dataclass(frozen=True)
+class Mix:
+    """What is heard of notes.
+
+    Attributes:
+        heard: a source's name, or `DIFFERENCE`.
+        matched: each source sounds with the gain that brings its level to the truth's, once that is known.
+        difference_gain_db: of the difference.
+    """
+
+    heard: str = "model"
+    matched: bool = False
+    difference_gain_db: float = 0.0
+
+    def gain(self, source: str, match: Mapping[str, float] | None) -> float:
+        """With which a voice sounds; 0: it is only kept ready."""
+        if self.heard == DIFFERENCE:
+            gain = float(10 ** (self.difference_gain_db / 20))
+            return {"model": gain, "truth": -gain}.get(source, 0.0)
+        if source != self.heard:
+            return 0.0
+        return match.get(source, 1.0) if self.matched and match else 1.0
+
+    def gain_db(self, source: str, match: Mapping[str, float] | None) -> float | None:
+        """With which a slot's content is heard, in dB; None while that is not known."""
+        if source == DIFFERENCE:
+            return self.difference_gain_db
+        if not self.matched:
+            return 0.0
+        return None if match is None else 20 * math.log10(match.get(source, 1.0))

@@ -1,0 +1,69 @@
+"""A voice rendered for a file: sample by sample what a device would be given, as fast as it can be had."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from engine.kernels import layout as at
+from engine.pluck import FULL_SCALE_M, Pluck
+from engine.preset import PresetInfo
+from engine.sources import ModelSource, Runaway, project
+from engine.voices.ear import Ear
+from engine.voices.mixer import Mixer
+from engine.voices.programs import Program
+from engine.voices.voice import Voice
+
+BLOCK_FRAMES = 4096  # between two looks at `advanced`
+
+
+def render_voice(
+    program: Program,
+    source: ModelSource,
+    info: PresetInfo,
+    pluck: Pluck,
+    ear: Ear,
+    seconds: float,
+    advanced: Callable[[float], None] = lambda share: None,
+) -> NDArray[np.float32]:
+    """The first seconds of a pluck, (frames, points), ±1 being full scale; no limiter.
+
+    Args:
+        source: what renders the samples of a program that is not compiled.
+        advanced: is told the share that is done now and then; may raise, to end it.
+
+    Raises:
+        Runaway: the output stopped being a string's.
+    """
+    initial_m = project(pluck.displacement(info.grid_points), info.modes)
+    rendered = program.kind == at.RENDERED
+    voice = Voice(program, initial_m, ear, 1.0, seconds + 0.1 if rendered else 0.0, info.rate_hz)
+    if rendered:
+        _fill(voice, source, initial_m, ear, advanced)
+    voice.never_ends()
+    mixer = Mixer(program.rate_hz, limited=False)
+    mixer.add(voice)
+    frames = max(1, round(seconds * program.rate_hz))
+    out = np.zeros((frames, len(ear.points)), np.float32)
+    for first in range(0, frames, BLOCK_FRAMES):
+        block = mixer.render(min(BLOCK_FRAMES, frames - first))
+        if voice.ran_away:
+            raise Runaway(voice.seconds)
+        out[first : first + len(block)] = block[:, : len(ear.points)]
+        advanced((first + len(block)) / frames)
+    return out
+
+
+def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanced: Callable[[float], None]) -> None:
+    """Renders all samples of a voice beforehand."""
+    weights = ear.weights(source.grid_points)
+    state = source.start(initial_m[None])
+    voice.append(((initial_m.double() @ weights)[None] / FULL_SCALE_M).float().numpy())
+    total = voice.room
+    while voice.room:
+        frames, state = source.advance(state, min(BLOCK_FRAMES, voice.room), weights)
+        voice.append((frames[0].double() / FULL_SCALE_M).float().numpy())
+        advanced(0.99 * (1 - voice.room / max(total, 1)))
