@@ -47,7 +47,7 @@ class Instruments(QObject):
 
     def perform(self, changes: dict[str, Any], plucks: bool) -> None:
         """New values of `Choices`, and a pluck."""
-        self._session.update(**changes)
+        (self._session.play if plucks else self._session.update)(**changes)
         if plucks:
             self.plucked.emit()
 
