@@ -266,6 +266,23 @@ def test_shading_envelope_and_focus_are_seen(qtbot: QtBot, view: StringView) -> 
     assert picture(view).pixel(at) != without.pixel(at)
 
 
+def test_of_two_motions_in_one_place_both_are_seen(view: StringView) -> None:
+    """And of two that part only the one that is there."""
+    shape = 2 * np.sin(np.pi * np.linspace(0, 1, 101)).astype(np.float32)
+
+    def seen(mm: float) -> int:
+        """How many pixels on the model's line are of the truth's hue, which has more blue in it than red."""
+        shapes = {"model": shape, "truth": shape - np.float32(mm)}
+        view.show_frame(StringFrame(shapes, shapes, shapes))
+        drawn, axes = picture(view), view._axes()
+        line = [axes.at(place, 2 * np.sin(np.pi * place)).toPoint() for place in np.linspace(0.1, 0.9, 400)]
+        colours = [drawn.pixelColor(at) for at in line]
+        return sum(colour.blue() > colour.red() + 40 for colour in colours)
+
+    assert seen(0.5) == 0
+    assert 80 < seen(0.0) < 200
+
+
 def test_the_pluck_comes_back_when_no_motion_is_shown(view: StringView) -> None:
     rest = picture(view)
     still = np.zeros(101, np.float32)
