@@ -46,6 +46,7 @@ TOUR = (
 )
 
 GESTURES = (
+    ("Click on the string", "pluck there, as far as the last time"),
     ("Drag on the string", "pluck there, that far"),
     ("Drag the green marker", "move the listening point; double-click resets it"),
     ("Arrow keys on the string", "move the pluck; with Shift the listening point"),

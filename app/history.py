@@ -1,7 +1,8 @@
 """Undo and redo: earlier values of what shapes the sound, around the session, which stays the one truth.
 
 A step is one gesture: all that changes between `hold` and `let_go` (a drag), or changes of the same fields that
-follow each other within half a second (keys, wheel notches, a controller).
+follow each other within half a second (keys, wheel notches, a controller). It takes back what it changed and nothing
+else: notes that are played (`Session.play`) are no steps, and the place of the last one stays.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ RECORDED = frozenset({*PLUCK, *EARS})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 
-Values = dict[str, Any]  # of the recorded fields
+Values = dict[str, Any]  # of recorded fields
 
 
 class History:
@@ -31,10 +32,11 @@ class History:
         self._now_s = now_s
         self._undo: deque[Values] = deque(maxlen=LARGEST_STEPS)
         self._redo: list[Values] = []
-        self._present = _recorded(session.choices)
+        self._present = _recorded(session.choices)  # all of them
         self._held = False
         self._open_fields: frozenset[str] | None = None  # of the step that still gathers; None: the next is a new one
         self._changed_s = 0.0
+        session.played.connect(self._choices_played)
         session.changed.connect(self._choices_changed)
 
     @property
@@ -65,22 +67,29 @@ class History:
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:
         self.let_go()
         while source:
-            wanted, here = source.pop(), self._present
+            wanted = source.pop()
+            here = {name: self._present[name] for name in wanted}
             if wanted != here:  # a drag that came back to its start is no step
                 target.append(here)
-                self._present = wanted
+                self._present |= wanted
                 self._session.update(**wanted)
                 return
+
+    def _choices_played(self, _: frozenset[str]) -> None:
+        self._present = _recorded(self._session.choices)
 
     def _choices_changed(self, names: frozenset[str]) -> None:
         values = _recorded(self._session.choices)
         fields = names & RECORDED
-        if not fields or values == self._present:  # the latter while a step is restored
+        if not fields or values == self._present:  # the latter while a step is restored, or a note played
             return
         now_s = self._now_s()
         soon = fields == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):
-            self._undo.append(self._present)
+            self._undo.append({})
+        step = self._undo[-1]
+        for name in fields - step.keys():
+            step[name] = self._present[name]
         self._redo.clear()
         self._open_fields, self._changed_s, self._present = fields, now_s, values
 

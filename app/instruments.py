@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -40,6 +41,7 @@ class Instruments(QObject):
         self._session = session
         self._library = library
         self._strike = strike
+        self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # of notes, and not in the session yet
         self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
@@ -67,15 +69,18 @@ class Instruments(QObject):
     def perform(self, changes: dict[str, Any], plucks: bool) -> None:
         """New values of `Choices`, and a pluck. Any thread."""
         if plucks:
-            self._strike(self._session.choices.model_copy(update={**self._told, **changes}))
-            self._told = {**self._told, **changes}
+            with self._lock:
+                self._told = {**self._told, **changes}
+                choices = self._session.choices.model_copy(update=self._told)
+            self._strike(choices)
             self._struck.emit(changes)
         else:
             self._session.update(**changes)
 
     def _tell_session(self, changes: dict[str, Any]) -> None:
         """Once for all notes that were struck meanwhile."""
-        told, self._told = self._told, {}
+        with self._lock:
+            told, self._told = self._told, {}
         if told:
             self._session.play(**told)
             self.played.emit()

@@ -69,9 +69,13 @@ class Choices(BaseModel):
 
 
 class Session:
-    """The present choices. `changed` carries the set of field names that have new values."""
+    """The present choices. `changed` carries the set of field names that have new values.
+
+    `played` does so before it, where a note brings them and nobody chooses them one by one.
+    """
 
     changed = Signal(frozenset)
+    played = Signal(frozenset)
 
     def __init__(self, choices: Choices | None = None) -> None:
         self._choices = choices or Choices()
@@ -86,19 +90,24 @@ class Session:
         Raises:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
         """
+        if names := self._take(changes):
+            self.changed.emit(names)
+
+    def play(self, **changes: Any) -> None:
+        """`update` by a note: what it changes is no step of undo."""
+        if names := self._take(changes):
+            self.played.emit(names)
+            self.changed.emit(names)
+
+    def _take(self, changes: dict[str, Any]) -> frozenset[str]:
+        """The fields that have new values then."""
         try:
             new = Choices.model_validate({**self._choices.model_dump(), **changes})
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
         before, self._choices = self._choices, new
-        names = frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
-        if names:
-            self.changed.emit(names)
-
-    def play(self, **changes: Any) -> None:
-        """As `update`, of a note that was played: no step of the history."""
-        self.update(**changes)
+        return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
         """Takes the nearest allowed pluck: for gestures, which know no limits."""

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.library import Library
 from app.rendering import Take
-from app.session import Session
+from app.session import Choices, Session
 from engine.metrics import ErrorSums
 
 
@@ -34,6 +34,10 @@ class Moment:
     position_s: float
     playing: bool
     elapsed_s: float
+
+    def standing(self, choices: Choices) -> tuple[object, ...]:
+        """What a picture of the take depends on; as long as it is the same and nothing plays, so is the picture."""
+        return self.take, self.take.ready_bytes if self.take is not None else 0, self.position_s, choices
 
 
 class Panel(QObject):

@@ -31,6 +31,7 @@ class SpectrumPanel(Panel):
         super().__init__(session, library)
         self.view = SpectrumView()
         self._moments = 0
+        self._standing: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
         self._partials_hz = np.zeros(0)
         self._hovered_hz = math.nan
@@ -45,7 +46,7 @@ class SpectrumPanel(Panel):
             self.view.set_full_scale(full_scale_words(choices))
 
     def take_started(self, take: Take) -> None:
-        self._shown = ()  # holds nothing of the last take
+        self._shown = self._standing = ()  # holds nothing of the last take
         self._partials_hz = take.info.string.undamped_frequencies(take.info.modes).numpy() / (2 * np.pi)
 
     def show_moment(self, moment: Moment) -> None:
@@ -53,6 +54,10 @@ class SpectrumPanel(Panel):
         take, choices = moment.take, self.session.choices
         if take is None or self._moments % EVERY:
             return
+        standing = moment.standing(choices)
+        if standing == self._standing:
+            return
+        self._standing = standing
         motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
         there = [motion for motion in motions if motion.there]
         ready = tuple(-1 if motion.ready == motion.frames else motion.ready for motion in there)

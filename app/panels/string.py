@@ -53,6 +53,7 @@ class StringPanel(Panel):
         self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
         self._strobe = Strobe()
         self._envelope: Envelope | None = None
+        self._standing: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
         self._take: Take | None = None  # the complete one of this pluck
 
@@ -76,6 +77,7 @@ class StringPanel(Panel):
     def take_started(self, take: Take) -> None:
         self._strobe.restart()
         self._envelope = Envelope()
+        self._standing = ()
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self._take = take
@@ -83,6 +85,10 @@ class StringPanel(Panel):
 
     def show_moment(self, moment: Moment) -> None:
         take, position_s, choices = moment.take, moment.position_s, self.session.choices
+        standing = moment.standing(choices)
+        if not moment.playing and standing == self._standing:
+            return
+        self._standing = standing
         if not choices.motion or take is None or not (moment.playing or position_s > 0):
             self.view.show_frame(None)
             self._shown = ()

@@ -33,11 +33,13 @@ class _Drawn:
     def __post_init__(self) -> None:
         self.signal = np.empty(self.heard.motion.frames, np.float32)
 
-    def catch_up(self) -> None:
+    def catch_up(self) -> bool:
+        """Whether there was something to read."""
         new = self.heard.read(self.ready, self.ready + MOST_FRAMES)
         self.signal[self.ready : self.ready + len(new)] = new
         self.ready += len(new)
         self.peak = max(self.peak, float(np.abs(new).max(initial=0.0)))
+        return len(new) > 0
 
 
 class WaveformPanel(Panel):
@@ -57,6 +59,7 @@ class WaveformPanel(Panel):
         self._take: Take | None = None
         self._drawn: dict[str, _Drawn] = {}
         self._full = 0.0  # of the axis, in m or m/s
+        self._caught_up: tuple[object, ...] = ()  # with what there is of the take, and what was chosen
         self._moments = 0
         self._shown: tuple[object, ...] = ()
 
@@ -67,7 +70,8 @@ class WaveformPanel(Panel):
             self._shown = ()
 
     def take_started(self, take: Take) -> None:
-        self._take, self._drawn, self._shown, self._full = take, {}, (), 0.0  # holds nothing of the last take
+        self._take, self._drawn, self._full = take, {}, 0.0
+        self._shown = self._caught_up = ()  # holds nothing of the last take
         self.view.set_take(take.seconds, take.info.horizon_s, 1 / take.fundamental_hz)
 
     def show_moment(self, moment: Moment) -> None:
@@ -76,16 +80,22 @@ class WaveformPanel(Panel):
         take = self._take
         if take is None or self._moments % EVERY:
             return
-        self._follow(take)
-        choices, ready = self.session.choices, {name: drawn.ready for name, drawn in self._drawn.items()}
+        choices = self.session.choices
+        there = take.ready_bytes, choices
+        if there != self._caught_up:
+            self._caught_up = () if self._follow(take) else there
+        ready = {name: drawn.ready for name, drawn in self._drawn.items()}
         shown = (take, ready, ear(choices), self.view.times_s, self.view.columns)
         if shown != self._shown:
             self._shown = shown
             self._draw()
 
-    def _follow(self, take: Take) -> None:
-        """Reads on what the slots hold, each from its start where it is another signal than before."""
-        choices = self.session.choices
+    def _follow(self, take: Take) -> bool:
+        """Reads on what the slots hold, each from its start where it is another signal than before.
+
+        Whether there was anything to read: perhaps there is more.
+        """
+        choices, moved = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
             motion = HeardMotion(take, source.source, source.gain)
@@ -93,10 +103,11 @@ class WaveformPanel(Panel):
                 continue  # another preset's model is still on its way
             heard, known = HeardSignal(motion, ear(choices)), before.get(source.source)
             drawn = known if known is not None and known.heard == heard else _Drawn(heard)
-            drawn.catch_up()
+            moved |= drawn.catch_up()
             self._drawn[source.source] = drawn
         if any(self._drawn.get(name) is not drawn for name, drawn in before.items()):
             self._full = 0.0  # something else is drawn: its own scale
+        return moved
 
     def _draw(self) -> None:
         choices, view = self.session.choices, self.view

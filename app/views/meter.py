@@ -34,9 +34,20 @@ class Meter(QWidget):
     def show_level(self, peak_db: float, limiting: bool) -> None:
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)
         peak_db = max(peak_db, LOWEST_DB)
-        if abs(peak_db - self._peak_db) > 0.1 or bool(hold) != bool(self._hold):
-            self.update()
+        if (peak_db, hold) == (self._peak_db, self._hold):
+            return
+        if self._pixels(peak_db) != self._pixels(self._peak_db) or bool(hold) != bool(self._hold):
+            self.update()  # and with it what lies behind
         self._peak_db, self._hold = peak_db, hold
+
+    def _pixels(self, peak_db: float) -> int:
+        """How long the bar is then, in pixels of the screen."""
+        return round((1 - peak_db / LOWEST_DB) * self._bar.width() * self.devicePixelRatioF())
+
+    @property
+    def _bar(self) -> QRectF:
+        """At 0 dBFS."""
+        return QRectF(12, 8, self.width() - 68, 9)
 
     @property
     def limit_light(self) -> bool:
@@ -45,7 +56,7 @@ class Meter(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        bar = QRectF(12, 8, self.width() - 68, 9)
+        bar = self._bar
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.LINE))
         painter.drawRoundedRect(bar, 3, 3)

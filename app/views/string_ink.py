@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QLine, QPointF, QRectF, Qt
+from PySide6.QtCore import QLine, QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPen, QPolygonF
 
 from app.views import theme
@@ -17,6 +17,8 @@ from app.views.string_ground import paint_grid
 
 HANDLE_RADIUS = 7.0
 DASH = 4  # pixels
+PIECE, EVERY = 9, 24  # pixels: of a line that another hides, so much is drawn above it, so often
+MERGED = 2.0  # pixels: two lines that are nearer are one to the eye
 Band = tuple[NDArray[np.float32], NDArray[np.float32]]  # lowest and highest
 
 
@@ -54,7 +56,10 @@ class ShownPluck:
 
 
 def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
-    """The sources, the heard one in front. Opaque fills and thin pens only: this is drawn sixty times a second."""
+    """The sources, the heard one in front, and pieces of what it hides above it.
+
+    Opaque fills and thin pens only: this is drawn sixty times a second.
+    """
     order = sorted(frame.shapes, key=lambda name: name == heard)
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in order:
@@ -68,7 +73,35 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard:
         curve = axes.curve(frame.shapes[name])
         for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower
             painter.drawPolyline(curve.translated(0, shift))
+    for name in order[:-1]:
+        pieces = _hidden_pieces(axes, frame.shapes[name], frame.shapes[order[-1]])
+        painter.setPen(QPen(QColor(_hue(name)), 1))
+        for shift in (-0.6, 0.6) if pieces else ():
+            painter.translate(0, shift)
+            painter.drawLines(pieces)
+            painter.translate(0, -shift)
     painter.setClipping(False)
+
+
+def _hidden_pieces(axes: StringAxes, below: NDArray[np.float32], above: NDArray[np.float32]) -> list[QLineF]:
+    """Short parts of a line that lies under another: together they make both a line of two colours.
+
+    They stand still while the string moves, and none is where the lines part.
+    """
+    starts = np.arange(EVERY / 2, axes.length - PIECE, EVERY)
+    ends = starts + PIECE
+    firsts, lasts = (_heights(axes, below, at) for at in (starts, ends))
+    apart = np.maximum(np.abs(firsts - _heights(axes, above, starts)), np.abs(lasts - _heights(axes, above, ends)))
+    hidden = apart < MERGED
+    left = axes.x(0)
+    corners = (left + starts[hidden], firsts[hidden], left + ends[hidden], lasts[hidden])
+    return [QLineF(*piece) for piece in zip(*(values.tolist() for values in corners), strict=True)]
+
+
+def _heights(axes: StringAxes, shape_mm: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The line's height in the picture at places along the string, both in pixels."""
+    points = np.linspace(0, axes.length, len(shape_mm))
+    return axes.middle - np.interp(at, points, shape_mm) * (axes.half_height / axes.span_mm)
 
 
 def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], heard: str) -> None:

@@ -1,7 +1,8 @@
 """The string: what the slots hold in motion, the pluck that is being drawn, and the listening points.
 
-Drag on the string: where and how far it is pulled; the wheel over the handle sets the width, with Shift the shape.
-Drag a marker beneath it: where it is heard. A double-click on either goes back to the default.
+Click on the string: where it is pulled, as far as the last time. Drag on it: where and how far; the wheel over the
+handle sets the width, with Shift the shape. Drag a marker beneath it: where it is heard. A double-click on either
+goes back to the default.
 """
 
 from __future__ import annotations
@@ -45,11 +46,12 @@ from engine.pluck import DEFAULT_LISTEN
 SPANS_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)  # the display's half height, chosen to fit
 GRAB_PIXELS = 14  # how near a handle or a marker counts as on it
 FINE = 0.1  # with Shift
+LEAST_DRAGGED_MM = 0.5  # what ends on the string's line is meant to be heard all the same
 WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
 
 MARKER_TIP = "Drag to hear the string from another point; double-click resets. Shift and arrow keys move it"
 TIPS: dict[str | None, str] = {  # by what the pointer is on
-    None: "Drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
+    None: "Click or drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
     "pluck": "Drag along the string for the place, up and down for the amplitude; double-click resets.\n"
     "The wheel sets the width, with Shift the shape. Arrow keys do the same, with Ctrl for width and shape",
     "left": MARKER_TIP,
@@ -93,6 +95,10 @@ class StringView(QWidget):
         self._drag: str | None = None  # "pluck" or a side
         self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
         self._dragged_at = QPointF()
+        self._pressed_at = QPointF()
+        self._on_bare_string = False  # there, not on something to grab
+        self._far = False  # whether the drag has gone too far from there to be a click
+        self._amplitude_mm = 0.0  # at its beginning
         self._hovered: str | None = None
         self._on_handle_first = False  # the last press was the first of a series, and on the handle
         self._last_press_ms = -10_000
@@ -196,7 +202,8 @@ class StringView(QWidget):
         axes = self._axes()
         self.drag_started.emit()
         self._drag = on or "pluck"
-        self._dragged_at = at
+        self._dragged_at = self._pressed_at = at
+        self._far, self._on_bare_string, self._amplitude_mm = False, on is None, self._pluck.amplitude_mm
         if on == "pluck":
             self._dragged = (self._pluck.position, self._pluck.amplitude_mm)
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
@@ -204,7 +211,7 @@ class StringView(QWidget):
             self._dragged = (self._listening[on], 0.0)
         else:
             self._dragged = (axes.position(at.x()), axes.displacement_mm(at.y()))
-            self._ask()
+            self.pluck_drawn.emit(self._dragged[0], self._amplitude_mm)  # which is all that a click does
         self.update()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -221,12 +228,15 @@ class StringView(QWidget):
             displacement_mm + fine * (axes.displacement_mm(at.y()) - axes.displacement_mm(self._dragged_at.y())),
         )
         self._dragged_at = at
-        self._ask()
+        self._far |= (at - self._pressed_at).manhattanLength() >= QApplication.startDragDistance()
+        if self._far or not self._on_bare_string:
+            self._ask()
 
     def _ask(self) -> None:
         position, displacement_mm = self._dragged
         if self._drag == "pluck":
-            self.pluck_drawn.emit(position, abs(displacement_mm))
+            least_mm = LEAST_DRAGGED_MM if self._far else min(LEAST_DRAGGED_MM, self._amplitude_mm)
+            self.pluck_drawn.emit(position, max(abs(displacement_mm), least_mm))
             self._fit_span()
         elif self._drag is not None:
             self.listening_point_moved.emit(self._drag, position)

@@ -83,6 +83,7 @@ class TransportBar(QFrame):
             knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
         self.meter = Meter()
         self._compact = False
+        self._playing: bool | None = None  # as shown; None where a click has checked the button by itself
         self._row = row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
         row.setSpacing(5)
@@ -137,14 +138,21 @@ class TransportBar(QFrame):
         self.slots.show_choices(choices)
 
     def show_playing(self, playing: bool) -> None:
+        if playing == self._playing:
+            return
+        self._playing = playing
         self._play.setChecked(playing)
         self._play.setText("■  Stop" if playing else "▶  Play")
+
+    def _forget_playing(self) -> None:
+        self._playing = None
 
     def _build_transport(self) -> QVBoxLayout:
         self._play = QPushButton("▶  Play")
         self._play.setObjectName("play")
         self._play.setCheckable(True)
         self._play.setToolTip("Play from the pluck, or stop (Space)")
+        self._play.clicked.connect(self._forget_playing)
         self._play.clicked.connect(self.play_asked)
         self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
         self._loop.setCheckable(True)

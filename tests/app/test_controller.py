@@ -146,6 +146,7 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     for key in (Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L):
         qtbot.keyClick(window, key)
     assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.6556])
+    assert not controller.history.can_undo
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
     qtbot.keyClick(window, Qt.Key.Key_9)
     assert session.choices.amplitude_mm == pytest.approx(10)
@@ -165,6 +166,7 @@ def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Contr
     midi = controller.instruments.midi
     midi.performed.emit({"position": 0.6, "amplitude_mm": 8.0}, True)
     assert (controller.session.choices.position, controller.session.choices.amplitude_mm) == (0.6, 8.0)
+    assert not controller.history.can_undo
     qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
     qtbot.keyClick(controller.window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
     assert midi._dialog is not None

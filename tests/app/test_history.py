@@ -119,3 +119,33 @@ def test_it_is_bounded(clock: Clock) -> None:
         clock.now_s += 1
         session.update(position=0.3 + step / 1000)
     assert len(positions_back(history, session)) == LARGEST_STEPS
+
+
+def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(clock: Clock) -> None:
+    session = Session()
+    history = History(session, clock)
+    session.play(position=0.2, amplitude_mm=6)
+    assert not history.can_undo
+    session.update(width=0.2)
+    session.play(position=0.7, amplitude_mm=2)
+    history.undo()
+    choices = session.choices
+    assert (choices.width, choices.position, choices.amplitude_mm) == (0.06, 0.7, 2)
+    assert not history.can_undo
+    session.play(position=0.3)
+    history.redo()  # a note forgets nothing of what was undone
+    assert (session.choices.width, session.choices.position) == (0.2, 0.3)
+
+
+def test_a_drag_after_a_note_goes_back_to_where_the_note_was(clock: Clock) -> None:
+    session = Session()
+    history = History(session, clock)
+    session.play(position=0.7)
+    history.hold()
+    session.update(position=0.6)
+    session.update(position=0.5, amplitude_mm=2)
+    session.play(position=0.3)  # played while the knob is in the other hand
+    session.update(amplitude_mm=3)
+    history.let_go()
+    history.undo()
+    assert (session.choices.position, session.choices.amplitude_mm) == (0.7, 4)

@@ -80,3 +80,15 @@ def test_presets_go_round() -> None:
     assert session.choices.preset == "c"
     session.step_preset([], 1)
     assert session.choices.preset == "c"
+
+
+def test_what_a_note_changes_is_told_as_played_before_it_is_told_as_changed() -> None:
+    session, told = Session(), []
+    session.played.connect(lambda names: told.append(("played", set(names), session.choices.position)))
+    session.changed.connect(lambda names: told.append(("changed", set(names), session.choices.position)))
+    session.play(position=0.5)
+    session.play(position=0.5)  # nothing new
+    session.update(position=0.6)
+    assert told == [("played", {"position"}, 0.5), ("changed", {"position"}, 0.5), ("changed", {"position"}, 0.6)]
+    with pytest.raises(ValueError, match="position"):
+        session.play(position=2)

@@ -14,6 +14,7 @@ import pytest
 from PySide6.QtCore import QPointF, Qt
 from pytestqt.qtbot import QtBot
 
+from app.analysis.heard import HeardMotion
 from app.controller import Controller
 from app.library import Library
 from app.panels import (
@@ -165,6 +166,49 @@ def test_a_click_on_the_map_seeks_and_with_shift_listens_there(qtbot: QtBot, mak
     panel.session.update(listen=0.1)
     panel.choices_changed(frozenset({"listen"}))
     assert panel.view._listening.value() == 0.1
+
+
+@pytest.mark.parametrize("kind", [StringPanel, SpectrumPanel, WaveformPanel])
+def test_while_all_stands_still_nothing_is_looked_at(
+    kind: type[Panel], make: Make, take: Take, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The window waits for its user most of the time, and should take no power for it."""
+    panel, looks = make(kind), []
+    held = Moment(take, 0.5, False, 0.016)
+    for _ in range(8 * EVERY):
+        panel.show_moment(held)
+
+    class Looked(HeardMotion):
+        def __init__(self, *which: Any) -> None:
+            looks.append(which)
+            super().__init__(*which)
+
+    monkeypatch.setattr(f"{kind.__module__}.HeardMotion", Looked)
+
+    def looked(moment: Moment) -> bool:
+        looks.clear()
+        for _ in range(2 * EVERY):
+            panel.show_moment(moment)
+        return bool(looks)
+
+    assert not looked(held)
+    panel.session.update(listen=0.2)
+    assert looked(held)
+    assert not looked(held)
+    panel.take_started(take)
+    assert looked(held)
+
+
+def test_a_take_at_rest_is_drawn_on_as_it_grows(make: Make, take: Take) -> None:
+    panel = make(WaveformPanel)
+    growing = Take("small", take.info, take.pluck, 1.0)
+    panel.take_started(growing)
+    frames = {name: take.motion_m(name) for name in ("model", "truth")}
+    for start in range(0, FRAMES, 1000):
+        growing.append(*(frames[name][start : start + 1000] for name in ("model", "truth")))
+        for _ in range(2 * EVERY):
+            panel.show_moment(Moment(growing, 0.0, False, 0.016))
+        assert panel._drawn["truth"].ready == growing.ready_frames
 
 
 def test_the_spectrogram_follows_the_listening_point(qtbot: QtBot, make: Make, take: Take) -> None:

@@ -105,6 +105,40 @@ def test_the_handle_is_dragged_without_a_jump_and_shift_is_finer(qtbot: QtBot, v
     assert (len(started), len(ended), len(released)) == (1, 1, 1)
 
 
+def test_a_click_plucks_there_as_far_as_the_last_time(qtbot: QtBot, view: StringView) -> None:
+    """On the string's own line too, where the pointer tells next to no amplitude; and a hand is not still."""
+    axes, released = view._axes(), recorded(view.pluck_released)
+    for mm in (4.0, 0.2):  # the latter is the knob's doing
+        view.pluck_drawn.emit(0.5, mm)
+        at = QPoint(round(axes.x(0.3)), round(axes.middle) - 1)
+        qtbot.mousePress(view, LEFT, pos=at)
+        qtbot.mouseMove(view, at + QPoint(1, -2))
+        qtbot.mouseRelease(view, LEFT, pos=at + QPoint(1, -2))
+        assert (view._pluck.position, view._pluck.amplitude_mm) == (pytest.approx(0.3, abs=0.003), mm)
+    assert len(released) == 2
+
+
+def test_a_drag_sets_the_amplitude_which_is_never_next_to_nothing(qtbot: QtBot, view: StringView) -> None:
+    axes = view._axes()
+    start = QPoint(round(axes.x(0.3)), round(axes.y(2.0)))
+    qtbot.mousePress(view, LEFT, pos=start)
+    for mm, expected in ((3.0, 3.0), (-2.0, 2.0), (0.1, 0.5), (0.0, 0.5)):
+        at = QPoint(start.x() + 40, round(axes.y(mm)))
+        qtbot.mouseMove(view, at)
+        assert view._pluck.amplitude_mm == pytest.approx(expected, abs=0.05)
+    qtbot.mouseRelease(view, LEFT, pos=at)
+    assert view._pluck.amplitude_mm == 0.5
+
+
+def test_the_handle_of_a_soft_pluck_is_clicked_without_a_change(qtbot: QtBot, view: StringView) -> None:
+    view.pluck_drawn.emit(0.5, 0.2)
+    at = handle(view)
+    qtbot.mousePress(view, LEFT, pos=at)
+    qtbot.mouseMove(view, at + QPoint(1, 0))
+    qtbot.mouseRelease(view, LEFT, pos=at + QPoint(1, 0))
+    assert view._pluck.amplitude_mm == pytest.approx(0.2)
+
+
 def test_a_drag_beyond_the_top_grows_steadily(qtbot: QtBot, view: StringView) -> None:
     """The scale steps up under the pointer; the amplitude must not jump with it."""
     at = handle(view)
@@ -158,7 +192,7 @@ def test_the_pointer_on_a_warning_tells_all_of_it(qtbot: QtBot, view: StringView
     qtbot.mouseMove(view, QPoint(200, 12))
     assert view.toolTip() == "amplitude 15.39 mm is outside the trained 0.5 … 10 mm"
     qtbot.mouseMove(view, QPoint(200, 200))
-    assert "Drag to pluck" in view.toolTip()
+    assert "drag to pluck" in view.toolTip()
 
 
 def test_two_markers_are_told_apart_and_reset(qtbot: QtBot, view: StringView) -> None:
@@ -230,6 +264,23 @@ def test_shading_envelope_and_focus_are_seen(qtbot: QtBot, view: StringView) -> 
     view.show_frame(StringFrame(both, both, both, envelopes=reach))
     at = view._axes().at(0.42, 0.03).toPoint()
     assert picture(view).pixel(at) != without.pixel(at)
+
+
+def test_of_two_motions_in_one_place_both_are_seen(view: StringView) -> None:
+    """And of two that part only the one that is there."""
+    shape = 2 * np.sin(np.pi * np.linspace(0, 1, 101)).astype(np.float32)
+
+    def seen(mm: float) -> int:
+        """How many pixels on the model's line are of the truth's hue, which has more blue in it than red."""
+        shapes = {"model": shape, "truth": shape - np.float32(mm)}
+        view.show_frame(StringFrame(shapes, shapes, shapes))
+        drawn, axes = picture(view), view._axes()
+        line = [axes.at(place, 2 * np.sin(np.pi * place)).toPoint() for place in np.linspace(0.1, 0.9, 400)]
+        colours = [drawn.pixelColor(at) for at in line]
+        return sum(colour.blue() > colour.red() + 40 for colour in colours)
+
+    assert seen(0.5) == 0
+    assert 80 < seen(0.0) < 200
 
 
 def test_the_pluck_comes_back_when_no_motion_is_shown(view: StringView) -> None:
