@@ -1,4 +1,4 @@
-"""Which threads go first where they are more than the cores: sound and picture, then rendering, then all else."""
+"""Which threads go first where they are more than the cores: sound, then picture, then rendering, then all else."""
 
 from __future__ import annotations
 
@@ -28,3 +28,25 @@ def step_back(rank: Rank) -> None:
         with contextlib.suppress(OSError):
             niceness = os.getpriority(os.PRIO_PROCESS, thread) + rank
             os.setpriority(os.PRIO_PROCESS, thread, min(niceness, NICEST))
+
+
+REAL_TIME_PRIORITY = 10
+
+
+def native_threads() -> set[int]:
+    """The system's numbers of this process's threads; none where it does not tell."""
+    try:
+        return {int(name) for name in os.listdir("/proc/self/task")}
+    except OSError:
+        return set()
+
+
+def put_first(threads: set[int]) -> bool:
+    """Real time for a device's own threads, where Linux grants it to the user; elsewhere the system does so itself."""
+    granted = False
+    for thread in threads if sys.platform == "linux" else ():
+        with contextlib.suppress(OSError):
+            policy = os.SCHED_RR | os.SCHED_RESET_ON_FORK
+            os.sched_setscheduler(thread, policy, os.sched_param(REAL_TIME_PRIORITY))
+            granted = True
+    return granted

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from app.audio.devices import AudioDevice, close_device, open_device
 from app.audio.problems import refused
+from app.precedence import native_threads, put_first
 from engine.voices.mixer import Mixer
 
 STALLED_AFTER_S = 2.5  # without a call: longer than any start of a sound server that was seen
@@ -51,6 +52,7 @@ class DeviceOutput:
         self.device: AudioDevice | None = device
         self.rate_hz = device.default_rate_hz
         self._mixer = mixer
+        threads = native_threads()
         self._stream = open_device(device, buffer_s, mixer)
         self.latency_s = float(self._stream.latency)
         self._calls, self._called_s = mixer.calls, time.monotonic()
@@ -59,6 +61,7 @@ class DeviceOutput:
         except Exception as error:
             self.close()
             raise refused(error, device.name, self.rate_hz) from error
+        self.real_time = put_first(native_threads() - threads)
 
     def now_s(self) -> float:
         return float(self._stream.time)

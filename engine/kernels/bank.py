@@ -19,9 +19,12 @@ from numba import njit
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 
-SHORT, LONG = 16, 64  # frames of a segment, at first and later
+SHORT, LONG = 32, 64  # frames of a segment, at first and later
 INAUDIBLE = 1e-6  # of full scale: what changes less than that is left out
+DEAD = math.log(4e-7)  # of full scale: a latent that is quieter is left out
 LOOK_EVERY = 8  # quanta
+NO_FIXED_POINT = 3e-4  # nepers: the second step would change a smaller change by less than its square
+STRAIGHT = 5e-6  # radians and nepers of a segment that may come from a cubic term that is left out
 _PI, _TWO_PI, _QUARTER = math.pi, 2 * math.pi, math.pi / 4
 
 
@@ -163,8 +166,15 @@ def strike(voice: np.ndarray, program: np.ndarray, scratch: np.ndarray) -> None:
     counts[at.SEGMENT_VALID] = 0
     counts[at.MODULATED] = whole[at.P_MODULATION]
     counts[at.REFRESH] = 0
+    counts[at.ALIVE] = n
     if whole[at.P_HIGHER]:
         _integrate_from(voice, program, 0, scratch)
+
+
+@njit(inline="always", **COMPILED)
+def _width(node: int) -> int:
+    """Nodes from this one to the next that is used: what is left to change does so ever more slowly."""
+    return 1 if node < 16 else 2 if node < 64 else 4 if node < 256 else 8
 
 
 @njit(**COMPILED)
@@ -174,7 +184,7 @@ def _integrate_from(voice: np.ndarray, program: np.ndarray, node: int, scratch: 
     rows, spacing = at.state(n), program[at.P_SPACING]
     energy, more = scratch[4 * at.MOST_MODES : 4 * at.MOST_MODES + n], scratch[5 * at.MOST_MODES :]
     for half in range(3):
-        energies(voice, program, (node + 0.5 * half) * spacing, energy)
+        energies(voice, program, (node + 0.5 * half * _width(node)) * spacing, energy)
         higher_orders(program, energy, voice[rows + (at.AT_LEFT + 2 * half) * n :], more)
 
 
@@ -186,7 +196,8 @@ def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: 
     rows, spacing = at.state(n), program[at.P_SPACING]
     energy, more = scratch[4 * at.MOST_MODES : 4 * at.MOST_MODES + n], scratch[5 * at.MOST_MODES :]
     wanted = int(time / spacing)
-    while counts[at.NODE] < wanted:
+    while counts[at.NODE] + _width(counts[at.NODE]) <= wanted:
+        width = _width(counts[at.NODE])
         total = voice[rows + at.INTEGRAL * n : rows + (at.INTEGRAL + 2) * n]
         left, middle, right = (
             voice[rows + at.AT_LEFT * n : rows + (at.AT_LEFT + 2) * n],
@@ -194,47 +205,47 @@ def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: 
             voice[rows + at.AT_RIGHT * n : rows + (at.AT_RIGHT + 2) * n],
         )
         for j in range(2 * n):
-            total[j] += spacing * (left[j] + 4 * middle[j] + right[j]) / 6
+            total[j] += width * spacing * (left[j] + 4 * middle[j] + right[j]) / 6
             left[j] = right[j]
-        counts[at.NODE] += 1
+        counts[at.NODE] += width
         node = counts[at.NODE]
-        energies(voice, program, (node + 0.5) * spacing, energy)
+        width = _width(node)
+        energies(voice, program, (node + 0.5 * width) * spacing, energy)
         higher_orders(program, energy, middle, more)
-        energies(voice, program, (node + 1.0) * spacing, energy)
+        energies(voice, program, (node + width) * spacing, energy)
         higher_orders(program, energy, right, more)
 
 
 @njit(**COMPILED)
-def _change(program: np.ndarray, level: np.ndarray, n: int, out: np.ndarray, scratch: np.ndarray) -> None:
+def _change(program: np.ndarray, level: np.ndarray, n: int, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
     """What A adds to the log gain of each latent, of levels log |z| (modes,)."""
     whole = program.view(np.int64)
-    weight = program[whole[at.O_A] :]
-    squares, found = scratch[:n], scratch[at.MOST_MODES : at.MOST_MODES + n]
-    for m in range(n):
-        squares[m] = _exp(2 * level[m])
-    for step in range(3):
+    weight = program[whole[at.O_A] :]  # transposed
+    squares, energy = scratch[:alive], scratch[at.MOST_MODES : at.MOST_MODES + alive]
+    found = out[:alive]
+    most = 0.0
+    for m in range(alive):
+        energy[m] = _exp(2 * level[m])
+        squares[m] = energy[m]
+        most = max(most, energy[m])
+    for _ in range(3):
         found[:] = 0.0
-        for m in range(n):
-            if squares[m] > 1e-14:
-                row = weight[m * n : (m + 1) * n]  # transposed
-                # where the change falls, the square that counts depends on the latent that is changed: see below
-                for j in range(n):
-                    found[j] += squares[m] * row[j]
-        if step == 0:
-            out[:n] = found
-            falls = False
-            for j in range(n):
-                falls = falls or found[j] < 0
-            if not falls:
-                break
-        else:
-            out[:n] = found
-        for m in range(n):
-            e = _exp(2 * level[m])
-            squares[m] = e / math.sqrt(1 + 4 * abs(out[m])) if out[m] < 0 else e
-    for j in range(n):
-        sign = -1.0 if out[j] < 0 else 1.0
-        out[j] = sign * math.log1p(4 * abs(out[j])) / 4
+        for m in range(alive):
+            if squares[m] > 1e-7 * most:
+                share, row = squares[m], weight[m * n : m * n + alive]
+                for j in range(alive):
+                    found[j] += share * row[j]
+        lowest = 0.0
+        for j in range(alive):
+            lowest = min(lowest, found[j])
+        if lowest > -NO_FIXED_POINT:
+            break
+        for m in range(alive):  # where the change falls, the square that counts is the amplitude's, not the action's
+            squares[m] = energy[m] / math.sqrt(1 + 4 * abs(found[m])) if found[m] < 0 else energy[m]
+    for j in range(alive):
+        size = abs(found[j])
+        grown = math.log1p(4 * size) / 4 if size > 1e-3 else size * (1 - size * (2 - size * 16 / 3))
+        found[j] = -grown if found[j] < 0 else grown
 
 
 @njit(**COMPILED)
@@ -248,10 +259,12 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
     coupling, largest = program[whole[at.O_COUPLING] :], program[whole[at.O_LARGEST] :]
     start = voice[rows + at.ENERGY_0 * n :]
     constant = voice[rows + at.CONSTANT * n :]
+    alive = counts[at.ALIVE]
     f, integral = scratch[: 2 * n], scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + 2 * n]
     if whole[at.P_HIGHER]:
         spacing = program[at.P_SPACING]
-        u = time / spacing - counts[at.NODE]
+        spacing *= _width(counts[at.NODE])
+        u = (time - counts[at.NODE] * program[at.P_SPACING]) / spacing
         total, left = voice[rows + at.INTEGRAL * n :], voice[rows + at.AT_LEFT * n :]
         middle, right = voice[rows + at.AT_MIDDLE * n :], voice[rows + at.AT_RIGHT * n :]
         for j in range(2 * n):
@@ -263,26 +276,28 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
         f[:] = 0.0
         for j in range(2 * n):
             integral[j] = constant[j]
-    for m in range(n):
+    for m in range(alive):
         energy = start[m] * _exp(-2 * sigma[m] * time)
-        if energy * largest[m] < 1e-14:
+        if energy * largest[m] < 2e-8 * sigma[m]:
             continue
         share = energy / (2 * sigma[m])
-        row = coupling[m * 2 * n : (m + 1) * 2 * n]
-        for j in range(2 * n):
-            f[j] += energy * row[j]
-            integral[j] -= share * row[j]
+        for part in range(2):
+            row = coupling[(2 * m + part) * n : (2 * m + part + 1) * n]
+            slopes, sums = f[part * n : (part + 1) * n], integral[part * n : (part + 1) * n]
+            for j in range(alive):
+                slopes[j] += energy * row[j]
+                sums[j] -= share * row[j]
     limit = program[at.P_LIMIT]
     level_0, angle_0 = voice[rows + at.LEVEL_0 * n :], voice[rows + at.ANGLE_0 * n :]
     level, phase, level_rate, phase_rate = out[:n], out[n : 2 * n], out[2 * n : 3 * n], out[3 * n : 4 * n]
-    for j in range(n):
+    for j in range(alive):
         saturated = _tanh(integral[j] / limit)
         level[j] = level_0[j] - sigma[j] * time + limit * saturated
         level_rate[j] = f[j] * (1 - saturated * saturated)  # the decay comes later: this part alone is held
         phase[j] = angle_0[j] + omega[j] * time + integral[n + j]
         phase_rate[j] = omega[j] + f[n + j]
-    if whole[at.P_ADIABATIC]:
-        _change(program, level, n, out[4 * n :], scratch)
+    if whole[at.P_ADIABATIC] and counts[at.MODULATED]:
+        _change(program, level, n, alive, out[4 * n :], scratch)
 
 
 @njit(**COMPILED)
@@ -310,7 +325,7 @@ def generate(
         if not counts[at.SEGMENT_VALID]:
             _keep_end(voice, program, first * ratio, scratch)
         for begin in range(0, at.QUANTUM, length):
-            _segment(voice, program, first + begin, length, z[begin * 2 * n :], scratch)
+            _segment(voice, program, first + begin, length, counts[at.ALIVE], z[begin * 2 * n :], scratch)
         if counts[at.MODULATED]:
             if counts[at.REFRESH] == 0:
                 _look(voice, program, z, scratch)
@@ -319,13 +334,13 @@ def generate(
         modulated = counts[at.MODULATED] and counts[at.ROWS] > 0
         for which in range(2 if fading else 1):
             for point in range(points):
-                _sum(voice, n, which, point, z, out[2 * which + point])
+                _sum(voice, n, counts[at.ALIVE], which, point, z, out[2 * which + point], scratch)
         if modulated:
             _modulate(voice, program, z, fading, points, out, scratch)
     else:
         counts[at.SEGMENT_VALID] = 0
     counts[at.GENERATED] = first + at.QUANTUM
-    loudest = -1e9
+    loudest, alive = -1e9, 1
     sigma = program[whole[at.O_SIGMA] :]
     time = (first + at.QUANTUM) * ratio
     for m in range(n):
@@ -333,7 +348,10 @@ def generate(
         if heard and whole[at.P_HIGHER]:
             level = max(level, voice[rows + at.LEVEL * n + m])
         loudest = max(loudest, level)
+        if level + program[at.P_LOUDNESS] > DEAD:
+            alive = m + 1
     voice[at.LOUDNESS] = loudest + program[at.P_LOUDNESS]
+    counts[at.ALIVE] = alive
 
 
 @njit(**COMPILED)
@@ -352,7 +370,13 @@ def _keep_end(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.n
 
 @njit(**COMPILED)
 def _segment(
-    voice: np.ndarray, program: np.ndarray, first: int, length: int, z: np.ndarray, scratch: np.ndarray
+    voice: np.ndarray,
+    program: np.ndarray,
+    first: int,
+    length: int,
+    alive: int,
+    z: np.ndarray,
+    scratch: np.ndarray,
 ) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
     whole = program.view(np.int64)
@@ -370,7 +394,8 @@ def _segment(
     turns = scratch[16 * at.MOST_MODES :].view(np.float32)
     zr, zi, rr, ri = turns[:n], turns[n : 2 * n], turns[2 * n : 3 * n], turns[3 * n : 4 * n]
     sr, si, cr, ci = turns[4 * n : 5 * n], turns[5 * n : 6 * n], turns[6 * n : 7 * n], turns[7 * n : 8 * n]
-    for m in range(n):
+    bent = 0.0
+    for m in range(alive):
         held_left = min(max(level_rate[m] * width, -limit), limit) - sigma[m] * width
         held_right = min(max(end[2 * n + m] * width, -limit), limit) - sigma[m] * width
         rise, turn = end[m] - level[m], end[n + m] - phase[m]
@@ -379,6 +404,7 @@ def _segment(
         cube = (-2 * rise + held_left + held_right) / (count * count * count)
         twist = (3 * turn - 2 * turn_left - turn_right) / (count * count)
         screw = (-2 * turn + turn_left + turn_right) / (count * count * count)
+        bent = max(bent, abs(cube), abs(screw))
         loud = _exp(level[m])
         c, s = _turn(phase[m])
         zr[m], zi[m] = loud * c, loud * s
@@ -391,9 +417,19 @@ def _segment(
         grown = _exp(6 * cube)
         c, s = _turn(6 * screw)
         cr[m], ci[m] = grown * c, grown * s
-    for frame in range(length):
+    curved = bent * count * count * count > STRAIGHT
+    if not curved:
+        for frame in range(length):
+            real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
+            for m in range(alive):
+                a, b, c, d = zr[m], zi[m], rr[m], ri[m]
+                real[m], imaginary[m] = a, b
+                zr[m], zi[m] = a * c - b * d, a * d + b * c
+                e, f = sr[m], si[m]
+                rr[m], ri[m] = c * e - d * f, c * f + d * e
+    for frame in range(length if curved else 0):
         real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
-        for m in range(n):
+        for m in range(alive):
             a, b, c, d = zr[m], zi[m], rr[m], ri[m]
             real[m], imaginary[m] = a, b
             zr[m], zi[m] = a * c - b * d, a * d + b * c
@@ -401,23 +437,34 @@ def _segment(
             rr[m], ri[m] = c * e - d * f, c * f + d * e
             g, h = cr[m], ci[m]
             sr[m], si[m] = e * g - f * h, e * h + f * g
-    for m in range(n):
+    for m in range(alive):
         level[m], level_rate[m], phase_rate[m] = end[m], end[2 * n + m], end[3 * n + m]
         phase[m] = end[n + m]
         next_change[m] = end[4 * n + m]
 
 
 @njit(**COMPILED)
-def _sum(voice: np.ndarray, n: int, which: int, point: int, z: np.ndarray, out: np.ndarray) -> None:
+def _sum(
+    voice: np.ndarray,
+    n: int,
+    alive: int,
+    which: int,
+    point: int,
+    z: np.ndarray,
+    out: np.ndarray,
+    scratch: np.ndarray,
+) -> None:
     """Adds Re Σ w z at each frame of the quantum."""
     slot = at.weights(n, which, point, 0)
-    w = voice[slot : slot + 2 * n]
+    w, v = scratch[32 * at.MOST_MODES :].view(np.float32), scratch[33 * at.MOST_MODES :].view(np.float32)
+    for m in range(alive):
+        w[m], v[m] = voice[slot + m], voice[slot + n + m]
     constant = voice[at.bias(n, which, point)]
     for frame in range(at.QUANTUM):
-        total = 0.0
-        row = z[frame * 2 * n : (frame + 1) * 2 * n]
-        for m in range(2 * n):
-            total += w[m] * row[m]
+        total = np.float32(0)
+        real, imaginary = z[frame * 2 * n :], z[frame * 2 * n + n :]
+        for m in range(alive):
+            total += w[m] * real[m] + v[m] * imaginary[m]
         out[frame] += total + constant
 
 

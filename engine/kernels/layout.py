@@ -58,6 +58,7 @@ COLUMNS = 35  # W latents that can be heard in others' modulation
 BEGIN_AT = 36  # W the mixer's frame before which it waits
 RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
 LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins anew after its last sample
+ALIVE = 39  # W latents up to the last that can be heard
 HEADER = 40
 
 SETS = 2  # of weights
@@ -186,6 +187,6 @@ M_TAPS = M_OUT + 4 * QUANTUM  # R the differentiator's, (2 REACH + 1)
 REACH = 32  # frames of the differentiator to either side
 M_SCRATCH = M_TAPS + 2 * REACH + 2
 MOST_MODES = 512
-SCRATCH_ROWS = 32
+SCRATCH_ROWS = 40
 SCRATCH_SLOTS = SCRATCH_ROWS * MOST_MODES + 4 * QUANTUM * MOST_MODES
 MIXER_SLOTS = M_SCRATCH + SCRATCH_SLOTS

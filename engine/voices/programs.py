@@ -25,7 +25,7 @@ from engine.preset import PresetInfo
 from engine.reference import SplittingSolver, default_substeps
 from engine.sine_transform import synthesis_matrix, to_modes
 
-HEARD_SILENCE = 1e-6  # of a mode, of all: what the truth leaves out where it is heard is 120 dB down
+HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 
