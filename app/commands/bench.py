@@ -1,7 +1,8 @@
-"""bench solver, render, train, app, soak: what the program costs here."""
+"""bench solver, render, train, app, play, soak: what the program costs here."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ from app.commands.console import print_json, print_table, progress
 
 if TYPE_CHECKING:
     from app.bench.machine import Machine
+    from app.bench.play.measure import Spread
 
 bench = typer.Typer(help="Measure speed on this machine: medians of repeats.", no_args_is_help=True)
 
@@ -132,6 +134,76 @@ def app(
     print(f"{found.preset}; {width} × {height} on {found.platform}; views: string, {', '.join(found.views)}")
     rows = [(f.name, f.value, f.worst, f.target, f.unit) for f in found.figures]
     print_table(("what", "here", "worst", "target", ""), rows)
+
+
+@bench.command()
+def play(
+    json: Json = False,
+    seconds: Annotated[float, typer.Option(min=1.0, help="How long it is played.")] = 60.0,
+    rate: Annotated[float, typer.Option(min=0.5, max=20.0, help="Plucks a second.")] = 12.0,
+    buffer: Annotated[str, typer.Option(help="low, medium, high, or 128 ... 2048 frames.")] = "medium",
+    busy: Annotated[
+        bool | None,
+        typer.Option("--busy/--alone", help="Only beside a process that keeps a core busy, or only without one."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+) -> None:
+    """What its user hears: the app on a private screen, played by keys from outside, and its sound recorded.
+
+    Linux only; needs PulseAudio and Xvfb, and touches nothing of the sound and the screen in use.
+    """
+    from pydantic import ValidationError
+
+    from app.bench.play.measure import measure
+    from app.settings import SoundChoice
+
+    try:
+        chosen = SoundChoice.model_validate({"buffer": int(buffer) if buffer.isdecimal() else buffer}).buffer
+    except ValidationError:
+        raise typer.BadParameter("low, medium, high, 128, 256, 512, 1024 or 2048", param_hint="--buffer") from None
+    with progress("bench play") as report:
+        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    width, height = found.size
+    print(
+        f"{found.buffer} buffer; {found.rate_hz:g} plucks/s for {found.phases[0].seconds:.0f} s, seed {found.seed}; "
+        f"{width} × {height}; views: string, {', '.join(found.views)}; "
+        f"load before: {', '.join(f'{phase.load_before[0]:.1f}' for phase in found.phases)}"
+    )
+    rows: list[tuple[object, ...]] = [
+        ("holes", *(phase.holes for phase in found.phases)),
+        ("holes together, ms", *(phase.holes_ms for phase in found.phases)),
+        ("longest hole, ms", *(phase.longest_hole_ms for phase in found.phases)),
+        ("fades", *(phase.fades for phase in found.phases)),
+        ("clicks", *(phase.clicks for phase in found.phases)),
+        ("single plucks that were not heard", *(phase.unheard for phase in found.phases)),
+        *_spread_rows("key to sound", [phase.latency_ms for phase in found.phases]),
+        *_spread_rows("key to sound, beyond the device", [phase.beyond_device_ms for phase in found.phases]),
+        ("the device's own buffer, ms", *(phase.device_ms for phase in found.phases)),
+        ("loudest sample", *(phase.loudest for phase in found.phases)),
+        ("cores while playing", *(phase.cpu_cores for phase in found.phases)),
+    ]
+    print_table(("what", *("beside a busy process" if phase.busy else "alone" for phase in found.phases)), rows)
+    lag = found.picture_lag_ms
+    rows = [
+        ("start to the window, s", found.start_to_window_s),
+        ("start to the first sound, s", found.start_to_sound_s),
+        ("cores while idle", found.idle_cpu_cores),
+        *_spread_rows("sound to its picture", [lag]),
+        ("uncertainty of the recording's clock, ms", found.clock_uncertainty_ms),
+        ("uncertainty of the device's buffer, ms", found.device_uncertainty_ms),
+    ]
+    print_table(("what", "here"), rows)
+
+
+def _spread_rows(name: str, spreads: Sequence[Spread | None]) -> list[tuple[object, ...]]:
+    return [
+        (f"{name}, {word}, ms", *(getattr(spread, field, None) for spread in spreads))
+        for word, field in (("median", "median"), ("99 %", "p99"), ("worst", "worst"))
+    ]
 
 
 @bench.command()

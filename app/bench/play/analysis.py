@@ -1,0 +1,270 @@
+"""What a recording of plucked strings tells: holes, fades nobody asked for, clicks, and when a pluck began.
+
+The sound of strings that ring is predictable: a linear prediction fitted to a few hundredths of a second leaves next
+to nothing of it. What nobody could have predicted stands out of the rest, however loud it rings: a new pluck, after
+which the rest is louder for long, or a click, after which it is as before.
+
+Sounds are float arrays at `rate_hz`; places are frames from their beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+ZERO = 1e-7  # nothing, as a sound card is given it
+SHORTEST_HOLE_S = 0.001
+SOUNDS_S = 0.5  # a pluck is heard for so long at least
+LEVEL_S = 0.002
+FADE_DB = 40.0
+ORDINARY_DB = 20.0  # so far below all levels nearby: strings have quiet moments of their own, but many
+NEARBY_S = 0.025
+LONGEST_FADE_S = 0.3
+ORDER = 32  # of the prediction
+FIT_S = 0.01
+FITTED_STEPS = 4
+STEP_S = 0.00025  # places of events are searched in such steps
+STANDS_OUT = 6.0  # times what is nearby
+MOSTLY = 0.9
+FAINTEST_CLICK = 1e-4
+FAINTEST_PLUCK = 1e-6
+ATTACK_S = 0.006  # of a pluck
+LATEST_S = 0.5  # after its key, for a pluck to be one
+EARLY_OR_LATE_S = 0.04  # a pluck among others, against what is usual
+
+
+@dataclass(frozen=True)
+class Span:
+    """Frames start ≤ n < end."""
+
+    start: int
+    end: int
+
+    @property
+    def frames(self) -> int:
+        return self.end - self.start
+
+    def meets(self, other: Span) -> bool:
+        return self.start < other.end and other.start < self.end
+
+
+def holes(sound: NDArray[np.float32], expected: Sequence[Span], rate_hz: int) -> list[Span]:
+    """Where nothing at all is in any channel for a millisecond or more; `sound` has the shape (frames, channels)."""
+    silent = np.all(np.abs(sound) < ZERO, axis=1)
+    shortest = round(SHORTEST_HOLE_S * rate_hz)
+    found = [_moved(run, span.start) for span in expected for run in _runs(silent[span.start : span.end])]
+    return [run for run in found if run.frames >= shortest]
+
+
+def expected_sound(sound: NDArray[np.float32], keys: Sequence[int], rate_hz: int) -> list[Span]:
+    """Where something must sound: from the first sound after a key on, until half a second after the last key."""
+    sounds = np.flatnonzero(np.any(np.abs(sound) >= ZERO, axis=1))
+    spans: list[Span] = []
+    for key in sorted(keys):
+        end = min(key + round(SOUNDS_S * rate_hz), len(sound))
+        if spans and key <= spans[-1].end:
+            spans[-1] = Span(spans[-1].start, end)
+            continue
+        place = np.searchsorted(sounds, key)
+        if place < sounds.size and sounds[place] < end:
+            spans.append(Span(int(sounds[place]), end))
+    return spans
+
+
+def fades(sound: NDArray[np.floating], expected: Sequence[Span], rate_hz: int) -> list[Span]:
+    """Where the level, of one channel, falls far below all that is near, and comes back.
+
+    A low string is silent between two of its pulses, too; then it is so in every period, and not all levels nearby
+    are higher. A fade down to nothing is found as well as a hole is.
+    """
+    size = round(LEVEL_S * rate_hz)
+    hop = size // 2
+    near = round(NEARBY_S * rate_hz / hop)
+    longest = round(LONGEST_FADE_S * rate_hz / hop)
+    found = []
+    for span in expected:
+        part = np.abs(np.asarray(sound[span.start : span.end], float))
+        if part.size < size * 4:
+            continue
+        level = sliding_window_view(part, size)[::hop].max(axis=1)
+        around = sliding_window_view(np.pad(level, near, mode="edge"), 2 * near + 1)
+        # What a long fade's middle is compared with is beyond its ends.
+        reach = longest // 2 + near
+        loud = _highest(np.median(around, axis=1), -reach, reach)
+        for run in _runs(level < loud * 10 ** (-FADE_DB / 20)):
+            left = level[max(run.start - near, 0) : max(run.start - 2, 0)]
+            right = level[run.end + 2 : run.end + near]
+            if run.start < near or run.end + near > level.size or run.frames > longest:
+                continue
+            deepest = level[run.start : run.end].min()
+            ordinary = min(left.min(), right.min()) * 10 ** (-ORDINARY_DB / 20)
+            comes_back = right.max() > 0.1 * left.max()
+            if deepest < ordinary and comes_back:
+                found.append(Span(span.start + run.start * hop, span.start + (run.end - 1) * hop + size))
+    return found
+
+
+@dataclass(frozen=True)
+class Unpredicted:
+    """What linear predictions leave of one channel.
+
+    Attributes:
+        by_past: of the one that is fitted to what sounded just before: nothing before a pluck, much after it.
+        by_both: the lesser of that one and of one that is fitted to what sounds just after: little after a pluck too,
+            so that what stands out of it on both sides belongs to nothing that rings.
+    """
+
+    by_past: NDArray[np.float64]
+    by_both: NDArray[np.float64]
+
+
+def unpredicted(sound: NDArray[np.floating], rate_hz: int) -> Unpredicted:
+    """Predictions are fitted to `FITTED_STEPS` steps of `FIT_S` each and used in the step after, or before them."""
+    size = round(FIT_S * rate_hz)
+    steps = -(-len(sound) // size)
+    signal = np.concatenate([np.zeros(ORDER), np.asarray(sound, float), np.zeros(steps * size - len(sound))])
+    rows = sliding_window_view(signal, ORDER + 1)  # the last entry of row n is frame n, the others what came before
+    products = np.zeros((steps + 2 * FITTED_STEPS, ORDER + 1, ORDER + 1))  # of each step, with silence at both ends
+    with threadpool_limits(limits=1, user_api="blas"):  # products so small are no work for two
+        for step in range(steps):
+            here = np.ascontiguousarray(rows[step * size : (step + 1) * size])
+            products[FITTED_STEPS + step] = here.T @ here
+    sums = np.concatenate([np.zeros((1, ORDER + 1, ORDER + 1)), np.cumsum(products, axis=0)])
+    del products
+    around = (
+        sums[FITTED_STEPS:] - sums[:-FITTED_STEPS]
+    )  # of the steps i … i + FITTED_STEPS - 1, counted with the ends
+    ridge = 1e-10 * np.trace(around[:, :-1, :-1], axis1=1, axis2=2) / ORDER + 1e-20
+    past_products = around[:, :-1, :-1] + ridge[:, np.newaxis, np.newaxis] * np.eye(ORDER)
+    with threadpool_limits(limits=1, user_api="blas"):
+        weights = np.linalg.solve(past_products, around[:, :-1, -1:])[..., 0]
+    by_past, by_both = np.zeros(steps * size), np.zeros(steps * size)
+    for step in range(steps):
+        frames = slice(step * size, (step + 1) * size)
+        here, past, future = rows[frames], weights[step], weights[step + FITTED_STEPS + 1]
+        by_past[frames] = np.abs(here[:, -1] - here[:, :-1] @ past)
+        by_both[frames] = np.minimum(by_past[frames], np.abs(here[:, -1] - here[:, :-1] @ future))
+    return Unpredicted(by_past[: len(sound)], by_both[: len(sound)])
+
+
+@dataclass(frozen=True)
+class Events:
+    """Where what could not be predicted stands out: of what came before (`plucks`), or of all around (`spikes`)."""
+
+    plucks: tuple[int, ...]
+    spikes: tuple[int, ...]
+
+
+def events(rest: Unpredicted, rate_hz: int) -> Events:
+    """Of what `unpredicted` has left. Several within 6 ms are one."""
+    step = round(STEP_S * rate_hz)
+    near = round(NEARBY_S / STEP_S)
+    gap = 2 + -(-ORDER // step)  # a click is unpredicted in all predictions that it is part of
+
+    def highest_of_steps(left: NDArray[np.float64]) -> NDArray[np.float64]:
+        return left[: len(left) // step * step].reshape(-1, step).max(axis=1)
+
+    def places(found: NDArray[np.bool_], left: NDArray[np.float64]) -> tuple[int, ...]:
+        kept: list[int] = []
+        for index in np.flatnonzero(found):
+            if not kept or index - kept[-1] > ATTACK_S / STEP_S:
+                kept.append(int(index))
+        ranges = [left[index * step : (index + 1) * step] for index in kept]
+        return tuple(i * step + int(np.argmax(part > 0.5 * part.max())) for i, part in zip(kept, ranges, strict=True))
+
+    size = highest_of_steps(rest.by_both)
+    spikes = (size > FAINTEST_CLICK) & (size >= _highest(size, -1, 1))
+    spikes &= size > STANDS_OUT * _quantile(size, -near, -2, MOSTLY)  # other clicks nearby are no reason
+    spikes &= size > STANDS_OUT * _quantile(size, gap, near, MOSTLY)
+    size = highest_of_steps(rest.by_past)
+    before = np.maximum(_highest(size, -near, -2), FAINTEST_PLUCK / STANDS_OUT)
+    rings = _quantile(size, gap, round(0.01 / STEP_S), 0.5)
+    plucks = (size > STANDS_OUT * before) & (rings > before)
+    sharp = tuple(place for place in places(spikes, rest.by_both) if _begins_at_once(rest.by_both, place))
+    return Events(places(plucks, rest.by_past), sharp)
+
+
+def matched(
+    keys: Sequence[int], found: Events, strength: NDArray[np.float64], usual: int, rate_hz: int
+) -> list[int | None]:
+    """For each key the beginning of its pluck: the strongest event about `usual` frames after it.
+
+    One that came much earlier or later than is usual is not found: where its attack is sharp, it counts as a click.
+    """
+    farthest = round(EARLY_OR_LATE_S * rate_hz)
+    places = np.array(sorted({*found.plucks, *found.spikes}), int)
+
+    def strongest(start: int, end: int) -> int | None:
+        first, last = np.searchsorted(places, (start, end))
+        reach = round(0.001 * rate_hz)
+        return max((int(p) for p in places[first:last]), key=lambda p: strength[p : p + reach].max(), default=None)
+
+    return [strongest(key + usual - farthest, key + usual + farthest) for key in keys]
+
+
+def clicks(
+    found: Events, plucked: Sequence[int | None], gaps: Sequence[Span], expected: Sequence[Span], rate_hz: int
+) -> list[int]:
+    """Spikes while sound is expected that are no attack of a pluck and no edge of a hole or fade."""
+    apart = round(ATTACK_S * rate_hz)
+    known = [Span(place - apart, place + apart) for place in plucked if place is not None]
+    known += [Span(gap.start - apart, gap.end + apart) for gap in gaps]
+    return [
+        place
+        for place in found.spikes
+        if any(span.start <= place < span.end for span in expected)
+        and not any(span.start <= place < span.end for span in known)
+    ]
+
+
+def onset(sound: NDArray[np.floating], key: int, rate_hz: int) -> int | None:
+    """The first frame, of one channel, of the pluck that a key began, or None where none began within half a second.
+
+    Out of silence it is the first frame that sounds. Where something rings it is the first that cannot be predicted
+    from what sounded before, which is some frames late where a pluck begins softly.
+    """
+    end = min(key + round(LATEST_S * rate_hz), len(sound))
+    quiet = key - round(0.005 * rate_hz)
+    after = np.abs(sound[key:end])
+    if np.abs(sound[max(quiet, 0) : key]).max(initial=0) < FAINTEST_PLUCK:
+        over = after > FAINTEST_PLUCK
+        return key + int(np.argmax(over)) if over.any() else None
+    start = max(key - round(0.1 * rate_hz), 0)
+    found = events(unpredicted(sound[start:end], rate_hz), rate_hz)
+    return next((start + place for place in found.plucks if start + place > key), None)
+
+
+def _begins_at_once(rest: NDArray[np.float64], place: int) -> bool:
+    """Whether there is little right before what begins here: a step, not a short tone of high partials."""
+    part = rest[max(place - ORDER, 0) : place + ORDER]
+    start = int(np.argmax(part > 0.2 * part.max()))
+    return start > 2 and bool(STANDS_OUT * part[: start - 1].max() < part.max())
+
+
+def _runs(where: NDArray[np.bool_]) -> list[Span]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(np.int8), [0]])))
+    return [Span(int(start), int(end)) for start, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _moved(span: Span, frames: int) -> Span:
+    return Span(span.start + frames, span.end + frames)
+
+
+def _highest(values: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
+    """At each place the highest of those from `first` to `last` places further on."""
+    padded = np.pad(values, (max(-first, 0), max(last, 0)))
+    start = max(first, 0)
+    return sliding_window_view(padded, last - first + 1)[start : start + values.size].max(axis=1)
+
+
+def _quantile(values: NDArray[np.float64], first: int, last: int, share: float) -> NDArray[np.float64]:
+    """The same with a quantile of them."""
+    padded = np.pad(values, (max(-first, 0), max(last, 0)))
+    start = max(first, 0)
+    windows = sliding_window_view(padded, last - first + 1)[start : start + values.size]
+    return np.partition(windows, place := int(share * (last - first)), axis=1)[:, place]

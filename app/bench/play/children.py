@@ -1,0 +1,52 @@
+"""Programs that the benchmark starts: none missing, none left over."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from typing import IO, Any
+
+PATIENCE_S = 5.0  # before a child that was asked to end is killed
+PACKAGES = {  # of Debian and its kin
+    "pulseaudio": "pulseaudio",
+    "pacat": "pulseaudio-utils",
+    "parec": "pulseaudio-utils",
+    "pactl": "pulseaudio-utils",
+    "Xvfb": "xvfb",
+}
+
+
+class Missing(RuntimeError):
+    """Something of the computer that the benchmark cannot do without."""
+
+
+def need_programs() -> None:
+    """Raises `Missing` with the names of all programs that are absent, and what to install."""
+    absent = [program for program in PACKAGES if shutil.which(program) is None]
+    if absent:
+        packages = " ".join(sorted({PACKAGES[program] for program in absent}))
+        raise Missing(f"bench play needs {', '.join(absent)}: install {packages} (on Debian: apt install {packages})")
+
+
+@contextlib.contextmanager
+def child(
+    command: Sequence[str],
+    environment: Mapping[str, str],
+    stdout: IO[Any] | int | None = subprocess.DEVNULL,
+    stderr: IO[Any] | int | None = subprocess.DEVNULL,
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that ends with the block, whatever happens in it."""
+    process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
