@@ -7,6 +7,7 @@ import os
 import sys
 import threading
 from enum import IntEnum
+from pathlib import Path
 
 NICEST = 19
 
@@ -36,13 +37,13 @@ REAL_TIME_PRIORITY = 10
 def native_threads() -> set[int]:
     """The system's numbers of this process's threads; none where it does not tell."""
     try:
-        return {int(name) for name in os.listdir("/proc/self/task")}
+        return {int(folder.name) for folder in Path("/proc/self/task").iterdir()}
     except OSError:
         return set()
 
 
 def put_first(threads: set[int]) -> bool:
-    """Real time for a device's own threads, where Linux grants it to the user; elsewhere the system does so itself."""
+    """Real time for a device's own threads, where Linux grants it; elsewhere the system does so itself."""
     granted = False
     for thread in threads if sys.platform == "linux" else ():
         with contextlib.suppress(OSError):

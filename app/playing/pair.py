@@ -13,7 +13,7 @@ STOP_S = 0.012
 
 
 class Pair:
-    """Samples of the mixer's own rate, by name, (frames, channels) of one length. Begun, told and ended by one thread."""
+    """Samples of the mixer's own rate, by name, (frames, channels) of one length. All is called by one thread."""
 
     def __init__(self, mixer: Mixer, samples: Mapping[str, NDArray[np.float32]]) -> None:
         self._mixer, self._samples = mixer, samples

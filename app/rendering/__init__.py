@@ -1,4 +1,4 @@
-"""From a pluck to its motion, for pictures: the take, and the worker thread that renders it. Sound has no part in it."""
+"""From a pluck to its motion, for pictures alone: the take, and the worker thread that renders it."""
 
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.take import SOURCES, Take

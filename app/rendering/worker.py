@@ -38,7 +38,7 @@ class RenderWorker:
         self._thread.start()
 
     def submit(self, request: RenderRequest) -> None:
-        """Replaces what waits, and abandons what is rendered where it is another motion. Returns at once; any thread."""
+        """Replaces what waits, and abandons another motion that is rendered. Returns at once; any thread."""
         with self._mailbox:
             self._request = request
             self._mailbox.notify()

@@ -22,7 +22,7 @@ def _sources() -> list[Path]:
 def _cache_folder() -> Path:
     """A folder for these very sources: beside them, else in the home folder, else a temporary one.
 
-    Numba notices that a function's own file has changed, but not a file that it calls into: with one folder a version,
+    Numba notices that a function's own file has changed, but not a file that it calls into. With one folder a version
     nothing compiled for another memory layout is ever loaded.
     """
     digest = hashlib.sha256()

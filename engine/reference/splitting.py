@@ -92,7 +92,7 @@ class SplittingSolver:
 
     @property
     def constants(self) -> tuple[Tensor, ...]:
-        """What the compiled kernels take: flows, kicks, coupling, η², sub-steps, levels, ω⁻²; see `_splitting_kernel`."""
+        """What compiled kernels take: flows, kicks, coupling, η², sub-steps, levels, ω⁻²; see `_splitting_kernel`."""
         of_flow = (self._flows, self._kicks, self._coupling, self._eta_squared)
         return (*of_flow, self._substeps, self._levels, self._inverse_omega_squared)
 
