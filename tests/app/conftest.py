@@ -1,4 +1,4 @@
-"""A window with its controller, a silent player and one small preset."""
+"""A window with its controller, a sound without a device and one small preset."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, ProblemKind
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, ProblemKind, Sound
 
-OWN_THREADS = ("render-worker", "audio-feeder", "eigenvalues", "partials", "error-map", "compare")
+OWN_THREADS = ("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock", "eigenvalues", "partials", "error-map", "compare")
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
@@ -32,8 +32,9 @@ def no_device(*_: object) -> AudioDevice:
     raise AudioUnavailable(AudioProblem(ProblemKind.NO_DEVICE, "No sound output here.", "Connect one."))
 
 
-def make_player(on_problem: Callable[[AudioProblem], None]) -> Player:
-    return Player(on_problem, look_up=no_device)
+def make_sound(on_problem: Callable[[AudioProblem], None] | None = None) -> Sound:
+    """Its frames are taken at the pace of time, and dropped."""
+    return Sound(on_problem, look_up=no_device)
 
 
 @pytest.fixture
@@ -57,7 +58,7 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
     window = MainWindow()
     qtbot.addWidget(window)
     settings = Settings(choices=Choices(seconds=0.5))
-    made = Controller(window, settings, tmp_path / "settings.json", make_player)
+    made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     window.show()
     qtbot.waitExposed(window)
     yield made

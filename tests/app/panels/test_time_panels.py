@@ -455,7 +455,7 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
             timeout=20_000,
         )
         plots[1].seek_asked.emit(0.1)
-        qtbot.waitUntil(lambda: controller.player.status().position_s < 0.2, timeout=5_000)
+        qtbot.waitUntil(lambda: controller.performance.position_s < 0.2, timeout=5_000)
 
 
 @pytest.mark.parametrize(
