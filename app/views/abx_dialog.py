@@ -268,7 +268,7 @@ class AbxDialog(QDialog):
             if self._rate_hz != self._output.rate_hz:
                 self._ask_for_sound()
                 self._prepare()
-            elif self._stimuli is None and self._silence == RENDERING:
+            elif self._silence == RENDERING or (self._pair and self._pair.mixer is not self._output.mixer):
                 self._prepare()
             else:
                 self._show_state()
