@@ -71,7 +71,7 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, mail.refused.emit)
-        self._worker = RenderWorker(mail, self._sources.load)
+        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
 
     @property
     def entry(self) -> PresetEntry | None:

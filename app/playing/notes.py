@@ -22,7 +22,6 @@ from app.playing.ahead import Ahead, AheadVoice
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
 from app.precedence import Rank, step_back
-from engine.kernels import layout
 from engine.preset import PresetError
 from engine.sources import project
 from engine.voices import Ear, Mixer, Voice, render_voice
@@ -249,12 +248,13 @@ class Notes:
         note.ahead = []
         for source in stroke.sources:
             path = stroke.path(source)
-            program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
+            kind = "truth" if source == "truth" else "model"
+            program = self._sources.program(path, kind, rate_hz)
             loaded = self._sources.load(path)
             info = loaded.preset.info
-            initial_m = project(stroke.pluck.displacement(info.grid_points), info.modes)
-            ahead = program.kind == layout.RENDERED
-            voice = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds if ahead else 0.0, info.rate_hz)
+            initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
+            ahead = program.rendered
+            voice = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds if ahead else 0.0, info.rate_hz, begin)
             voices[source] = voice
             if ahead:
                 key = (path, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds)
@@ -334,7 +334,7 @@ class Notes:
         info = self._sources.load(path).preset.info
         rate_hz = min(self._sound.rate_hz, 48_000)
         program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
-        if program.kind == layout.RENDERED:
+        if program.rendered:
             return 0.0
         mixer = Mixer(rate_hz)
         mixer.add(Voice(program, project(stroke.pluck.displacement(info.grid_points), info.modes), stroke.ear))
