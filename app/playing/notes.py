@@ -34,6 +34,7 @@ BUSY = 0.75  # of the device's time: beyond, the oldest notes end, so that the o
 MATCHED_S = 1.0  # so much from the pluck on is compared to match levels
 LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
 KEPT_MATCHES = 256
+MOST_CARRIED = 4  # notes that ring on where the device changes its rate
 
 Report = Callable[[str, str], None]  # a message and its details
 
@@ -55,6 +56,7 @@ class Note:
         self.released = False
         self.timed = False  # its latency has been noted
         self.begin_frame = 0  # of the mixer, before which it waits
+        self.mixer: Mixer | None = None  # that it was handed to
 
     @property
     def over(self) -> bool:
@@ -191,7 +193,11 @@ class Notes:
     def poll(self) -> None:
         """Now and then: forgets what is over, moves listening points, keeps the load bounded."""
         with self._lock:
-            self._notes = [note for note in self._notes if not note.over]
+            mixer = self._sound.mixer
+            left = [note for note in self._notes if note.mixer is not mixer and not note.over and not note.released]
+            self._notes = [note for note in self._notes if not note.over and note.mixer is mixer]
+            for note in left[-MOST_CARRIED:]:  # the device has changed its rate: they ring on there
+                self._submit(lambda note=note: self._begin(note, 0.0, note.seconds))  # type: ignore[misc]
             for note in self._notes:
                 if not note.timed and not note.pending and note.voices:
                     latency_s = next(iter(note.voices.values())).struck_to_began_s
@@ -272,8 +278,8 @@ class Notes:
         note.voices = voices
 
     def _rendered_enough(self, note: Note) -> None:
-        if all(each.begun for each in note.ahead):
-            self._hand_over(note, self._sound.mixer)
+        if all(each.begun for each in note.ahead) and not self._hand_over(note, self._sound.mixer):
+            self._submit(lambda: self._begin(note, 0.0, 0.0))  # the device has changed its rate meanwhile
 
     def _hand_over(self, note: Note, mixer: Mixer) -> bool:
         with self._lock:
@@ -284,7 +290,7 @@ class Notes:
                 mixer.add(*note.voices.values())
             except ValueError:
                 return False
-            note.pending = False
+            note.pending, note.mixer = False, mixer
             self._notes.append(note)
         self._wish_match(note)
         return True
