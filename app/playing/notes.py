@@ -199,7 +199,7 @@ class Notes:
             for note in left[-MOST_CARRIED:]:  # the device has changed its rate: they ring on there
                 self._submit(lambda note=note: self._begin(note, 0.0, note.seconds))  # type: ignore[misc]
             for note in self._notes:
-                if not note.timed and not note.pending and note.voices:
+                if not note.timed and not note.ahead and note.voices:
                     latency_s = next(iter(note.voices.values())).struck_to_began_s
                     if latency_s is not None:
                         note.timed = True

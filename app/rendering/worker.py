@@ -70,7 +70,8 @@ class RenderWorker:
                 if job is not None and not waits and self._request is None and self._in_step(job):
                     self._mailbox.wait(LOOK_AGAIN_S)
                 while waits and self._request is None and not self._closing:
-                    if not self._mailbox.wait(TIDY_AFTER_S if untidy else None) and untidy:
+                    # giving pages back locks the heap, which the sound server's client uses too
+                    if not self._mailbox.wait(TIDY_AFTER_S if untidy else None) and untidy and not self._hurried():
                         return_free_pages()
                         untidy = False
                 if self._closing:
