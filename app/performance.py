@@ -71,7 +71,7 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, mail.refused.emit)
-        self._worker = RenderWorker(mail, self._sources.load)
+        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -100,7 +100,7 @@ class Performance(QObject):
         if shown.take is None:
             return 0.0
         heard_s = shown.parked_s
-        if shown.note is not None and not shown.note.pending:
+        if shown.note is not None:
             heard_s = shown.note.seconds - self._sound.mixer.output_latency_s
         return min(max(heard_s, 0.0), shown.take.seconds)
 

@@ -16,16 +16,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from app.audio.sound import Sound
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
 from app.precedence import Rank, step_back
-from engine.kernels import layout
+from engine.kernels.layout import QUANTUM
 from engine.preset import PresetError
-from engine.sources import ModelSource, project
 from engine.voices import Ear, Mixer, Voice, render_voice
 
 MOST_NOTES = 24  # that ring at once; the oldest makes room
@@ -36,6 +34,7 @@ BUSY = 0.75  # of the device's time: beyond, the oldest notes end, so that the o
 MATCHED_S = 1.0  # so much from the pluck on is compared to match levels
 LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
 KEPT_MATCHES = 256
+MOST_CARRIED = 4  # notes that ring on where the device changes its rate
 
 Report = Callable[[str, str], None]  # a message and its details
 
@@ -73,6 +72,8 @@ class Note:
     @property
     def seconds(self) -> float:
         """How long it has been ringing, as far as the device was given it."""
+        if self.pending:
+            return self.from_s
         return max((voice.seconds for voice in self.voices.values()), default=0.0)
 
     @property
@@ -95,7 +96,7 @@ class Note:
         assert self.mixer is not None
         rate_hz = self.mixer.rate_hz
         if self.from_s:  # its voices did not note when they began, but both count in whole quanta
-            begun = -(-round(self.mixer.seconds * rate_hz) // layout.QUANTUM) * layout.QUANTUM
+            begun = -(-round(self.mixer.seconds * rate_hz) // QUANTUM) * QUANTUM
             return begun + round((seconds - self.seconds) * rate_hz)
         starved_s = min(voice.starved_s for voice in self.voices.values())
         return self.began_frame + round((seconds + starved_s) * rate_hz)
@@ -219,12 +220,10 @@ class Notes:
     def poll(self) -> None:
         """Now and then: forgets what is over, moves listening points, keeps the load bounded."""
         with self._lock:
-            for note in self._notes:
-                if note.mixer not in (None, self._sound.mixer):  # another rate: no device takes its frames now
-                    note.cut = True
+            self._carry()
             self._notes = [note for note in self._notes if not note.over]
             for note in self._notes:
-                if not note.timed and not note.pending and note.voices:
+                if not note.timed and not note.ahead and note.voices:
                     latency_s = next(iter(note.voices.values())).struck_to_began_s
                     if latency_s is not None:
                         note.timed = True
@@ -263,6 +262,19 @@ class Notes:
         if not self._closed:
             self._helper.submit(work)
 
+    def _carry(self) -> None:
+        """Where the device has changed its rate, the latest notes ring on in its new mixer."""
+        mixer = self._sound.mixer
+        left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
+        ringing = [note for note in left if note.seconds and not note.released][-MOST_CARRIED:]
+        for note in left:
+            if note in ringing:
+                note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
+                note.pending, note.handed_over = True, False
+                self._submit(self._guarded(lambda note=note: self._begin(note, 0.0), note))  # type: ignore[misc]
+            else:
+                note.cut = True
+
     def _begin(self, note: Note, struck_s: float) -> None:
         """Makes the voices and hands them over, again where the device has changed its rate meanwhile."""
         for _ in range(3):
@@ -289,43 +301,33 @@ class Notes:
         stroke, voices = note.stroke, {}
         ahead: list[AheadVoice] = []
         for source in stroke.sources:
+            path, kind = stroke.path(source), "truth" if source == "truth" else "model"
             try:
-                voice, model = self._make_voice(stroke, source, rate_hz)
+                program = self._sources.program(path, kind, rate_hz)
+                initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
+                model = self._sources.load(path).model if program.rendered else None
             except (PresetError, ValueError):
                 if source not in stroke.others:
                     raise
                 continue  # what stands beside it is at rest; who draws it tells why
-            voices[source] = voice
-            if model is not None:
-                ahead.append(
-                    AheadVoice(
-                        voice,
-                        model,
-                        self._initial_m(stroke, source),
-                        stroke.ear.weights(model.grid_points),
-                        (stroke.path(source), stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
-                        lambda: self._rendered_enough(note, ahead, struck_s),
-                        lambda error: self._cannot_render(note, error),
-                        lambda: note.over,
-                        note.from_s,
-                    )
+            if model is None:
+                voices[source] = Voice(program, initial_m, stroke.ear, 0.0, begin=begin)
+                continue
+            voice = voices[source] = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds, model.rate_hz, begin)
+            ahead.append(
+                AheadVoice(
+                    voice,
+                    model,
+                    initial_m,
+                    stroke.ear.weights(model.grid_points),
+                    (path, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
+                    lambda: self._rendered_enough(note, ahead, struck_s),
+                    lambda error: self._cannot_render(note, error),
+                    lambda: note.over,
+                    note.from_s,
                 )
+            )
         note.ahead, note.voices = ahead, voices
-
-    def _make_voice(self, stroke: Stroke, source: str, rate_hz: int) -> tuple[Voice, ModelSource | None]:
-        """With the model that renders its samples, if one must."""
-        path = stroke.path(source)
-        program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
-        loaded = self._sources.load(path)
-        info = loaded.preset.info
-        initial_m = self._initial_m(stroke, source)
-        rendered = program.kind == layout.RENDERED
-        voice = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds if rendered else 0.0, info.rate_hz)
-        return voice, loaded.model if rendered else None
-
-    def _initial_m(self, stroke: Stroke, source: str) -> Tensor:
-        info = self._sources.load(stroke.path(source)).preset.info
-        return project(stroke.pluck.displacement(info.grid_points), info.modes)
 
     def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
         """One of its models is; in any thread."""
@@ -401,13 +403,14 @@ class Notes:
 
     def _level(self, stroke: Stroke, source: str) -> float:
         """Root mean square of the first second; 0 of what is rendered ahead: it is left as it is."""
-        path = stroke.path(source)
+        path, kind = stroke.path(source), "truth" if source == "truth" else "model"
         rate_hz = min(self._sound.rate_hz, 48_000)
-        program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
-        if program.kind == layout.RENDERED:
+        program = self._sources.program(path, kind, rate_hz)
+        if program.rendered:
             return 0.0
         mixer = Mixer(rate_hz, limited=False)
-        mixer.add(Voice(program, self._initial_m(stroke, source), stroke.ear))
+        initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
+        mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))
         sound = mixer.render(round(MATCHED_S * rate_hz))
         return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))
 

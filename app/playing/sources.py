@@ -6,12 +6,21 @@ import threading
 from collections import OrderedDict
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
 from app.rendering.loaded import Loaded
+from engine.pluck import Pluck
 from engine.preset import load_preset
-from engine.voices import Program, bank_program, rendered_program, truth_program
+from engine.sources import project
+from engine.voices import Program, model_program, truth_program
 
 KINDS = ("truth", "model")
 KEPT_PRESETS = 8  # the latest used
+KEPT_PLUCKS = 512
+
+Array = NDArray[np.float64]
 
 
 class Sources:
@@ -21,6 +30,7 @@ class Sources:
         self._lock = threading.Lock()  # of what is there, for a moment
         self._loading = threading.RLock()  # one after the other
         self._presets: OrderedDict[Path, Loaded] = OrderedDict()
+        self._begins: OrderedDict[tuple[Path, str, int, Pluck], tuple[Tensor, tuple[Array, Array]]] = OrderedDict()
         self._programs: dict[tuple[Path, str, int], Program] = {}
 
     def has(self, path: Path, rate_hz: int) -> bool:
@@ -38,8 +48,9 @@ class Sources:
                 self._presets[path] = found
                 while len(self._presets) > KEPT_PRESETS:
                     oldest, _ = self._presets.popitem(last=False)
-                    for key in [key for key in self._programs if key[0] == oldest]:
-                        del self._programs[key]
+                    self._programs = {key: each for key, each in self._programs.items() if key[0] != oldest}
+                    for key in [key for key in self._begins if key[0] == oldest]:
+                        del self._begins[key]
             return found
 
     def program(self, path: Path, kind: str, rate_hz: int) -> Program:
@@ -53,11 +64,25 @@ class Sources:
                 if kind == "truth":
                     found = truth_program(preset.info, rate_hz)
                 else:
-                    bank = bank_program(preset.model, preset.info, rate_hz)
-                    found = rendered_program(preset.info, rate_hz) if bank is None else bank
+                    found = model_program(preset.model, preset.info, rate_hz)
                 with self._lock:
                     self._programs[key] = found
             return found
+
+    def begin(self, path: Path, kind: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+        """A pluck's displacement (grid_points,) in m, and what a voice of the program sets out from; remembered."""
+        key = (path, kind, rate_hz, pluck)
+        with self._lock:
+            found = self._begins.pop(key, None)
+        if found is None:
+            info = self.load(path).preset.info
+            initial_m = project(pluck.displacement(info.grid_points), info.modes)
+            found = initial_m, self.program(path, kind, rate_hz).start(initial_m)
+        with self._lock:
+            self._begins[key] = found
+            while len(self._begins) > KEPT_PLUCKS:
+                self._begins.popitem(last=False)
+        return found
 
     def prepare(self, path: Path, rate_hz: int) -> None:
         """Loads it with both programs. Raises PresetError."""

@@ -27,6 +27,7 @@ class Voice:
         displacement_m: as it is let go, (grid_points,), projected on the modes in use.
         gain: with which it is heard, 0 for a source that is only kept ready.
         seconds: of a rendered voice: how much room there is for its samples.
+        begin: what `program.start` gives for this displacement, where it is known.
     """
 
     def __init__(
@@ -37,6 +38,7 @@ class Voice:
         gain: float = 1.0,
         seconds: float = 0.0,
         source_rate_hz: int = 0,
+        begin: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         n = program.modes
         rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS}.get(program.kind, 0)
@@ -51,7 +53,7 @@ class Voice:
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         peak = float(displacement_m.abs().max())
         memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / ear.full_scale * (1.0 if not counts[at.VELOCITY] else 60.0)
-        first, second = program.start(displacement_m)
+        first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + n], memory[place + n : place + 2 * n] = first, second
         self._samples: NDArray[np.float32] | None = None
@@ -60,7 +62,7 @@ class Voice:
         elif program.kind == at.BANK:
             from engine.kernels.bank import strike
 
-            strike(memory, program.memory, np.empty(at.SCRATCH_SLOTS))
+            strike(memory, program.memory, np.empty(at.SCRATCH_ROWS * at.MOST_MODES))
         else:
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
@@ -200,7 +202,7 @@ class Voice:
 
     def _set_weights(self, which: int, ear: Ear) -> None:
         n = self.program.modes
-        weights, bias = self.program.read(ear.weights(self.program.grid_points))
+        weights, bias = self.program.weights(ear)
         for point in range(len(ear.points)):
             place = at.HEADER + (which * 2 + point) * 2 * n
             self.memory[place : place + 2 * n] = weights[point]
