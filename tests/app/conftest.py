@@ -12,8 +12,13 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, ProblemKind, Sound
+from app.audio.output import ClockOutput
+from engine.voices import Mixer
 
-OWN_THREADS = ("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock", "eigenvalues", "partials", "error-map", "compare")
+OWN_THREADS = (
+    *("render-worker", "render-helper_0", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
+    *("eigenvalues", "partials", "error-map", "compare"),
+)
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
@@ -35,6 +40,23 @@ def no_device(*_: object) -> AudioDevice:
 def make_sound(on_problem: Callable[[AudioProblem], None] | None = None) -> Sound:
     """Its frames are taken at the pace of time, and dropped."""
     return Sound(on_problem, look_up=no_device)
+
+
+class NumbOutput(ClockOutput):
+    """A device that takes frames at the pace of time, like a real one, and makes no sound."""
+
+    def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
+        super().__init__(mixer)
+        self.device, self.latency_s = device, buffer_s
+        self.gone = False
+
+    def lost(self) -> bool:
+        return self.gone
+
+
+@pytest.fixture
+def numb_output() -> type[NumbOutput]:
+    return NumbOutput
 
 
 @pytest.fixture

@@ -93,9 +93,7 @@ def played() -> Played:
     return []
 
 
-def control(
-    choices: MidiChoices, presets: list[str], played: Played, load: Callable[[], FakeBackend]
-) -> MidiControl:
+def control(choices: MidiChoices, presets: list[str], played: Played, load: Callable[[], FakeBackend]) -> MidiControl:
     def play(changes: dict[str, Any]) -> None:
         played.append((changes, threading.current_thread()))
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from app.audio.limiter import CEILING, RELEASE_S, Limiter
 
 RATE_HZ = 48_000

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
-from app.audio import Levels, Mixer, Track
 from app.audio.limiter import CEILING
 from app.audio.mixer import MOST_PLUCKS
 from app.audio.strand import ATTACK_S, CROSS_FADE_S, DECLICK_S, RESUME_RESERVE_S
+
+from app.audio import Levels, Mixer, Track
 
 RATE_HZ = 48_000
 TONE_HZ = 220.0

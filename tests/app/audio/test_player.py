@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from app.audio.stream import AHEAD_S, BUFFER_S, SOON_S, OutputStream
 
 from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Mixer, Player, ProblemKind, Track
 from app.audio import player as player_module
 from app.audio import stream as stream_module
 from app.audio.problems import no_device, vanished
-from app.audio.stream import AHEAD_S, BUFFER_S, SOON_S, OutputStream
 
 RATE_HZ = 48_000
 BLOCK_FRAMES = 256

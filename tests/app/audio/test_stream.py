@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from app.audio.stream import AHEAD_S, BLOCK_FRAMES, BUFFER_S, SOON_S, OutputStream
 
 from app.audio import AudioDevice, AudioUnavailable, ProblemKind
 from app.audio import stream as stream_module
-from app.audio.stream import AHEAD_S, BLOCK_FRAMES, BUFFER_S, SOON_S, OutputStream
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """The playhead as heard lags behind the playhead as rendered."""
 
 import pytest
-
 from app.audio.timeline import Timeline
 
 

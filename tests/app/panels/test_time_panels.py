@@ -29,13 +29,13 @@ from app.panels import (
 )
 from app.panels.spectrum import EVERY
 from app.rendering import Take
-from engine.voices import Ear
 from app.rendering.take import Motion
 from app.session import Choices, Session
 from app.shown import ShownSource
 from app.views.space_time_view import AUTO
 from engine.pluck import Pluck
 from engine.preset import read_info
+from engine.voices import Ear
 
 LEFT = Qt.MouseButton.LeftButton
 FRAMES = 4001  # a second
