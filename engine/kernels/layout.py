@@ -1,8 +1,9 @@
 """What lies where: a voice, a program and a mixer are flat arrays of eight-byte numbers, real or whole.
 
 A *program* is what voices of one source share: a model's parameters, or a solver's. A *voice* is one pluck of it as
-it rings. Slots are counted in eight-byte numbers. Whole numbers and real ones share the memory, each slot is always one
-or the other. One thread writes a slot while others may read it; a slot that a command changes is read once a quantum.
+it rings. Slots are counted in eight-byte numbers. Whole numbers and real ones share the memory; each slot is always
+one or the other. One thread writes a slot while others may read it; a slot that a command changes is read once a
+quantum.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Programs: what all voices of one source share, at one sample rate.
 
 A model whose decoder is linear becomes a bank of latents, and the string itself a solver; both are compiled and
-sound at once, at the device's own rate. Any other model is rendered ahead at the rate that it was trained at, and converted.
+sound at once, at the device's own rate. Any other model is rendered ahead at the rate that it was trained at, and
+converted.
 """
 
 from __future__ import annotations
