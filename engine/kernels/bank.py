@@ -1,10 +1,10 @@
 """A voice of latents z_n(t) whose frequencies follow their energies: `engine.models.integrated_phase`, compiled.
 
 It is what that module says, with time in samples of the trained rate and any number of frames a sample. Level and
-phase are computed at the ends of short segments and are cubics in between; within a segment z is advanced by products.
-Where the modulation M z² can be heard it is computed at every frame, for the latents that matter alone. Energies only
-decay, so that what has become too quiet to matter is left out for good. Any block is the same as if it were rendered
-in one piece: everything hangs on the frame alone.
+phase are computed at the ends of short segments and are cubics in between; within a segment z is advanced by
+products. Where the modulation M z² can be heard it is computed at every frame, for the latents that matter alone.
+Energies only decay, so that what has become too quiet to matter is left out for good. Any block is the same as if it
+were rendered in one piece: everything hangs on the frame alone.
 
 A linear model (DMD) is a bank without coupling.
 """

@@ -94,7 +94,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
     now = mix_counts[at.M_FRAMES]
-    if counts[at.BEGIN_AT] > now and counts[at.FRAME] == 0:
+    if counts[at.BEGIN_AT] > now and counts[at.STATE] == at.WAITING:
         return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
         counts[at.RELEASE] = counts[at.FADE_FRAMES]
@@ -140,7 +140,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
         counts[at.GAIN_DONE] = min(done + quantum, length)
         voice[at.GAIN] = goal if done + quantum >= length else source + (goal - source) * ((done + quantum) / length)
     if counts[at.GENERATED] > generated:  # else it stands still
-        if counts[at.FRAME] == 0:
+        if counts[at.BEGAN_FRAME] < 0:
             counts[at.BEGAN_FRAME] = mix_counts[at.M_FRAMES]
             voice[at.BEGAN_S] = now_s
         counts[at.FRAME] += quantum

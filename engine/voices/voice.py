@@ -47,6 +47,7 @@ class Voice:
         counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = program.kind, program.address, n
         counts[at.POINTS], counts[at.VELOCITY] = len(ear.points), ear.pickup == "velocity"
         memory[at.WANTED_GAIN] = memory[at.GAIN] = memory[at.GAIN_FROM] = memory[at.GAIN_TO] = gain
+        counts[at.BEGAN_FRAME] = -1
         counts[at.FADE_FRAMES] = round(FADE_S * program.rate_hz)
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
@@ -114,7 +115,7 @@ class Voice:
     @property
     def struck_to_began_s(self) -> float | None:
         """From the gesture to the callback that gave its first samples to the device; None until then."""
-        if not self._counts[at.FRAME] or not self.memory[at.STRUCK_S]:
+        if self._counts[at.BEGAN_FRAME] < 0 or not self.memory[at.STRUCK_S]:
             return None
         return float(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
 
@@ -146,8 +147,8 @@ class Voice:
 
     @property
     def began_frame(self) -> int:
-        """Of the mixer."""
-        return int(self._counts[at.BEGAN_FRAME])
+        """Of the mixer; 0 until then."""
+        return max(0, int(self._counts[at.BEGAN_FRAME]))
 
     def release(self, seconds: float) -> None:
         """Fades to silence and ends; a release under way goes on."""
