@@ -126,12 +126,16 @@ class Notes:
         note.begin_frame = begin_frame
         if alone:
             self.stop(REPLACED_S)
-        rate_hz = self._sound.rate_hz
-        if from_s > 0 or not all(self._sources.has(stroke.path(source), rate_hz) for source in stroke.sources):
+        if from_s > 0 or not self.have(stroke):
             self._submit(lambda: self._begin(note, struck_s, from_s))
         else:
             self._begin(note, struck_s, from_s)
         return note
+
+    def have(self, stroke: Stroke) -> bool:
+        """Whether nothing needs to be loaded for it."""
+        rate_hz = self._sound.rate_hz
+        return all(self._sources.has(stroke.path(source), rate_hz) for source in stroke.sources)
 
     def prepare(self, *paths: Path) -> None:
         """Loads presets in the background, so that a strike need not wait."""

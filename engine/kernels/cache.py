@@ -8,6 +8,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+
 def _sources() -> list[Path]:
     """Of all compiled functions, which call one another across files."""
     engine = Path(__file__).parents[1]

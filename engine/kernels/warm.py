@@ -5,14 +5,12 @@ It takes the better part of a minute where nothing has been compiled yet, and ab
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
 
 from engine.kernels import cache, layout
-from engine.kernels.mixer import call
 from engine.models import StringModel, build_model
 from engine.models.base import Physics
 from engine.pluck import Pluck
@@ -47,21 +45,23 @@ FRAMES = 4 * layout.QUANTUM
 
 
 def warm() -> None:
-    """All that sounds; and, where it has not been compiled yet, all that models and the solver render with."""
-    voices()
-    if not cache.is_whole():
+    """Loads what a pluck needs at once; where not all has been compiled yet, compiles all."""
+    if cache.is_whole():
+        _sound(_struck(_bank({}), EARS[0]))
+    else:
+        voices()
         models()
         cache.set_whole()
 
 
 def voices() -> None:
-    """A few quanta of every kind of voice; and what a device calls, which is compiled as it is imported."""
-    assert call.address
-    programs = [bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ) for sizes in BANKS]
-    _sound([program for program in programs if program], lambda p, ear: Voice(p, _initial_m(), ear))
-    _sound([truth_program(INFO, RATE_HZ)], lambda p, ear: Voice(p, _initial_m(), ear))
-    silence = np.zeros((FRAMES, 1), np.float32)
-    _sound([plain_program(RATE_HZ)], lambda p, _ear: Voice.of_samples(p, silence))
+    """A few quanta of every kind of voice; what a device calls is compiled as it is imported."""
+    for program in (*map(_bank, BANKS), truth_program(INFO, RATE_HZ)):
+        for ear in EARS:
+            voice = _struck(program, ear)
+            voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
+            _sound(voice)
+    _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
 
 
 def models() -> None:
@@ -81,13 +81,20 @@ def models() -> None:
     truth.advance(truth.start(_initial_m()[None]), 2)
 
 
-def _sound(programs: list[Program], strike: Callable[[Program, Ear], Voice]) -> None:
-    for program in programs:
-        for ear in EARS:
-            mixer, voice = Mixer(RATE_HZ), strike(program, ear)
-            voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
-            mixer.add(voice)
-            mixer.render(FRAMES)
+def _bank(sizes: dict[str, Any]) -> Program:
+    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
+    assert program is not None
+    return program
+
+
+def _struck(program: Program, ear: Ear) -> Voice:
+    return Voice(program, _initial_m(), ear)
+
+
+def _sound(voice: Voice) -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.add(voice)
+    mixer.render(FRAMES)
 
 
 def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
