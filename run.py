@@ -6,8 +6,8 @@ python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with ar
 python3 run.py setup           only prepare
 python3 run.py -- render ...   the command line: everything after -- goes to learned-strings
 
-The first start makes .venv beside this file, with the versions of constraints.txt, and takes minutes;
-later ones start at once. Delete .venv to begin afresh.
+The first start makes .venv beside this file, with the versions of constraints.txt, compiles what makes the
+sound, and takes minutes; later ones start at once. Delete .venv to begin afresh.
 """
 
 import collections
@@ -31,6 +31,7 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 LOCK = VENV / "run.lock"
 STAMP = VENV / "run.json"
+COMPILED = VENV / "compiled"
 WINDOWS = os.name == "nt"
 SCRIPTS = VENV / ("Scripts" if WINDOWS else "bin")
 SUFFIX = ".exe" if WINDOWS else ""
@@ -149,14 +150,41 @@ def prepare(action: str, window: bool) -> None:
     if stamp and action == "start":
         if window:
             say_absent(missing(stamp["absent"]))
-        return
-    with locked():
-        absent = system_packages(action)
-        say_absent(absent)
-        if not read_stamp():  # a set-up that this one waited for may have made it
-            environment(absent)
+    else:
+        with locked():
+            absent = system_packages(action)
+            say_absent(absent)
+            if not read_stamp():  # a set-up that this one waited for may have made it
+                environment(absent)
+    if not compiled():
+        with locked():
+            compile_kernels()
     if action == "setup":
         say("ready; to open the app: python3 run.py")
+
+
+def compiled() -> bool:
+    """Whether what makes the sound has been compiled as it is now, for this .venv."""
+    try:
+        return COMPILED.read_text("utf-8") == kernels()
+    except OSError:
+        return False
+
+
+def compile_kernels() -> None:
+    """Compile what makes the sound; the window would else have its user wait for it."""
+    if compiled():  # by a set-up that this one waited for
+        return
+    say("compiling the sound engine: a minute, once for each version of it")
+    trouble = "the sound engine was not compiled, for the reason above; remedy: delete .venv, then try again"
+    run_step([PYTHON, "-m", "engine.kernels.warm"], trouble)
+    COMPILED.write_text(kernels(), "utf-8")
+
+
+def kernels() -> str:
+    """Hash the compiled functions' sources, and what else .venv holds."""
+    sources = sorted([*ROOT.glob("engine/kernels/*.py"), *ROOT.glob("engine/*/_*kernel.py")])
+    return hashlib.sha256(b"\0".join([fingerprint().encode(), *(path.read_bytes() for path in sources)])).hexdigest()
 
 
 def read_stamp() -> dict | None:

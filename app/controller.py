@@ -75,6 +75,8 @@ class Controller(QObject):
         self._audio_mail = _AudioMail()
         self.sound = make_sound(self._audio_mail.told.emit)
         self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
+        self._audio_mail.told.connect(self.audio.tell)
+        self.audio.open()  # it is opened while all else is made
         self.appearance = Appearance(window, settings.look)
         self._last_tick_s = time.monotonic()
         self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
@@ -105,7 +107,6 @@ class Controller(QObject):
         self.instruments.start()
         for problem in problems:
             self.window.notices.tell(problem)
-        self.audio.open()
         everything = frozenset(type(self.session.choices).model_fields)
         self.performance.choices_changed(everything)
         self._choices_shown(everything)
@@ -141,7 +142,6 @@ class Controller(QObject):
         window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
         window.all_modes_asked.connect(lambda: session.update(solo=0))
         window.closing.connect(self.close)
-        self._audio_mail.told.connect(self.audio.tell)
 
     def _connect_history(self) -> None:
         window, session, history = self.window, self.session, self.history

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import sys
@@ -25,14 +26,18 @@ if TYPE_CHECKING:
     from app.controller import Controller
 
 
+Alive = Callable[["Controller"], None]
+
+
 class _Start(QObject):
     """Loads the engine in a thread of its own once the window is painted, then brings the window to life."""
 
     _loaded = Signal()
 
-    def __init__(self, window: MainWindow, settings: Settings, path: Path, notice: str) -> None:
+    def __init__(self, window: MainWindow, settings: Settings, path: Path, notice: str, alive: Alive) -> None:
         super().__init__()
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
+        self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
         self._controller: Controller | None = None
         self.failure: Exception | None = None
@@ -47,6 +52,8 @@ class _Start(QObject):
     def _load(self) -> None:
         try:
             load_engine()
+            import app.controller
+            import app.views.plots  # noqa: F401
         except Exception as error:
             self.failure = error
         self._loaded.emit()
@@ -67,21 +74,36 @@ class _Start(QObject):
             return
         if self._notice:
             self._window.notices.tell(self._notice)
+        self._alive(self._controller)
 
 
 def load_engine() -> None:
-    """What the window does not need in order to be seen: two seconds and more, most of it for torch."""
-    import scipy.fft  # noqa: F401  the spectrum's; here it is loaded beside the window
+    """What the window does not need in order to be seen: two seconds, most of it for torch."""
+    threading.Thread(target=_find_devices, name="sound-finder", daemon=True).start()
     import torch
     from threadpoolctl import threadpool_limits
+
+    from engine.kernels.warm import warm
 
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
     # NumPy's products are small here. Its BLAS would wait for the next one in a loop, a thread a core, for nothing.
     threadpool_limits(limits=1, user_api="blas")
+    warm()
 
 
-def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
-    """Opens the app and returns its exit status when it is closed. `watch` is given the window before it is shown."""
+def _find_devices() -> None:
+    """PortAudio looks for devices as it is loaded, which may take long: here it does so beside the rest."""
+    with contextlib.suppress(Exception):  # told where it is used
+        import sounddevice  # noqa: F401
+
+
+def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive = lambda controller: None) -> int:
+    """Opens the app and returns its exit status when it is closed.
+
+    Args:
+        watch: is given the window before it is shown.
+        alive: is given the controller as soon as there is one.
+    """
     gc.disable()  # until `collect_between_events`: nothing is thrown away before
     return_large_blocks()
     path = settings_file()
@@ -94,7 +116,7 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None) -> int:
     apply_theme(application, settings.look.face)
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
-    start = _Start(window, settings, path, notice)
+    start = _Start(window, settings, path, notice, alive)
     watch(window)
     window.show()
     status = application.exec()

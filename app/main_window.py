@@ -34,6 +34,7 @@ from app.views.parts import tool_button
 from app.views.preset_bar import PresetBar
 from app.views.sideways import Sideways
 from app.views.transport_bar import TransportBar
+from engine.kernels import cache  # and not the compiler
 
 KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
@@ -56,6 +57,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
+LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
 WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
 FACTS_HEIGHT = 20
@@ -153,7 +155,7 @@ class MainWindow(QMainWindow):
         decks.addWidget(self.right)
         decks.setSizes([560, 720])
         self._stage = QSplitter(Qt.Orientation.Vertical)
-        self._loading = QLabel("Loading the models …")
+        self._loading = QLabel(LOADING if cache.is_whole() else COMPILING)
         self._loading.setObjectName("faint")
         self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._stage.addWidget(self._loading)

@@ -89,6 +89,12 @@ class Performance(QObject):
         return self.take is not None and motion_key(self.take) == self._key(self._session.choices)
 
     @property
+    def at_hand(self) -> bool:
+        """Whether a pluck of what is chosen would sound at once: its sources are loaded, and the output is open."""
+        stroke = self._stroke()
+        return stroke is not None and self._sound.status().changes_done > 0 and self.notes.have(stroke)
+
+    @property
     def playing(self) -> bool:
         """Whether anything rings that has not been told to end."""
         return self.notes.ringing > 0

@@ -49,6 +49,9 @@ def run(tmp_path, monkeypatch):
     monkeypatch.setattr(run, "missing", lambda table: [])
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: pytest.fail(f"started {command}"))
     run.environment([])
+    (tmp_path / "engine" / "kernels").mkdir(parents=True)
+    (tmp_path / "engine" / "kernels" / "bank.py").write_text("1")
+    run.COMPILED.write_text(run.kernels())
     return run
 
 
@@ -122,6 +125,30 @@ def test_a_spoiled_environment_is_seen(run, spoil):
     assert run.read_stamp()
     spoil(run)
     assert run.read_stamp() is None
+
+
+@pytest.mark.parametrize("action", ["start", "setup", "test"])
+def test_changed_kernels_are_compiled_once_and_that_is_said(run, action, monkeypatch, capsys):
+    steps = []
+    monkeypatch.setattr(run, "run_step", lambda command, trouble, **_: steps.append(command[1:]))
+    run.prepare(action, True)
+    assert steps == []
+    (run.ROOT / "engine" / "kernels" / "bank.py").write_text("2")
+    for _ in range(2):
+        run.prepare(action, True)
+    assert steps == [["-m", "engine.kernels.warm"]]
+    assert capsys.readouterr().err.count("compiling the sound engine") == 1
+
+
+def test_kernels_that_were_not_compiled_are_compiled_at_the_next_start(run, monkeypatch):
+    def failing(command, trouble, **_):
+        raise run.SetupError(trouble)
+
+    run.COMPILED.unlink()
+    monkeypatch.setattr(run, "run_step", failing)
+    with pytest.raises(run.SetupError, match="delete .venv"):
+        run.prepare("start", True)
+    assert not run.compiled()
 
 
 def test_a_moved_folder_is_seen(run, tmp_path):

@@ -11,16 +11,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from app.controller import Controller
     from app.main_window import MainWindow
 
-Moment = Literal["painted", "ready"]
 LOOK_MS = 5
 PATIENCE_S = 180.0
 # the command line is imported, as it is at a user's start
-COMMAND = "import sys; import app.cli; from app.bench.start import main; sys.exit(main(sys.argv[1]))"
+COMMAND = "import sys; import app.cli; from app.bench.start import main; sys.exit(main())"
 
 
 @dataclass(frozen=True)
@@ -29,36 +29,30 @@ class Starts:
 
     Attributes:
         painted_s: of each start, until the window has been painted.
-        ready_s: of one, until the engine is loaded and the first block of the first pluck is rendered: Space would
-            sound at once.
+        ready_s: until the sources of the first pluck are loaded and the
+            output is open: a key would sound at once.
     """
 
     painted_s: tuple[float, ...]
-    ready_s: float
+    ready_s: tuple[float, ...]
 
 
 def measure_starts(count: int, report: Callable[[int], None]) -> Starts:
-    """`count` warm starts with default settings, after one that fills the system's caches and does not count.
-
-    All but the last end with the first picture: what comes after it takes longer, and differs little.
-    """
-    report(0)
-    _measure("ready")
-    painted_s = []
-    for number in range(1, count):
+    """`count` warm starts with default settings, after one that fills the caches and does not count."""
+    found = []
+    for number in range(count + 1):
         report(number)
-        painted_s.append(_measure("painted")["painted"])
-    report(count)
-    last_s = _measure("ready")
-    return Starts((*painted_s, last_s["painted"]), last_s["ready"])
+        found.append(_measure())
+    painted_s, ready_s = zip(*((each["painted"], each["ready"]) for each in found[1:]), strict=True)
+    return Starts(painted_s, ready_s)
 
 
-def _measure(until: Moment) -> dict[str, float]:
+def _measure() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "LEARNED_STRINGS_SETTINGS": str(Path(folder) / "settings.json")}
         begun_s = time.time()  # the one clock that two processes share everywhere
         done = subprocess.run(
-            [sys.executable, "-c", COMMAND, until],
+            [sys.executable, "-c", COMMAND],
             env=environment,
             cwd=Path(__file__).parents[2],
             capture_output=True,
@@ -70,34 +64,36 @@ def _measure(until: Moment) -> dict[str, float]:
     return {name: time_s - begun_s for name, time_s in json.loads(done.stdout.splitlines()[-1]).items()}
 
 
-def main(until: Moment) -> int:
+def main() -> int:
     """Starts the app as its command does, notes the times on the way, and ends it."""
     from app.bench.display import choose_display
     from app.main import run
 
     choose_display()
     times_s: dict[str, float] = {}
-    status = run(lambda window: _watch(window, times_s, until))
+    status = run(lambda window: _watch(window, times_s), lambda controller: _watch_for_sound(controller, times_s))
     print(json.dumps(times_s))
     return status
 
 
-def _watch(window: MainWindow, times_s: dict[str, float], until: Moment) -> None:
-    from PySide6.QtCore import QTimer
-
+def _watch(window: MainWindow, times_s: dict[str, float]) -> None:
     def painted() -> None:
         times_s["painted"] = time.time()
-        if until == "painted":
-            print(json.dumps(times_s), flush=True)
-            os._exit(0)  # the engine is being loaded, and would be waited for
+
+    window.first_painted.connect(painted)
+
+
+def _watch_for_sound(controller: Controller, times_s: dict[str, float]) -> None:
+    from PySide6.QtCore import QTimer
+
+    times_s["alive"] = time.time()
 
     def look() -> None:
-        if window.error_label.text():  # it tells of every rendering as it begins and ends
+        if controller.performance.at_hand:
             times_s["ready"] = time.time()
             timer.stop()
-            window.close()
+            controller.window.close()
 
-    timer = QTimer(window, interval=LOOK_MS)
+    timer = QTimer(controller, interval=LOOK_MS)
     timer.timeout.connect(look)
     timer.start()
-    window.first_painted.connect(painted)

@@ -148,13 +148,17 @@ class Notes:
             self.stop(REPLACED_S)
         with self._lock:
             self._notes.append(note)
-        rate_hz = self._sound.rate_hz
         begin = self._guarded(lambda: self._begin(note, struck_s), note)
-        if from_s > 0 or not all(self._sources.has(stroke.path(source), rate_hz) for source in stroke.sources):
+        if from_s > 0 or not self.have(stroke):
             self._submit(begin)
         else:
             begin()
         return note
+
+    def have(self, stroke: Stroke) -> bool:
+        """Whether nothing needs to be loaded for it."""
+        rate_hz = self._sound.rate_hz
+        return all(self._sources.has(stroke.path(source), rate_hz) for source in stroke.sources)
 
     def prepare(self, *paths: Path) -> None:
         """Loads presets in the background, so that a strike need not wait."""

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
-from scipy.fft import rfft
 
 from app.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
@@ -72,7 +71,7 @@ class Analyser:
         frames = self.window_frames
         block = np.zeros(frames, np.float32)
         block[: min(frames, len(signal))] = signal[:frames]
-        magnitude = np.abs(rfft((block - block.mean()) * self._window, PADDING * frames))
+        magnitude = np.abs(np.fft.rfft((block - block.mean()) * self._window, PADDING * frames))
         columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
         # the loudest bin of a wide column, so that no partial falls between two
         loudest = np.maximum.reduceat(magnitude, self._first_bins)

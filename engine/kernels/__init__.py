@@ -7,6 +7,8 @@
     rendered   a voice that reads samples which somebody else renders
     voice      what all voices share: listening points, pick-up, gain, silence
     mixer      the sum of all voices, volume, limiter, meters; the device's callback
+    cache      where they are kept once they are compiled
+    warm       compiles, or loads, all of them
 
 A voice and a mixer are flat arrays of eight-byte numbers; `engine.voices` makes them. The interpreter may be
 busy with anything: nothing here waits for it.

@@ -2,45 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import config, njit
 
+from engine.kernels import cache
 
-def _sources() -> list[Path]:
-    """Of all compiled functions, which call one another across files."""
-    engine = Path(__file__).parents[1]
-    kernels = [*(engine / "models").glob("_*kernel.py"), *(engine / "reference").glob("_*kernel.py")]
-    return sorted([*(engine / "kernels").glob("*.py"), *kernels])
-
-
-def _cache_folder() -> Path:
-    """A folder for these very sources: beside them, else in the home folder, else a temporary one.
-
-    Numba notices that a function's own file has changed, but not a file that it calls into. With one folder a version
-    nothing compiled for another memory layout is ever loaded.
-    """
-    digest = hashlib.sha256()
-    for source in _sources():
-        digest.update(source.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:16]}"
-    for place in (Path(__file__).parent / "__pycache__", Path("~/.cache/learned-strings").expanduser()):
-        try:
-            (place / name).mkdir(parents=True, exist_ok=True)
-        except (OSError, RuntimeError):  # read-only, or no home
-            continue
-        if os.access(place / name, os.W_OK):
-            return place / name
-    return Path(tempfile.mkdtemp(prefix=name))
-
-
-if not config.CACHE_DIR:  # else the user has said where
-    config.CACHE_DIR = str(_cache_folder())
+config.CACHE_DIR = str(cache.folder())
 
 # Fast mathematics without "nnan" and "ninf": a model that blows up shall be seen to. NumPy's errors: Python's test of
 # every divisor keeps loops from becoming vector instructions.

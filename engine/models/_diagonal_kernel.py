@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from engine.kernels.compiled import COMPILED
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+
+@njit(**COMPILED)
 def listen(factors: np.ndarray, weights: np.ndarray, frames: np.ndarray) -> None:
     """Writes frames[b, s, j, p] = Re Σ_n weights[p, n] z_n(j), where each log z_n is a cubic in j.
 

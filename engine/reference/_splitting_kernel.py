@@ -10,10 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from engine.kernels.compiled import COMPILED
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@njit(**COMPILED)
 def advance(
     q: Array,
     v: Array,

@@ -18,6 +18,7 @@ ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade w
 FADE_S = 0.020  # another source, another gain
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
 BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
+BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
 class Voice:
@@ -48,11 +49,12 @@ class Voice:
         counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = program.kind, program.address, n
         counts[at.POINTS], counts[at.VELOCITY] = len(ear.points), ear.pickup == "velocity"
         memory[at.WANTED_GAIN] = memory[at.GAIN] = memory[at.GAIN_FROM] = memory[at.GAIN_TO] = gain
+        counts[at.BEGAN_FRAME] = -1
         counts[at.FADE_FRAMES] = round(FADE_S * program.rate_hz)
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         peak = float(displacement_m.abs().max())
-        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / ear.full_scale * (1.0 if not counts[at.VELOCITY] else 60.0)
+        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + n], memory[place + n : place + 2 * n] = first, second
@@ -90,6 +92,10 @@ class Voice:
         """Whether it sounds no more and its memory may go."""
         return bool(self._counts[at.STATE] in (at.OVER, at.RUNAWAY))
 
+    def refuse(self) -> None:
+        """It is over before it was handed over."""
+        self._counts[at.STATE] = at.OVER
+
     @property
     def ran_away(self) -> bool:
         return bool(self._counts[at.STATE] == at.RUNAWAY)
@@ -111,7 +117,7 @@ class Voice:
     @property
     def struck_to_began_s(self) -> float | None:
         """From the gesture to the callback that gave its first samples to the device; None until then."""
-        if not self._counts[at.FRAME] or not self.memory[at.STRUCK_S]:
+        if self._counts[at.BEGAN_FRAME] < 0 or not self.memory[at.STRUCK_S]:
             return None
         return float(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
 
@@ -143,8 +149,8 @@ class Voice:
 
     @property
     def began_frame(self) -> int:
-        """Of the mixer."""
-        return int(self._counts[at.BEGAN_FRAME])
+        """Of the mixer; 0 until then."""
+        return max(0, int(self._counts[at.BEGAN_FRAME]))
 
     def release(self, seconds: float) -> None:
         """Fades to silence and ends; a release under way goes on."""

@@ -1,0 +1,112 @@
+"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.kernels.warm`.
+
+It takes the better part of a minute where nothing has been compiled yet, and about a second where all is kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from engine.kernels import cache, layout
+from engine.models import StringModel, build_model
+from engine.models.base import Physics
+from engine.pluck import Pluck
+from engine.preset import PresetInfo, TrainedRange
+from engine.sine_transform import listening_weights
+from engine.sources import TruthSource, project
+from engine.string import StringParameters
+from engine.voices import Ear, Mixer, Program, Voice, bank_program, plain_program, truth_program
+
+RATE_HZ = 48_000
+INFO = PresetInfo(
+    title="",
+    model="koopman_integrated",
+    model_configuration={},
+    string=StringParameters(),
+    tension_modulated=True,
+    initial="pluck",
+    rate_hz=16_000,
+    modes=4,
+    grid_points=16,
+    horizon_steps=1,
+    scale_m=1e-3,
+    trained_range=TrainedRange(None, None, (0.0, 1.0)),
+    initialisation="",
+    seed=0,
+)
+LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
+MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
+BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
+EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
+FRAMES = 4 * layout.QUANTUM
+
+
+def warm() -> None:
+    """Loads what a pluck needs at once; where not all has been compiled yet, compiles all."""
+    if cache.is_whole():
+        _sound(_struck(_bank({}), EARS[0]))
+    else:
+        voices()
+        models()
+        cache.set_whole()
+
+
+def voices() -> None:
+    """A few quanta of every kind of voice; what a device calls is compiled as it is imported."""
+    for program in (*map(_bank, BANKS), truth_program(INFO, RATE_HZ)):
+        for ear in EARS:
+            voice = _struck(program, ear)
+            voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
+            _sound(voice)
+    _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
+
+
+def models() -> None:
+    """A few frames of every model that has compiled parts, and of the solver."""
+    readout = listening_weights(torch.tensor([0.3]), INFO.grid_points).float()
+    with torch.inference_mode():
+        for name, sizes in (
+            ("koopman_integrated", LATENTS),
+            ("s5", {"grid_points": INFO.grid_points}),
+            ("fgru", {"grid_points": INFO.grid_points}),
+            ("frnn", {"grid_points": INFO.grid_points}),
+        ):
+            model = _model(name, sizes)
+            _, state = model.advance(model.release((_initial_m()[None] / INFO.scale_m).float()), 2)
+            model.advance(state, 2, readout)
+    truth = TruthSource(INFO)
+    truth.advance(truth.start(_initial_m()[None]), 2)
+
+
+def _bank(sizes: dict[str, Any]) -> Program:
+    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
+    assert program is not None
+    return program
+
+
+def _struck(program: Program, ear: Ear) -> Voice:
+    return Voice(program, _initial_m(), ear)
+
+
+def _sound(voice: Voice) -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.add(voice)
+    mixer.render(FRAMES)
+
+
+def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
+    model = build_model(name, sizes)
+    physics = Physics(INFO.string, INFO.modes, INFO.rate_hz)
+    model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
+    return model.eval()
+
+
+def _initial_m() -> torch.Tensor:
+    return project(Pluck().displacement(INFO.grid_points), INFO.modes)
+
+
+if __name__ == "__main__":
+    warm()
