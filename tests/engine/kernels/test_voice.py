@@ -140,9 +140,7 @@ def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, run
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 2])
-def test_another_listening_point_is_faded_to_and_then_exact(
-    kind: str, solo: int, struck: Strike, rung: Rung
-) -> None:
+def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
     here, there = Ear((0.3, 0.6)), Ear((0.45, 0.2), solo=solo)
     moved, mixer = struck(kind, here), Mixer(RATE_HZ, limited=False)
     mixer.add(moved)
