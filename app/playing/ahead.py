@@ -64,8 +64,9 @@ class AheadVoice:
     @property
     def wanted_s(self) -> float:
         """So much must be there before it begins."""
-        total_s = self.done / self.source.rate_hz + self.voice.room / self.source.rate_hz
-        return max(LEAST_S, total_s * (1 - CARE * self.speed)) if self.speed else LEAST_S
+        from_s = self.voice.seconds  # it may begin later than with the pluck
+        left_s = self.rendered_s + self.voice.room / self.source.rate_hz - from_s
+        return from_s + (max(LEAST_S, left_s * (1 - CARE * self.speed)) if self.speed else LEAST_S)
 
     @property
     def waits_s(self) -> float:
