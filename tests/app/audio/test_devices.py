@@ -48,7 +48,8 @@ class FakeSoundDevice(SimpleNamespace):
     PortAudioError = PortAudioError
 
     def __init__(self, entries: list[tuple[str, int, int]], default: int = -1) -> None:
-        super().__init__(default=SimpleNamespace(device={"output": default}), opened=[], streams=[], restarts=0)
+        super().__init__(default=SimpleNamespace(device={"output": default}), opened=[], restarts=0)
+        self.streams: list[FakeStream] = []
         self._ffi = SimpleNamespace(cast=lambda kind, address: (kind, address))
         self.entries = entries
         self.refusal: Exception | None = None
@@ -75,7 +76,7 @@ class FakeSoundDevice(SimpleNamespace):
         if self.refusal is not None:
             raise self.refusal
         self.streams.append(FakeStream())
-        return self.streams[-1]  # type: ignore[no-any-return]
+        return self.streams[-1]
 
     def _terminate(self) -> None:
         self.restarts += 1
