@@ -232,24 +232,20 @@ class Performance(QObject):
 
     def _turn(self) -> None:
         """Hands over the next turn of the loop in time."""
-        note, take = self._shown.note, self._shown.take
-        if self._next_turn is not None and self._next_turn.over:  # its mixer has gone
-            self._next_turn = None
-        if note is None or take is None or note.pending or not note.seconds:
+        note, take, turn = self._shown.note, self._shown.take, self._next_turn
+        if note is None or take is None or not note.began:
             return
-        if self._next_turn is not None:
-            if self._next_turn.seconds > 0:
-                self._latest = self._shown.note = self._next_turn
+        if turn is not None:
+            if turn.began and not turn.cut:
+                self._latest = self._shown.note = turn
+            if turn.began:  # or its mixer has gone: there will be another
                 self._next_turn = None
             return
-        if (
-            note.cut
-            or note.released
-            or note.seconds < take.seconds - LOOP_AHEAD_S
-            or (stroke := self._stroke()) is None
-        ):
+        if note.cut or note.released or (stroke := self._stroke()) is None:
             return
-        frame = note.frame_at(take.seconds)
+        frame, mixer = note.frame_at(take.seconds), self._sound.mixer
+        if frame > (mixer.seconds + LOOP_AHEAD_S) * mixer.rate_hz:
+            return
         note.release_at(frame)
         self._next_turn = self.notes.strike(stroke, begin_frame=frame)
 

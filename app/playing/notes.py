@@ -77,6 +77,11 @@ class Note:
         return max((voice.seconds for voice in self.voices.values()), default=0.0)
 
     @property
+    def began(self) -> bool:
+        """Whether the device was given any of it, or would have been."""
+        return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
+
+    @property
     def waits_s(self) -> float:
         """How long it will still be rendered before it sounds."""
         waits = self.pending and not self.over
@@ -95,11 +100,9 @@ class Note:
         """The frame of its mixer at which it will have been ringing for so long; only after it began."""
         assert self.mixer is not None
         rate_hz = self.mixer.rate_hz
-        if self.from_s:  # its voices did not note when they began, but both count in whole quanta
-            begun = -(-round(self.mixer.seconds * rate_hz) // QUANTUM) * QUANTUM
-            return begun + round((seconds - self.seconds) * rate_hz)
+        skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
         starved_s = min(voice.starved_s for voice in self.voices.values())
-        return self.began_frame + round((seconds + starved_s) * rate_hz)
+        return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
     def release_at(self, frame: int) -> None:
         """Fades out from a frame of the mixer on; 0: it rings on."""

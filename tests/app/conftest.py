@@ -16,7 +16,7 @@ from app.audio.output import ClockOutput
 from engine.voices import Mixer
 
 OWN_THREADS = (
-    *("render-worker", "render-helper_0", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
+    *("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
     *("eigenvalues", "partials", "error-map", "compare"),
 )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,16 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
-from app.audio import PlayerStatus, Track
-from app.controller import STARTING_TICKS, Controller
+from app.controller import FRAME_MS, IDLE_MS, Controller
 from app.main_window import MainWindow
+from app.midi import Note as MidiNote
+from app.playing import Note
 from app.session import Choices
 from app.settings import Settings, load_settings
+from app.slots import ear_of, mix_of
 from app.views.string_axes import MARGIN_X
+from engine.kernels import layout as at
+from engine.voices import Ear
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -25,6 +28,21 @@ LEFT = Qt.MouseButton.LeftButton
 def view(controller: Controller, key: str) -> Any:
     """The view of a panel."""
     return next(panel.view for panel in controller.panels if panel.key == key)
+
+
+def notes(controller: Controller) -> list[Note]:
+    """Those that are heard and have not been told to end, the oldest first."""
+    return [note for note in controller.performance.notes._notes if not note.over and not note.released]
+
+
+def gains(controller: Controller) -> dict[str, float]:
+    """With which the voices of the latest note sound, or fade to; without those of matched levels."""
+    (*_, note) = notes(controller)
+    match = note.match or {}
+    return {
+        name: float(voice.memory[at.WANTED_GAIN]) / (match.get(name, 1.0) or 1.0)
+        for name, voice in note.voices.items()
+    }
 
 
 def wait_for_take(qtbot: QtBot, controller: Controller) -> None:
@@ -41,12 +59,12 @@ def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller)
     qtbot.mousePress(string, LEFT, pos=QPoint(x, string.height() // 2))
     qtbot.mouseMove(string, QPoint(x, string.height() // 4))
     assert string.is_dragging_pluck
-    assert not controller.player.status().playing
+    assert not controller.performance.playing
     qtbot.mouseRelease(string, LEFT, pos=QPoint(x, string.height() // 4))
     assert controller.session.choices.position == pytest.approx(0.6, abs=0.01)
     assert 1 < controller.session.choices.amplitude_mm < 5
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
-    qtbot.waitUntil(lambda: controller.player.status().position_s > 0.05, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.position_s > 0.05, timeout=20_000)
 
 
 def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: Controller) -> None:
@@ -80,7 +98,7 @@ def test_the_handle_sets_width_and_shape_and_resets(qtbot: QtBot, controller: Co
 def test_the_motion_can_be_switched_off(qtbot: QtBot, controller: Controller) -> None:
     string = view(controller, "string")
     wait_for_take(qtbot, controller)
-    controller.player.seek(0.1)
+    controller.performance.seek(0.1)
     qtbot.waitUntil(lambda: string._frame is not None and bool(string._frame.envelopes), timeout=20_000)
     qtbot.mouseClick(string._toggles[1], LEFT)
     assert not controller.session.choices.envelope
@@ -122,14 +140,14 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     window, session, string = controller.window, controller.session, view(controller, "string")
     wait_for_take(qtbot, controller)
     qtbot.keyClick(window, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
+    qtbot.waitUntil(lambda: controller.performance.playing, timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_X)
     assert session.source_heard == "truth"
-    qtbot.waitUntil(lambda: controller.player.status().source == "truth", timeout=5_000)
+    qtbot.waitUntil(lambda: gains(controller) == {"model": 0.0, "truth": 1.0}, timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert session.choices.loop
     qtbot.keyClick(window, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: not controller.player.status().playing, timeout=5_000)
+    qtbot.waitUntil(lambda: not controller.performance.playing, timeout=5_000)
     qtbot.keyClick(string, Qt.Key.Key_Right)
     assert session.choices.position == pytest.approx(0.36)
     qtbot.keyClick(string, Qt.Key.Key_Up)
@@ -142,16 +160,19 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     window, session = controller.window, controller.session
     wait_for_take(qtbot, controller)
     plucks: list[float] = []
-    controller.instruments.plucked.connect(lambda: plucks.append(session.choices.position))
-    for key in (Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L):
+    controller.instruments.played.connect(lambda: plucks.append(session.choices.position))
+    for number, key in enumerate((Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L), 1):
         qtbot.keyClick(window, key)
+        assert len(notes(controller)) == number, "it is struck before the window knows of it"
+        qtbot.waitUntil(lambda number=number: len(plucks) == number, timeout=5_000)
     assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.6556])
     assert not controller.history.can_undo
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
     qtbot.keyClick(window, Qt.Key.Key_9)
     assert session.choices.amplitude_mm == pytest.approx(10)
     qtbot.keyClick(window, Qt.Key.Key_C)
     assert 7 < session.choices.amplitude_mm < 8
+    qtbot.wait(20)
     assert len(plucks) == 5
     knob = window.transport.knobs["seconds"]
     qtbot.keyClicks(knob, "2")
@@ -164,10 +185,16 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
 def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
     wait_for_take(qtbot, controller)
     midi = controller.instruments.midi
-    midi.performed.emit({"position": 0.6, "amplitude_mm": 8.0}, True)
-    assert (controller.session.choices.position, controller.session.choices.amplitude_mm) == (0.6, 8.0)
+    midi._receive(MidiNote(96, 127))  # as in mido's thread
+    (note,) = notes(controller)
+    assert (note.stroke.pluck.position, note.stroke.pluck.amplitude_mm) == pytest.approx((0.7, 10))
+    assert controller.session.choices.position == Choices().position, "the window has had no time yet"
+    qtbot.waitUntil(lambda: controller.session.choices.position == pytest.approx(0.7), timeout=5_000)
+    assert controller.session.choices.amplitude_mm == pytest.approx(10)
     assert not controller.history.can_undo
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.position_s > 0, timeout=20_000)
+    midi.performed.emit({"width": 0.1})
+    assert controller.session.choices.width == 0.1
     qtbot.keyClick(controller.window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
     assert midi._dialog is not None
     assert midi._dialog.isVisible()
@@ -205,7 +232,7 @@ def test_a_knob_asks_and_shows(qtbot: QtBot, controller: Controller) -> None:
 
 def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
-    controller.player.seek(0.1)
+    controller.performance.seek(0.1)
     qtbot.waitUntil(lambda: view(controller, "string")._frame is not None, timeout=20_000)
     frame = view(controller, "string")._frame
     assert frame is not None
@@ -217,16 +244,18 @@ def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
             assert np.ptp(curve.getData()[1]) > 0
 
 
-def test_pictures_wait_for_a_struck_pluck_and_no_longer(qtbot: QtBot, controller: Controller) -> None:
-    views = [panel.view for panel in controller.panels]
+def test_a_pluck_is_struck_before_its_motion_is_rendered(qtbot: QtBot, controller: Controller) -> None:
+    """The picture follows when it is there."""
+    wait_for_take(qtbot, controller)
     controller.session.update(position=0.61)
-    controller.pluck()  # not rendered yet
-    assert not any(view.updatesEnabled() for view in views)
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
-    qtbot.waitUntil(lambda: all(view.updatesEnabled() for view in views), timeout=5_000)
-    qtbot.waitUntil(lambda: controller.performance.ready, timeout=5_000)  # it sounds before it is shown
-    controller.pluck()  # is on stage: nothing to wait for
-    assert all(view.updatesEnabled() for view in views)
+    controller.pluck()
+    performance, (note,) = controller.performance, notes(controller)
+    assert not performance.ready
+    assert note.stroke.pluck.position == 0.61
+    qtbot.waitUntil(lambda: any(voice.sounding for voice in note.voices.values()), timeout=20_000)
+    qtbot.waitUntil(lambda: performance.ready, timeout=20_000)
+    qtbot.waitUntil(lambda: performance.position_s == pytest.approx(note.seconds, abs=0.05), timeout=5_000)
+    assert performance.position_s > 0
 
 
 def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller) -> None:
@@ -245,7 +274,7 @@ def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: 
     assert len(controller.window.notices.kept) == 1
     wait_for_take(qtbot, controller)
     controller.pluck()
-    qtbot.waitUntil(lambda: controller.player.status().position_s > 0.1, timeout=5_000)
+    qtbot.waitUntil(lambda: controller.performance.position_s > 0.1, timeout=5_000)
 
 
 def test_a_broken_preset_is_told_and_the_app_goes_on(
@@ -305,114 +334,110 @@ def test_decks_and_session_agree_on_the_views(controller: Controller) -> None:
     assert left.currentWidget() is view(controller, "spectrum")
 
 
-def sounding(controller: Controller) -> int:
-    """How many earlier plucks ring."""
-    return controller.player.status().ringing
-
-
-def test_plucks_ring_beside_each_other_and_a_knob_replaces(qtbot: QtBot, controller: Controller) -> None:
+def test_plucks_ring_beside_each_other_and_a_knob_strikes_none(qtbot: QtBot, controller: Controller) -> None:
     controller.session.update(seconds=3.0)
     wait_for_take(qtbot, controller)
     controller.pluck()
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
     controller.pluck()  # the same again
-    qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=5_000)
+    assert len(notes(controller)) == 2
     controller.session.update(position=0.5)
     controller.pluck()  # another one
-    qtbot.waitUntil(lambda: sounding(controller) == 2, timeout=20_000)
-    track = controller.player.track
+    assert [note.stroke.pluck.position for note in notes(controller)] == [0.35, 0.35, 0.5]
+    struck = notes(controller)
     controller.session.update(position=0.6)  # a knob that is turned
-    qtbot.waitUntil(lambda: controller.player.track is not track, timeout=20_000)
-    qtbot.waitUntil(lambda: controller.player.status().position_s > 0, timeout=5_000)
-    assert sounding(controller) <= 2
+    qtbot.waitUntil(lambda: controller.performance.ready, timeout=20_000)
+    assert notes(controller) == struck
+    assert controller.performance.position_s == 0, "what is shown is not struck"
     controller.play_or_stop()
-    qtbot.waitUntil(lambda: sounding(controller) == 0, timeout=5_000)
+    assert not controller.performance.playing
+    qtbot.waitUntil(lambda: all(note.over for note in struck), timeout=5_000)
 
 
-def test_a_pluck_that_is_overtaken_sounds_all_the_same(qtbot: QtBot, controller: Controller) -> None:
+def test_another_preset_leaves_what_rings(qtbot: QtBot, controller: Controller) -> None:
+    controller.session.update(seconds=3.0)
+    wait_for_take(qtbot, controller)
+    controller.pluck()
+    (note,) = notes(controller)
+    qtbot.waitUntil(lambda: note.seconds > 0.05, timeout=20_000)
+    controller.session.update(preset="second")
+    qtbot.waitUntil(lambda: controller.performance.ready, timeout=20_000)
+    assert notes(controller) == [note]
+    assert note.stroke.preset.stem == "first"
+    assert not controller.performance.moving
+    before_s = note.seconds
+    qtbot.waitUntil(lambda: note.seconds > before_s + 0.05, timeout=5_000)
+    controller.pluck()
+    assert [each.stroke.preset.stem for each in notes(controller)] == ["first", "second"]
+
+
+def test_plucks_that_are_overtaken_sound_all_the_same(qtbot: QtBot, controller: Controller) -> None:
     controller.session.update(seconds=3.0)
     wait_for_take(qtbot, controller)
     for position in (0.45, 0.55):  # before the first is rendered
         controller.session.update(position=position)
         controller.pluck()
-    qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=20_000)
-    assert not controller.performance.strikes.awaited
+    struck = notes(controller)
+    assert [note.stroke.pluck.position for note in struck] == [0.45, 0.55]
+    qtbot.waitUntil(lambda: all(note.seconds > 0 for note in struck), timeout=20_000)
 
 
-def test_only_what_concerns_the_sound_is_told_to_the_player(
+def test_only_what_concerns_the_sound_is_told_to_the_notes(
     qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each command is mixed for, and right then a new pluck is rendered."""
     wait_for_take(qtbot, controller)
-    chosen: list[str] = []
-    monkeypatch.setattr(controller.player, "select", chosen.append)
-    controller.session.update(listen_right=0.4)
-    assert chosen == []
+    told: list[object] = []
+    monkeypatch.setattr(controller.performance.notes, "set_mix", told.append)
+    monkeypatch.setattr(controller.performance.notes, "listen", told.append)
+    controller.session.update(left_view="waveform", speed=0.1, position=0.4)
+    assert told == []
     controller.session.update(heard="b")
-    assert chosen == [controller.session.source_heard]
+    controller.session.update(listen=0.2)
+    assert told == [mix_of(controller.session.choices), ear_of(controller.session.choices)]
 
 
-def test_the_picture_gives_way_to_a_struck_pluck_but_not_for_long(
-    qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_while_nothing_moves_pictures_are_looked_at_less_often(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
-    controller._timer.stop()
-    shown: list[object] = []
-    monkeypatch.setattr(controller.panels[0], "show_moment", shown.append)
-    controller.performance.strikes.expect(("never", controller.session.choices.pluck, 1))
-    for _ in range(STARTING_TICKS):
-        controller._tick()
-    assert shown == []
-    controller._tick()
-    assert len(shown) == 1
-
-
-def test_the_picture_gives_way_while_rendering_is_hardly_ahead_of_what_is_heard(
-    qtbot: QtBot, controller: Controller
-) -> None:
-    wait_for_take(qtbot, controller)
-    stage, half = controller.performance, Track(8_000, 8_000, ("model", "truth"))
-    half.append({source: np.zeros(4_000) for source in half.sources})
-    stage.track = half
-    heard = [PlayerStatus(position_s=position_s, playing=True) for position_s in (0.1, 0.4)]
-    assert [stage.hurried(status, 0.3) for status in heard] == [False, True]
-    assert not stage.hurried(replace(heard[1], playing=False), 0.3)
-    stage.watch(heard[1])
-    assert "gaps" not in controller.window.error_label.text()
-    stage.watch(replace(heard[1], waiting=True))
-    assert "gaps" in controller.window.error_label.text()
-    half.finish()
-    assert not stage.hurried(heard[1], 0.3), "there is nothing more to render"
+    qtbot.waitUntil(lambda: controller._timer.interval() == IDLE_MS, timeout=10_000)
+    controller.session.update(listen=0.3)
+    assert controller._timer.interval() == FRAME_MS
 
 
 def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, controller: Controller) -> None:
     controller.session.update(seconds=3.0)
     wait_for_take(qtbot, controller)
     controller.pluck()
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=5_000)
-    loaded, take, string = controller.player.track, controller.performance.take, view(controller, "string")
+    take, string, (note,) = controller.performance.take, view(controller, "string"), notes(controller)
     at = QPoint(string.width() // 2, string.height() // 4)
     qtbot.mousePress(string, LEFT, pos=at)
     qtbot.waitUntil(lambda: controller.performance.take is not take, timeout=20_000)
-    assert controller.player.track is loaded
+    assert notes(controller) == [note]
     qtbot.mouseRelease(string, LEFT, pos=at)
-    assert controller.player.track is controller.performance.track
-    qtbot.waitUntil(lambda: sounding(controller) == 1, timeout=5_000)
+    first, second = notes(controller)
+    assert first is note
+    qtbot.waitUntil(lambda: controller.performance._shown.note is second, timeout=5_000)
 
 
 def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -> None:
     slots, session = controller.window.transport.slots, controller.session
     wait_for_take(qtbot, controller)
     slots.change_asked.emit("b", "preset:second")
-    qtbot.waitUntil(lambda: "preset:second" in controller.player.track.sources, timeout=20_000)  # type: ignore[union-attr]
+    controller.pluck()
+    (note,) = notes(controller)
+    qtbot.waitUntil(lambda: note.seconds > 0, timeout=20_000)
+    assert set(note.voices) == {"model", "preset:second"}
+    assert gains(controller) == {"model": 1.0, "preset:second": 0.0}
     qtbot.mouseClick(slots._buttons["b"], LEFT)
     assert session.source_heard == "preset:second"
-    qtbot.waitUntil(lambda: controller.player.status().source == "preset:second", timeout=5_000)
+    assert gains(controller) == {"model": 0.0, "preset:second": 1.0}
     assert slots._buttons["b"].objectName() == "other"
     qtbot.keyClick(controller.window, Qt.Key.Key_X)
-    qtbot.waitUntil(lambda: controller.player.status().source == "model", timeout=5_000)
-    session.update(a="difference", difference_gain_db=30)
-    qtbot.waitUntil(lambda: controller.player.status().source == "difference", timeout=5_000)
+    assert gains(controller) == {"model": 1.0, "preset:second": 0.0}
+    session.update(a="difference", difference_gain_db=30, level_match=False)
+    controller.pluck()
+    qtbot.waitUntil(lambda: notes(controller)[-1].seconds > 0, timeout=20_000)
+    loud = pytest.approx(10 ** (30 / 20))
+    assert gains(controller)["model"] == loud
+    assert -gains(controller)["truth"] == loud
     qtbot.waitUntil(lambda: "+30 dB" in slots._buttons["a"].text(), timeout=5_000)
 
 
@@ -435,7 +460,7 @@ def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controll
     qtbot.waitUntil(lambda: views[1]._curves["preset:second"].getData()[0] is not None, timeout=20_000)
     assert views[1].legend.text == f"A  {title} · heard   B  difference +20 dB"
     controller.play_or_stop()
-    controller.player.seek(0.2)
+    controller.performance.seek(0.2)
     qtbot.waitUntil(
         lambda: views[0]._frame is not None and set(views[0]._frame.shapes) == {"preset:second", "difference"},
         timeout=20_000,
@@ -478,9 +503,12 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     qtbot.wait(20)
     assert [knob.pos() for knob in transport.knobs.values()] == places
     wait_for_take(qtbot, controller)
-    player = controller.player
-    qtbot.waitUntil(lambda: player.track is not None and player.track.channels == 2, timeout=20_000)
-    session.update(stereo=False, pickup="displacement")
+    ears = []
+    for choices in ({}, {"stereo": False, "pickup": "displacement"}):
+        session.update(**choices)
+        controller.pluck()
+        ears.append(notes(controller)[-1].stroke.ear)
+    left, right = session.choices.listen, session.choices.listen_right
+    assert ears == [Ear((left, right), "velocity"), Ear((left,))]
     assert not transport._stereo.isChecked()
     assert not transport._velocity.isChecked()
-    qtbot.waitUntil(lambda: player.track.channels == 1, timeout=20_000)  # type: ignore[union-attr]

@@ -1,0 +1,101 @@
+"""Notes in a mixer whose frames the test takes itself; presets that sound at once, and one that is rendered first."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from app.playing import Notes, Sources, Stroke
+from engine.pluck import Pluck
+from engine.preset import SHIPPED
+from engine.voices import Ear, Mixer
+
+DEADLINE_S = 30.0
+EAR = Ear((0.37,))
+
+
+class StandingSound:
+    """A `Sound` whose clock is the mixer's own: nothing takes a frame but the test."""
+
+    def __init__(self, rate_hz: int = 48_000) -> None:
+        self.mixer = Mixer(rate_hz)
+        self.load = 0.0
+
+    @property
+    def rate_hz(self) -> int:
+        return self.mixer.rate_hz
+
+    def now_s(self) -> float:
+        return self.mixer.seconds
+
+    def status(self) -> SimpleNamespace:
+        return SimpleNamespace(load=self.load)
+
+
+@pytest.fixture
+def sound() -> StandingSound:
+    made = StandingSound()
+    made.mixer.render(64)  # a clock that stands at zero has not begun
+    return made
+
+
+@pytest.fixture(scope="session")
+def bank() -> Path:
+    """A model that sounds at once."""
+    return SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+
+
+@pytest.fixture(scope="session")
+def sources(bank: Path, small_preset: Path) -> Sources:
+    """With both presets loaded at 48 kHz; nobody may change it."""
+    made = Sources()
+    for path in (bank, small_preset):
+        made.prepare(path, 48_000)
+    return made
+
+
+@pytest.fixture
+def reports() -> list[tuple[str, str]]:
+    return []
+
+
+@pytest.fixture
+def notes(sound: StandingSound, sources: Sources, reports: list[tuple[str, str]]) -> Iterator[Notes]:
+    made = Notes(sound, sources, lambda message, detail: reports.append((message, detail)))  # type: ignore[arg-type]
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stroke_of() -> Callable[..., Stroke]:
+    """stroke_of(path, position=…, sources=…, others=…, seconds=…, ear=…)"""
+
+    def made(
+        path: Path,
+        position: float = 0.35,
+        sources: tuple[str, ...] = ("model", "truth"),
+        others: dict[str, Path] | None = None,
+        seconds: float = 1.0,
+        ear: Ear = EAR,
+        amplitude_mm: float = 3.0,
+    ) -> Stroke:
+        return Stroke(path, Pluck(position, amplitude_mm), ear, seconds, sources, others or {})
+
+    return made
+
+
+@pytest.fixture
+def wait() -> Callable[[Callable[[], bool]], None]:
+    """For what another thread does."""
+
+    def until(done: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + DEADLINE_S
+        while not done():
+            assert time.monotonic() < deadline, "nothing came"
+            time.sleep(0.002)
+
+    return until
