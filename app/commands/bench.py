@@ -1,4 +1,4 @@
-"""bench solver, render, train, app, play, soak: what the program costs here."""
+"""bench solver, render, voices, train, app, play, soak: what the program costs here."""
 
 from __future__ import annotations
 
@@ -97,6 +97,40 @@ def render(json: Json = False) -> None:
         for t in found.models
     ]
     print_table(columns, rows)
+
+
+@bench.command()
+def voices(json: Json = False) -> None:
+    """What a voice of a model or the truth costs and how exact it is, how many fit on a core, what a strike costs."""
+    from app.bench import voices as bench
+
+    with progress("bench voices") as report:
+        found = bench.measure(report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    rows = [
+        (
+            v.preset,
+            v.kind,
+            v.modes,
+            *(f"{100 * part:.2f}" for part in (v.onset, v.first_second, v.later, v.mean)),
+            v.voices_at(bench.MODEL_SHARE),
+            v.voices_at(bench.TRUTH_SHARE),
+            f"{v.error:.1e}",
+        )
+        for v in found.voices
+    ]
+    ages = ("to 0.05 s, %", "to 1 s, %", "1 to 4 s, %", "to 4 s, %")
+    print_table(("preset", "voice", "modes", *ages, "at 25 %", "at 50 %", "error"), rows)
+    print_table(
+        ("strike of both", "median ms", "worst ms"), [(s.preset, s.median_ms, s.worst_ms) for s in found.strikes]
+    )
+    print(
+        f"targets: {bench.MODEL_VOICES} model voices at {bench.MODEL_SHARE:.0%} of a core,"
+        f" {bench.TRUTH_VOICES} truth voices at {bench.TRUTH_SHARE:.0%} and an error of {bench.TRUTH_ERROR:g} at most"
+    )
 
 
 @bench.command()

@@ -18,6 +18,7 @@ ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade w
 FADE_S = 0.020  # another source, another gain
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
 BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
+SHARPEST = 5.0  # times more, of full scale, velocity may be than displacement: shapes of few hundredths of a length
 
 
 class Voice:
@@ -50,7 +51,7 @@ class Voice:
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         peak = float(displacement_m.abs().max())
-        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / ear.full_scale * (1.0 if not counts[at.VELOCITY] else 60.0)
+        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (SHARPEST if counts[at.VELOCITY] else 1.0)
         first, second = program.start(displacement_m)
         place = _state(n)
         memory[place : place + n], memory[place + n : place + 2 * n] = first, second
