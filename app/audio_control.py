@@ -18,6 +18,7 @@ from app.views.audio_dialog import AudioDialog, AudioState
 if TYPE_CHECKING:
     from app.playing import Notes
     from app.rendering import Take
+    from engine.voices import Gap
 
 # of the device's own buffer; sound waits for nothing else
 LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
@@ -35,7 +36,7 @@ class AudioControl(QObject):
         self._changes = 0
         self._notice = ""
         self._latencies_s: tuple[float, ...] = ()
-        self._gaps_before = 0  # the user's zero
+        self._last_known: Gap | None = None  # the user's zero: gaps up to this one are not counted
         self._listed: list[DeviceChoice] | None = None
         self._moments = 0
         self._dialog: AudioDialog | None = None
@@ -99,7 +100,8 @@ class AudioControl(QObject):
         self.open()
 
     def _reset_gaps(self) -> None:
-        self._gaps_before = len(self._output.status().gaps)
+        gaps = self._output.status().gaps
+        self._last_known = gaps[-1] if gaps else None
 
     def _list_devices(self) -> None:
         """Fills the list when it has changed. Without PortAudio it is asked once only: asking takes long then."""
@@ -130,7 +132,9 @@ class AudioControl(QObject):
             label.style().polish(label)
 
     def _state(self, status: SoundStatus) -> AudioState:
-        device, gaps = status.device, status.gaps[self._gaps_before :]
+        device, gaps = status.device, status.gaps  # the latest: what was known may have been dropped
+        if self._last_known in gaps:
+            gaps = gaps[gaps.index(self._last_known) + 1 :]
         facts = f"{status.rate_hz / 1000:g} kHz, buffer {1000 * status.latency_s:.0f} ms"
         if self._latencies_s:
             facts += f", key to device {1000 * statistics.median(self._latencies_s):.1f} ms (measured)"

@@ -1,6 +1,6 @@
-"""Where everything is connected: session, performance, player, panels and window.
+"""Where everything is connected: session, performance, sound, panels and window.
 
-    widgets ── intents ──► session ── changed ──► controller ──► performance, player, panels, widgets
+    widgets ── intents ──► session ── changed ──► controller ──► performance, sound, panels, widgets
     a timer ── 60 times a second ──► the panels that can be seen, meter
 
 Everything here runs in the window's thread.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
@@ -29,7 +30,7 @@ from app.panels import Moment, StringPanel
 from app.panels.rack import fill
 from app.performance import Performance
 from app.preset_desk import PresetDesk
-from app.session import Session
+from app.session import Choices, Session
 from app.settings import Settings, save_settings
 from app.slots import missing_presets, mix_of
 from app.views.about_dialog import AboutDialog
@@ -51,7 +52,7 @@ ProblemListener = Callable[[AudioProblem], None]
 
 
 class _AudioMail(QObject):
-    """Carries a fault of the sound device from the feeder's thread into the window's (Qt queues the signal)."""
+    """Carries a fault of the sound device from the caretaker's thread into the window's (Qt queues the signal)."""
 
     told = Signal(object)
 
@@ -100,7 +101,7 @@ class Controller(QObject):
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session)
         self._connect_history()
-        self.instruments = Instruments(window, self.session, self.library, settings.midi, self.performance.strike)
+        self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike)
         self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
@@ -166,6 +167,11 @@ class Controller(QObject):
         if self._abx is None:
             self.performance.pluck()
 
+    def _strike(self, choices: Choices) -> None:
+        """A note of an instrument, in its thread."""
+        if self._abx is None:
+            self.performance.strike(choices)
+
     def play_or_stop(self) -> None:
         if self._abx is None:
             self.performance.play_or_stop()
@@ -188,7 +194,7 @@ class Controller(QObject):
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
     def listening_test(self) -> None:
-        """Opens the ABX test on what is on stage; until it is closed, the player belongs to it."""
+        """Opens the ABX test on what is on stage; until it is closed, the sound belongs to it."""
         entry = self.entry
         if entry is None or entry.unplayable:
             self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
@@ -199,7 +205,8 @@ class Controller(QObject):
             self.window.notices.tell(f"{entry.path} cannot be read ({error.strerror}).")
             return
         self.performance.stop()
-        self._abx = AbxDialog(self.sound, subject, self._settings.abx, self.performance.render_sound, self.window)
+        render = partial(self.performance.render_sound, self.session.choices)
+        self._abx = AbxDialog(self.sound, subject, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 

@@ -23,7 +23,6 @@ from app.sound import (
     SoundRequest,
     Source,
     Voices,
-    render_signal,
     render_sound,
     render_voices,
 )
@@ -117,8 +116,14 @@ def export_sounds(
             raise ExportError(str(error)) from error
         # opened first, so that a folder that refuses is told before the work
         writers = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
+        rate_hz = settings.rate_hz or info.rate_hz
         voices = render_voices(
-            request, paths, all_voices=measured or settings.normalise, progress=progress, cancelled=cancelled
+            request,
+            paths,
+            rate_hz,
+            all_voices=measured or settings.normalise,
+            progress=progress,
+            cancelled=cancelled,
         )
         sounds = {source: voices.samples(source, request.difference_gain_db) for source in paths}
         beside = [*voices.sounds.values(), *sounds.values()] if settings.normalise else []
@@ -127,7 +132,7 @@ def export_sounds(
             with _explained(paths[source]):
                 labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
                 wav = encode_wav(
-                    sounds[source], info.rate_hz, settings, _tags(info.title, recipes[source]), beside, labels
+                    sounds[source], rate_hz, settings, _tags(info.title, recipes[source]), beside, labels
                 )
             past_s = max(0.0, wav.frames / wav.rate_hz - info.horizon_s) if labels else 0.0
             reports.append(replace(write(wav), past_training_s=past_s, decayed=voices.ended))
@@ -220,7 +225,6 @@ __all__ = [
     "default_file_name",
     "export_sound",
     "export_sounds",
-    "render_signal",
     "render_sound",
     "settings_of",
     "write_wav",

@@ -62,7 +62,7 @@ class Performance(QObject):
         self._shown = _Shown()
         self._latest: Note | None = None  # struck last
         self._next_turn: Note | None = None  # of the loop, handed over and waiting for its frame
-        self._waiting_words = ""
+        self._waiting_words = self._error_words = ""
         mail = self._mail = RenderMail()
         mail.started.connect(self._take_started)
         mail.finished.connect(self._take_finished)
@@ -71,7 +71,7 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, mail.refused.emit)
-        self._worker = RenderWorker(mail, self._sources.load)
+        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -143,10 +143,13 @@ class Performance(QObject):
         self.follow()
 
     def follow(self) -> None:
-        """Shows the latest note, where its motion is there; otherwise when it comes."""
+        """Shows the latest note while it rings, where its motion is there; otherwise when it comes."""
         latest = self._latest
-        if self.ready and latest is not None and self._is_of(latest, self._session.choices):
-            self._shown.note, self._shown.parked_s = latest, 0.0
+        if latest is None or latest is self._shown.note or latest.released or latest.over:
+            return
+        if self.ready and self._is_of(latest, self._session.choices):
+            self._forget_turn()
+            self._shown.note, self._shown.parked_s = latest, latest.from_s
 
     def play_or_stop(self) -> None:
         if self.playing:
@@ -167,7 +170,7 @@ class Performance(QObject):
             return
         position_s = min(max(position_s, 0.0), self.take.seconds)
         self._forget_turn()
-        self._shown.parked_s = position_s
+        self._shown.note, self._shown.parked_s = None, position_s
         if self.playing and (stroke := self._stroke()) is not None:
             self._latest = self._shown.note = self.notes.strike(stroke, from_s=position_s, alone=True)
 
@@ -194,9 +197,9 @@ class Performance(QObject):
             self.render()
         self.follow()
 
-    def render_sound(self, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """Model and truth of the chosen pluck as they are heard, (frames, channels), in the background."""
-        entry, choices = self.entry, self._session.choices
+    def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
+        """Model and truth of a pluck as they are heard, (frames, channels), in the background."""
+        entry = self._library.find(choices.preset)
         assert entry is not None
         stroke = replace(stroke_of(choices, entry.path, self._library), sources=("model", "truth"))
         return self.notes.render(stroke, rate_hz, choices.seconds)
@@ -216,8 +219,7 @@ class Performance(QObject):
         waits = self._waiting()
         if waits != self._waiting_words:
             self._waiting_words = waits
-            if waits:
-                self._window.error_label.setText(waits)
+            self._show_words()
 
     def _waiting(self) -> str:
         """Of a model that is rendered before it is heard."""
@@ -231,18 +233,23 @@ class Performance(QObject):
     def _turn(self) -> None:
         """Hands over the next turn of the loop in time."""
         note, take = self._shown.note, self._shown.take
-        if note is None or take is None or note.pending or (not note.began_frame and not note.seconds):
+        if self._next_turn is not None and self._next_turn.over:  # its mixer has gone
+            self._next_turn = None
+        if note is None or take is None or note.pending or not note.seconds:
             return
         if self._next_turn is not None:
             if self._next_turn.seconds > 0:
                 self._latest = self._shown.note = self._next_turn
                 self._next_turn = None
             return
-        if note.released or note.seconds < take.seconds - LOOP_AHEAD_S or (stroke := self._stroke()) is None:
+        if (
+            note.cut
+            or note.released
+            or note.seconds < take.seconds - LOOP_AHEAD_S
+            or (stroke := self._stroke()) is None
+        ):
             return
-        rate_hz = self._sound.rate_hz
-        begun = self._sound.mixer.seconds - note.seconds
-        frame = round((begun + take.seconds) * rate_hz)
+        frame = note.frame_at(take.seconds)
         note.release_at(frame)
         self._next_turn = self.notes.strike(stroke, begin_frame=frame)
 
@@ -262,7 +269,7 @@ class Performance(QObject):
         for panel in self._panels:
             panel.take_started(take)
         self.follow()
-        self._window.error_label.setText("rendering …")
+        self._tell("rendering …")
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
         if take is not self.take:
@@ -277,16 +284,24 @@ class Performance(QObject):
         parts = [
             f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, ("as trained", "past it"), strict=False)
         ]
-        self._window.error_label.setText("error of this pluck: " + ", ".join(parts))
+        self._tell("error of this pluck: " + ", ".join(parts))
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
 
     def _render_failed(self, message: str, detail: str) -> None:
-        self._window.error_label.setText("")
+        self._tell("")
         self._window.notices.tell(message, detail)
 
     # Helpers
+
+    def _tell(self, words: str) -> None:
+        self._error_words = words
+        self._show_words()
+
+    def _show_words(self) -> None:
+        """Of a model that one waits for rather than of its error."""
+        self._window.error_label.setText(self._waiting_words or self._error_words)
 
     def _stroke(self) -> Stroke | None:
         entry = self.entry

@@ -31,7 +31,7 @@ def step_back(rank: Rank) -> None:
             os.setpriority(os.PRIO_PROCESS, thread, min(niceness, NICEST))
 
 
-REAL_TIME_PRIORITY = 10
+REAL_TIME_PRIORITY = 4  # below the sound server itself
 
 
 def native_threads() -> set[int]:

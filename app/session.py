@@ -44,7 +44,7 @@ class Choices(BaseModel):
     level_match: bool = True
     difference_gain_db: float = Field(20.0, ge=DIFFERENCE_GAIN_RANGE_DB[0], le=DIFFERENCE_GAIN_RANGE_DB[1])
     loop: bool = False
-    volume_db: float = Field(0.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
+    volume_db: float = Field(4.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
     speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
     left_view: str = "spectrum"  # keys of panels
     right_view: str = "waveform"

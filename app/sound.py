@@ -1,6 +1,6 @@
 """The sound of a pluck at the string's listening points: model, truth, their difference, or both side by side.
 
-What is heard in a file is made here, as samples at the preset's rate where ±1 is full scale.
+What is heard in a file is made here, by the voices that a sound device plays, sample by sample: ±1 is full scale.
 """
 
 from __future__ import annotations
@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
-from app.rendering.velocity import Differentiator
 from app.sound_names import PICKUPS, Pickup, Source
-from engine.pluck import FULL_SCALE_M_S, Pluck
+from engine.pluck import Pluck
 from engine.preset import Preset
-from engine.sine_transform import listening_weights
-from engine.sources import FULL_SCALE_M, ModelSource, Runaway, StringSource, TruthSource, project
+from engine.sources import ModelSource, Runaway
+from engine.voices import Ear, model_program, render_voice, truth_program
 
 Voice = Literal["model", "truth"]
 VOICES: tuple[Voice, ...] = get_args(Voice)
@@ -28,7 +25,7 @@ SOURCES: tuple[Source, ...] = get_args(Source)
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
 DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)
-BLOCK_FRAMES = 4096  # between two looks at `cancelled`
+DECAYED_FOR_SURE_DB = 30.0  # below the wanted decay, by all of the string: no point on it is louder
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level is no matter of phase
 
 Samples = NDArray[np.float64]
@@ -112,21 +109,29 @@ class Voices:
 
 
 def render_sound(
-    request: SoundRequest, *, progress: Progress = lambda share: None, cancelled: Cancelled = lambda: False
+    request: SoundRequest,
+    rate_hz: int = 0,
+    *,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
 ) -> Samples:
-    """The samples of a request at the preset's rate, (frames,) or (frames, 2).
+    """The samples of a request, (frames,) or (frames, 2).
+
+    Args:
+        rate_hz: 0 for the preset's own.
 
     Raises:
         ExportCancelled: `cancelled` said so.
         Runaway: the model's output stopped being a string's.
     """
-    voices = render_voices(request, (request.source,), progress=progress, cancelled=cancelled)
+    voices = render_voices(request, (request.source,), rate_hz, progress=progress, cancelled=cancelled)
     return voices.samples(request.source, request.difference_gain_db)
 
 
 def render_voices(
     request: SoundRequest,
     sources: Iterable[Source],
+    rate_hz: int = 0,
     *,
     all_voices: bool = False,
     progress: Progress = lambda share: None,
@@ -135,9 +140,10 @@ def render_voices(
     """Model and truth once, for any number of sources of one pluck (`request.source` is not looked at).
 
     Args:
+        rate_hz: of the samples; 0 for the preset's own.
         all_voices: both of them whatever the sources; a model that runs away is then left out if no source needs it.
     """
-    sources = tuple(sources)
+    sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
     needed = {voice for source in sources for voice in (VOICES if source in ("difference", "both") else (source,))}
     wanted = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
     sounds: dict[Voice, Samples] = {}
@@ -147,13 +153,12 @@ def render_voices(
             progress((place + share) / len(wanted))
 
         with suppress(*(() if voice in needed else (Runaway,))):
-            sounds[voice] = _render(request, voice, part, cancelled)
+            sounds[voice] = _render(request, voice, rate_hz, part, cancelled)
     if request.decay_db is None:
         return Voices(sounds)
-    rate_hz = request.preset.info.rate_hz
     ends = [decayed_frames(sound, rate_hz, request.decay_db) for sound in sounds.values()]
     frames = max(ends)
-    ended = frames < max(map(len, sounds.values()))
+    ended = frames < round(request.seconds * rate_hz)
     return Voices({voice: sound[:frames] for voice, sound in sounds.items()}, ended)
 
 
@@ -172,52 +177,27 @@ def decayed_frames(sound: Samples, rate_hz: int, decay_db: float) -> int:
     return min(len(sound), last * window)
 
 
-def render_signal(
-    source: StringSource,
-    displacement_m: Tensor,
-    seconds: float,
-    listen: float | tuple[float, ...],
-    *,
-    progress: Progress = lambda share: None,
-    cancelled: Cancelled = lambda: False,
-) -> Samples:
-    """Displacement of one source at a listening point (frames,), or at several (frames, points), ±1 being full scale.
+def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progress, cancelled: Cancelled) -> Samples:
+    """(frames, points), by the very voice that a device would play."""
+    preset, info = request.preset, request.preset.info
+    program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
+    ear = Ear(request.points, request.pickup)
 
-    The first value is frame 0.
-
-    Args:
-        displacement_m: frame 0, (grid_points,), already projected on the modes in use.
-
-    Raises:
-        ExportCancelled: `cancelled` said so between two blocks.
-    """
-    points = listen if isinstance(listen, tuple) else (listen,)
-    frames = max(1, round(seconds * source.rate_hz))
-    weights = listening_weights(torch.tensor(points, dtype=torch.float64), source.grid_points)
-    signal = torch.zeros(frames, len(points), dtype=torch.float64)
-    signal[0] = displacement_m.double() @ weights
-    state = source.start(displacement_m[None])
-    for first in range(1, frames, BLOCK_FRAMES):
+    def advanced(share: float) -> None:
         if cancelled():
             raise ExportCancelled
-        steps = min(BLOCK_FRAMES, frames - first)
-        block, state = source.advance(state, steps, weights)
-        signal[first : first + steps] = block[0]
-        progress((first + steps) / frames)
-    found = (signal / FULL_SCALE_M).numpy()
-    return found if isinstance(listen, tuple) else found[:, 0]
+        progress(share)
 
-
-def _render(request: SoundRequest, voice: Voice, progress: Progress, cancelled: Cancelled) -> Samples:
-    info = request.preset.info
-    source = ModelSource(request.preset) if voice == "model" else TruthSource(info)
-    displacement_m = project(request.pluck.displacement(info.grid_points), info.modes)
-    signal = render_signal(
-        source, displacement_m, request.seconds, request.points, progress=progress, cancelled=cancelled
-    )
-    if request.pickup == "displacement":
-        return signal
-    return Differentiator(info.rate_hz).feed(signal, last=True) * (FULL_SCALE_M / FULL_SCALE_M_S)
+    return render_voice(
+        program,
+        ModelSource(preset) if program.rendered else None,
+        info,
+        request.pluck,
+        ear,
+        request.seconds,
+        advanced,
+        None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB,
+    ).astype(np.float64)
 
 
 def _check(name: str, value: float | None, limits: tuple[float, float]) -> None:

@@ -52,6 +52,8 @@ class DeviceOutput:
         self.device: AudioDevice | None = device
         self.rate_hz = device.default_rate_hz
         self._mixer = mixer
+        self._closing = threading.Lock()
+        self._closed = False
         threads = native_threads()
         self._stream = open_device(device, buffer_s, mixer)
         self.latency_s = float(self._stream.latency)
@@ -64,7 +66,10 @@ class DeviceOutput:
         self.real_time = put_first(native_threads() - threads)
 
     def now_s(self) -> float:
-        return float(self._stream.time)
+        with self._closing:  # asked from any thread: PortAudio must not look at a stream that was freed
+            if self._closed:
+                raise RuntimeError("the output has been closed")
+            return float(self._stream.time)
 
     def load(self) -> float:
         return float(self._stream.cpu_load)
@@ -80,6 +85,8 @@ class DeviceOutput:
         return not active or self._silent_s() > LOST_AFTER_S
 
     def close(self) -> None:
+        with self._closing:
+            self._closed = True
         close_device(self._stream)
 
     def _silent_s(self) -> float:

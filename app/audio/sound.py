@@ -210,7 +210,7 @@ class Sound:
             if wish.rescan or present is None:
                 self._be_silent()
             device = wish.at_its_rate(self._look_up(wish.device, wish.rescan or present is None))
-            if device == present and self._wish == wish:
+            if device == self._output.device and self._wish == wish:
                 return
             self._be_silent()  # it might refuse to be opened twice
             self._adopt(device, wish)

@@ -3,7 +3,7 @@
 It does the latest job alone: asking for another abandons the one under way. What it says reaches the window's thread
 through queued signals, and nothing of an abandoned job arrives any more.
 
-It gives way to sound and picture: it computes on one core, mostly without the interpreter's lock, steps back behind
+It gives way to what is being drawn: it computes on one core, mostly without the interpreter's lock, steps back behind
 them, and rests between the pieces of a job, while a pluck is rendered, and while nobody looks at the panel.
 """
 
@@ -78,7 +78,7 @@ class Background(QObject):
         self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
 
     def give_way_to(self, take: Take) -> None:
-        """Lets jobs rest while this take is rendered: sound comes first."""
+        """Lets jobs rest while this take is rendered: its picture comes first."""
         self._growing = take
 
     def look(self) -> None:

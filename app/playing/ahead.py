@@ -34,6 +34,8 @@ class AheadVoice:
 
     Attributes:
         begin: hands the note over; called once, when enough is rendered.
+        given_up: whether nobody wants to hear it any more.
+        from_s: where it will begin.
         ends_s: where the model ran away.
     """
 
@@ -44,6 +46,8 @@ class AheadVoice:
     key: tuple[object, ...]
     begin: Callable[[], None]
     failed: Callable[[Exception], None]
+    given_up: Callable[[], bool] = lambda: False
+    from_s: float = 0.0
     ends_s: float | None = None
     _state: SourceState | None = None
     _frames: list[NDArray[np.float32]] = field(default_factory=list)
@@ -65,7 +69,8 @@ class AheadVoice:
     def wanted_s(self) -> float:
         """So much must be there before it begins."""
         total_s = self.done / self.source.rate_hz + self.voice.room / self.source.rate_hz
-        return max(LEAST_S, total_s * (1 - CARE * self.speed)) if self.speed else LEAST_S
+        least_s = min(self.from_s + LEAST_S, total_s)
+        return max(least_s, total_s - (total_s - self.from_s) * CARE * self.speed) if self.speed else least_s
 
     @property
     def waits_s(self) -> float:
@@ -157,7 +162,9 @@ class Ahead:
         step_back(Rank.RENDERING)
         while True:
             with self._mailbox:
-                self._voices = [each for each in self._voices if not each.finished and not each.voice.over]
+                self._voices = [
+                    each for each in self._voices if not each.finished and not each.voice.over and not each.given_up()
+                ]
                 self._mailbox.wait_for(lambda: bool(self._voices) or self._closing)
                 if self._closing:
                     return

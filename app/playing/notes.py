@@ -22,9 +22,8 @@ from app.playing.ahead import Ahead, AheadVoice
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
 from app.precedence import Rank, step_back
-from engine.kernels import layout
+from engine.kernels.layout import QUANTUM
 from engine.preset import PresetError
-from engine.sources import project
 from engine.voices import Ear, Mixer, Voice, render_voice
 
 MOST_NOTES = 24  # that ring at once; the oldest makes room
@@ -35,6 +34,7 @@ BUSY = 0.75  # of the device's time: beyond, the oldest notes end, so that the o
 MATCHED_S = 1.0  # so much from the pluck on is compared to match levels
 LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
 KEPT_MATCHES = 256
+MOST_CARRIED = 4  # notes that ring on where the device changes its rate
 
 Report = Callable[[str, str], None]  # a message and its details
 
@@ -43,33 +43,44 @@ class Note:
     """A pluck that was struck. Its voices know how far it is.
 
     Attributes:
+        from_s: where in its motion it begins.
+        begin_frame: of the mixer, before which it waits.
         match: by source, the gain that brings its level to the truth's; None until it is known.
         pending: it is not handed over yet.
+        mixer: whom it was handed to.
+        cut: it will not be heard any more: its mixer has gone, or it could not be played.
     """
 
-    def __init__(self, stroke: Stroke) -> None:
-        self.stroke = stroke
+    def __init__(self, stroke: Stroke, from_s: float = 0.0, begin_frame: int = 0) -> None:
+        self.stroke, self.from_s, self.begin_frame = stroke, from_s, begin_frame
         self.voices: dict[str, Voice] = {}
         self.ahead: list[AheadVoice] = []
         self.match: Mapping[str, float] | None = None
         self.pending = True
+        self.handed_over = False  # or about to be
         self.released = False
+        self.mixer: Mixer | None = None
+        self.cut = False
         self.timed = False  # its latency has been noted
-        self.begin_frame = 0  # of the mixer, before which it waits
 
     @property
     def over(self) -> bool:
-        return not self.pending and all(voice.over for voice in self.voices.values())
+        if self.cut or self.pending:
+            return self.cut or self.released
+        return all(voice.over for voice in self.voices.values())
 
     @property
     def seconds(self) -> float:
         """How long it has been ringing, as far as the device was given it."""
+        if self.pending:
+            return self.from_s
         return max((voice.seconds for voice in self.voices.values()), default=0.0)
 
     @property
     def waits_s(self) -> float:
         """How long it will still be rendered before it sounds."""
-        return max((each.waits_s for each in self.ahead), default=0.0) if self.pending else 0.0
+        waits = self.pending and not self.over
+        return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
 
     @property
     def ran_away(self) -> bool:
@@ -79,6 +90,16 @@ class Note:
     def began_frame(self) -> int:
         """Of the mixer; 0 before it began."""
         return max((voice.began_frame for voice in self.voices.values()), default=0)
+
+    def frame_at(self, seconds: float) -> int:
+        """The frame of its mixer at which it will have been ringing for so long; only after it began."""
+        assert self.mixer is not None
+        rate_hz = self.mixer.rate_hz
+        if self.from_s:  # its voices did not note when they began, but both count in whole quanta
+            begun = -(-round(self.mixer.seconds * rate_hz) // QUANTUM) * QUANTUM
+            return begun + round((seconds - self.seconds) * rate_hz)
+        starved_s = min(voice.starved_s for voice in self.voices.values())
+        return self.began_frame + round((seconds + starved_s) * rate_hz)
 
     def release_at(self, frame: int) -> None:
         """Fades out from a frame of the mixer on; 0: it rings on."""
@@ -121,15 +142,17 @@ class Notes:
             alone: those that ring fade out.
             begin_frame: waits for this frame of the mixer.
         """
-        struck_s = self._sound.now_s()
-        note = Note(stroke)
-        note.begin_frame = begin_frame
+        struck_s = 0.0 if from_s or begin_frame else self._sound.now_s()  # only gestures are timed
+        note = Note(stroke, from_s, begin_frame)
         if alone:
             self.stop(REPLACED_S)
+        with self._lock:
+            self._notes.append(note)
+        begin = self._guarded(lambda: self._begin(note, struck_s), note)
         if from_s > 0 or not self.have(stroke):
-            self._submit(lambda: self._begin(note, struck_s, from_s))
+            self._submit(begin)
         else:
-            self._begin(note, struck_s, from_s)
+            begin()
         return note
 
     def have(self, stroke: Stroke) -> bool:
@@ -142,10 +165,10 @@ class Notes:
         rate_hz = self._sound.rate_hz
         for path in paths:
             if not self._sources.has(path, rate_hz):
-                self._submit(lambda path=path: self._sources.prepare(path, rate_hz))  # type: ignore[misc]
+                self._submit(self._guarded(lambda path=path: self._sources.prepare(path, rate_hz)))  # type: ignore[misc]
 
     def stop(self, seconds: float = STOP_S) -> None:
-        """All fade out."""
+        """All fade out; what waits is not heard."""
         with self._lock:
             for note in self._notes:
                 note.release(seconds)
@@ -154,8 +177,12 @@ class Notes:
         """What is heard of all notes, from now on: a cross-fade where they ring."""
         with self._lock:
             self._mix = mix
-            for note in self._notes:
+            notes = list(self._notes)
+            for note in notes:
                 self._apply_mix(note)
+        for note in notes:
+            if not note.pending and not note.over:
+                self._wish_match(note)
 
     def listen(self, ear: Ear) -> None:
         """From where, from now on: a fade where they ring; another pick-up counts from the next pluck."""
@@ -182,6 +209,7 @@ class Notes:
 
     @property
     def ringing(self) -> int:
+        """Notes that were struck, waiting ones among them, and not told to end."""
         with self._lock:
             return sum(not note.over and not note.released for note in self._notes)
 
@@ -196,9 +224,10 @@ class Notes:
     def poll(self) -> None:
         """Now and then: forgets what is over, moves listening points, keeps the load bounded."""
         with self._lock:
+            self._carry()
             self._notes = [note for note in self._notes if not note.over]
             for note in self._notes:
-                if not note.timed and not note.pending and note.voices:
+                if not note.timed and not note.ahead and note.voices:
                     latency_s = next(iter(note.voices.values())).struck_to_began_s
                     if latency_s is not None:
                         note.timed = True
@@ -217,79 +246,123 @@ class Notes:
 
     # How it is done
 
-    def _submit(self, work: Callable[[], None]) -> None:
+    def _guarded(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
+        """Faults are told, and end the note."""
+
         def guarded() -> None:
             try:
                 work()
+                return
             except (PresetError, ValueError) as error:
                 self._report(str(error), "")
             except Exception as error:
                 self._report(f"This pluck cannot be played: {error}", traceback.format_exc())
+            if note is not None:
+                note.cut = True
 
+        return guarded
+
+    def _submit(self, work: Callable[[], None]) -> None:
         if not self._closed:
-            self._helper.submit(guarded)
+            self._helper.submit(work)
 
-    def _begin(self, note: Note, struck_s: float, from_s: float) -> None:
+    def _carry(self) -> None:
+        """Where the device has changed its rate, the latest notes ring on in its new mixer."""
+        mixer = self._sound.mixer
+        left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
+        ringing = [note for note in left if note.seconds and not note.released][-MOST_CARRIED:]
+        for note in left:
+            if note in ringing:
+                note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
+                note.pending, note.handed_over = True, False
+                self._submit(self._guarded(lambda note=note: self._begin(note, 0.0), note))  # type: ignore[misc]
+            else:
+                note.cut = True
+
+    def _begin(self, note: Note, struck_s: float) -> None:
         """Makes the voices and hands them over, again where the device has changed its rate meanwhile."""
         for _ in range(3):
             mixer = self._sound.mixer
-            self._make_voices(note, mixer.rate_hz)
+            self._make_voices(note, mixer.rate_hz, struck_s)
             for voice in note.voices.values():
-                voice.set_struck(0.0 if note.begin_frame else struck_s)
+                voice.set_struck(struck_s)
                 voice.begin_at(note.begin_frame)
-                if from_s > 0:
-                    voice.skip(from_s, Mixer(mixer.rate_hz).memory)
-            note.match = self._matches.get(note.stroke.matching_key)
-            self._apply_mix(note, at_once=from_s == 0)
             if note.ahead:
                 for each in note.ahead:
                     self._ahead.render(each)
                 return
+            self._skip(note)
             if self._hand_over(note, mixer):
                 return
+            note.begin_frame = 0  # another mixer counts anew
 
-    def _make_voices(self, note: Note, rate_hz: int) -> None:
+    def _skip(self, note: Note) -> None:
+        if note.from_s > 0:
+            for voice in note.voices.values():
+                voice.skip(note.from_s, Mixer(voice.program.rate_hz).memory)
+
+    def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
         stroke, voices = note.stroke, {}
-        note.ahead = []
+        ahead: list[AheadVoice] = []
         for source in stroke.sources:
-            path = stroke.path(source)
-            program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
-            loaded = self._sources.load(path)
-            info = loaded.preset.info
-            initial_m = project(stroke.pluck.displacement(info.grid_points), info.modes)
-            ahead = program.kind == layout.RENDERED
-            voice = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds if ahead else 0.0, info.rate_hz)
-            voices[source] = voice
-            if ahead:
-                key = (path, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds)
-                note.ahead.append(
-                    AheadVoice(
-                        voice,
-                        loaded.model,
-                        initial_m,
-                        stroke.ear.weights(info.grid_points),
-                        key,
-                        lambda: self._rendered_enough(note),
-                        lambda error: self._report(f"This pluck cannot be rendered: {error}", ""),
-                    )
+            path, kind = stroke.path(source), "truth" if source == "truth" else "model"
+            try:
+                program = self._sources.program(path, kind, rate_hz)
+                initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
+                model = self._sources.load(path).model if program.rendered else None
+            except (PresetError, ValueError):
+                if source not in stroke.others:
+                    raise
+                continue  # what stands beside it is at rest; who draws it tells why
+            if model is None:
+                voices[source] = Voice(program, initial_m, stroke.ear, 0.0, begin=begin)
+                continue
+            voice = voices[source] = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds, model.rate_hz, begin)
+            ahead.append(
+                AheadVoice(
+                    voice,
+                    model,
+                    initial_m,
+                    stroke.ear.weights(model.grid_points),
+                    (path, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
+                    lambda: self._rendered_enough(note, ahead, struck_s),
+                    lambda error: self._cannot_render(note, error),
+                    lambda: note.over,
+                    note.from_s,
                 )
-        note.voices = voices
+            )
+        note.ahead, note.voices = ahead, voices
 
-    def _rendered_enough(self, note: Note) -> None:
-        if all(each.begun for each in note.ahead):
-            self._hand_over(note, self._sound.mixer)
+    def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
+        """One of its models is; in any thread."""
+        with self._lock:
+            if note.handed_over or ahead is not note.ahead or not all(each.begun for each in ahead):
+                return
+            note.handed_over = True  # two that are ready at the same time would both do it
+        self._skip(note)
+        if not self._hand_over(note, self._sound.mixer):
+            note.handed_over, note.begin_frame = False, 0
+            self._submit(self._guarded(lambda: self._begin(note, struck_s), note))
+
+    def _cannot_render(self, note: Note, error: Exception) -> None:
+        note.cut = True
+        self._report(f"This pluck cannot be rendered: {error}", "")
 
     def _hand_over(self, note: Note, mixer: Mixer) -> bool:
+        """False where the mixer is another one now, with another rate."""
         with self._lock:
-            if mixer is not self._sound.mixer or note.released:
-                return note.released
-            self._make_room(MOST_NOTES - 1)
+            if note.over:
+                return True
+            if mixer is not self._sound.mixer:
+                return False
+            note.match = self._matches.get(note.stroke.matching_key)
+            self._apply_mix(note, at_once=note.from_s == 0)
             try:
                 mixer.add(*note.voices.values())
             except ValueError:
                 return False
-            note.pending = False
-            self._notes.append(note)
+            note.mixer, note.pending = mixer, False
+            self._make_room(MOST_NOTES)
         self._wish_match(note)
         return True
 
@@ -318,7 +391,7 @@ class Notes:
 
     def _match(self, note: Note, key: tuple[object, ...]) -> None:
         try:
-            levels = {source: self._level(note.stroke, source) for source in note.stroke.sources}
+            levels = {source: self._level(note.stroke, source) for source in note.voices}
             found = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
         finally:
             with self._lock:
@@ -334,14 +407,14 @@ class Notes:
 
     def _level(self, stroke: Stroke, source: str) -> float:
         """Root mean square of the first second; 0 of what is rendered ahead: it is left as it is."""
-        path = stroke.path(source)
-        info = self._sources.load(path).preset.info
+        path, kind = stroke.path(source), "truth" if source == "truth" else "model"
         rate_hz = min(self._sound.rate_hz, 48_000)
-        program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
-        if program.kind == layout.RENDERED:
+        program = self._sources.program(path, kind, rate_hz)
+        if program.rendered:
             return 0.0
-        mixer = Mixer(rate_hz)
-        mixer.add(Voice(program, project(stroke.pluck.displacement(info.grid_points), info.modes), stroke.ear))
+        mixer = Mixer(rate_hz, limited=False)
+        initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
+        mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))
         sound = mixer.render(round(MATCHED_S * rate_hz))
         return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))
 

@@ -16,7 +16,7 @@ class Pair:
     """Samples of the mixer's own rate, by name, (frames, channels) of one length. All is called by one thread."""
 
     def __init__(self, mixer: Mixer, samples: Mapping[str, NDArray[np.float32]]) -> None:
-        self._mixer, self._samples = mixer, samples
+        self.mixer, self._samples = mixer, samples
         self._voices: dict[str, Voice] = {}
         self._heard = ""
 
@@ -32,11 +32,11 @@ class Pair:
             return
         self.stop()
         for name, samples in self._samples.items():
-            voice = Voice.of_samples(plain_program(self._mixer.rate_hz), samples)
+            voice = Voice.of_samples(plain_program(self.mixer.rate_hz), samples)
             voice.loop()
             voice.start_with_gain(float(name == self._heard))
             self._voices[name] = voice
-        self._mixer.add(*self._voices.values())
+        self.mixer.add(*self._voices.values())
 
     def stop(self) -> None:
         """Fades out."""

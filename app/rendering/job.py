@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
@@ -41,10 +42,20 @@ class Job:
         self._take: Take | None = None
         self._errors = ErrorSums(0)
         self._finished = False  # and told
+        self._begun_s = time.monotonic()
 
     def ask_again(self, request: RenderRequest) -> None:
         """The same motion, beside other presets."""
         self.request = request
+
+    @property
+    def age_s(self) -> float:
+        """Since it was asked for."""
+        return time.monotonic() - self._begun_s
+
+    @property
+    def rendered_s(self) -> float:
+        return 0.0 if self._take is None else self._take.ready_frames / self._take.info.rate_hz
 
     @property
     def idle(self) -> bool:

@@ -19,6 +19,9 @@ from app.rendering.request import RenderListener, RenderRequest
 from engine.preset import PresetError
 
 TIDY_AFTER_S = 1.0  # without anything to render
+IN_STEP_S = 0.5  # for so long a motion keeps step with its sound
+LEAD_S = 0.08  # so far ahead
+LOOK_AGAIN_S = 0.01
 
 
 class RenderWorker:
@@ -26,10 +29,14 @@ class RenderWorker:
 
     Args:
         load: a preset's model and truth; called in the worker's thread.
+        hurried: whether plucks are heard just now: then a new motion keeps step with its sound for a while, so that
+            plucks in quick succession leave time for all else.
     """
 
-    def __init__(self, listener: RenderListener, load: Callable[[Path], Loaded]) -> None:
-        self._listener, self._load = listener, load
+    def __init__(
+        self, listener: RenderListener, load: Callable[[Path], Loaded], hurried: Callable[[], bool] = lambda: False
+    ) -> None:
+        self._listener, self._load, self._hurried = listener, load, hurried
         self._mailbox = threading.Condition()
         self._request: RenderRequest | None = None
         self._closing = False
@@ -60,8 +67,11 @@ class RenderWorker:
         while True:
             with self._mailbox:
                 waits = job is None or job.idle
+                if job is not None and not waits and self._request is None and self._in_step(job):
+                    self._mailbox.wait(LOOK_AGAIN_S)
                 while waits and self._request is None and not self._closing:
-                    if not self._mailbox.wait(TIDY_AFTER_S if untidy else None) and untidy:
+                    # giving pages back locks the heap, which the sound server's client uses too
+                    if not self._mailbox.wait(TIDY_AFTER_S if untidy else None) and untidy and not self._hurried():
                         return_free_pages()
                         untidy = False
                 if self._closing:
@@ -73,6 +83,8 @@ class RenderWorker:
                 else:
                     job = Job(request, self._load, self._listener, self._helper)
             assert job is not None
+            if self._in_step(job):
+                continue
             try:
                 job.advance()
                 untidy = True
@@ -82,3 +94,7 @@ class RenderWorker:
             except Exception as error:  # told to the user; the worker lives on
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
+
+    def _in_step(self, job: Job) -> bool:
+        """Whether a motion that is heard is far enough ahead for now."""
+        return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()

@@ -1,6 +1,6 @@
 """The listening test in a dialog: set up, trial by trial, the result, earlier records.
 
-While it is open the player belongs to it, and nothing else may show what the player plays: level, limiter and source
+While it is open the sound belongs to it, and nothing else may show what it plays: level, limiter and source
 would give X away.
 """
 
@@ -69,7 +69,7 @@ class AbxDialog(QDialog):
         self._rate_hz = 0  # at which it is, or was, rendered
         self._pair: Pair | None = None
         self._stimuli: Stimuli | None = None
-        self._silence = ""  # why there are no stimuli
+        self._silence = RENDERING  # why there are no stimuli
         self._run: Run | None = None
         self._sounding: Sound | None = None
         self._trial_began_s = 0.0
@@ -89,7 +89,7 @@ class AbxDialog(QDialog):
         self._watch.timeout.connect(self._look_at_device)
         self._watch.start()
         self._ask_for_sound()
-        self._show_state()
+        self._prepare()
         self._setup.start.setFocus()
 
     @property
@@ -268,7 +268,7 @@ class AbxDialog(QDialog):
             if self._rate_hz != self._output.rate_hz:
                 self._ask_for_sound()
                 self._prepare()
-            elif self._stimuli is None and self._silence == RENDERING:
+            elif self._silence == RENDERING or (self._pair and self._pair.mixer is not self._output.mixer):
                 self._prepare()
             else:
                 self._show_state()

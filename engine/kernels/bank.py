@@ -1,7 +1,7 @@
 """A voice of latents z_n(t) whose frequencies follow their energies: `engine.models.integrated_phase`, compiled.
 
-It is what that module says, with time in samples of the trained rate and any number of frames a sample. Level and phase
-are computed at the ends of short segments and are cubics in between; within a segment z is advanced by products.
+It is what that module says, with time in samples of the trained rate and any number of frames a sample. Level and
+phase are computed at the ends of short segments and are cubics in between; within one z is advanced by products.
 Where the modulation M z² can be heard it is computed at every frame, for the latents that matter alone. Energies only
 decay, so that what has become too quiet to matter is left out for good. Any block is the same as if it were rendered
 in one piece: everything hangs on the frame alone.
@@ -278,7 +278,7 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
             integral[j] = constant[j]
     for m in range(alive):
         energy = start[m] * _exp(-2 * sigma[m] * time)
-        if energy * largest[m] < 2e-8 * sigma[m]:
+        if not energy * largest[m] > 2e-8 * sigma[m]:
             continue
         share = energy / (2 * sigma[m])
         for part in range(2):
@@ -318,6 +318,10 @@ def generate(
     if whole[at.P_HIGHER]:
         _integrate_to(voice, program, first * ratio, scratch)
     points = counts[at.POINTS]
+    if fading and counts[at.WEIGHTS_FADED] == 0:  # what could not be heard there may be heard here
+        if counts[at.MODULATED] != whole[at.P_MODULATION]:
+            counts[at.MODULATED], counts[at.SEGMENT_VALID] = whole[at.P_MODULATION], 0
+        counts[at.REFRESH] = 0
     if heard:
         out[:] = 0.0
         length = SHORT if first < whole[at.P_EARLY] else LONG
@@ -340,12 +344,12 @@ def generate(
     else:
         counts[at.SEGMENT_VALID] = 0
     counts[at.GENERATED] = first + at.QUANTUM
-    loudest, alive = -1e9, 1
+    loudest, alive, was_alive = -1e9, 1, counts[at.ALIVE]  # beyond it there is no level: what is dead stays so
     sigma = program[whole[at.O_SIGMA] :]
     time = (first + at.QUANTUM) * ratio
     for m in range(n):
         level = voice[rows + at.LEVEL_0 * n + m] - sigma[m] * time
-        if heard and whole[at.P_HIGHER]:
+        if heard and whole[at.P_HIGHER] and m < was_alive:
             level = max(level, voice[rows + at.LEVEL * n + m])
         loudest = max(loudest, level)
         if level + program[at.P_LOUDNESS] > DEAD:
@@ -474,14 +478,14 @@ def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.nda
     whole = program.view(np.int64)
     counts = voice.view(np.int64)
     n = whole[at.P_MODES]
-    rows = at.state(n)
+    rows, alive = at.state(n), counts[at.ALIVE]
     matrix, largest = program[whole[at.O_M] :], program[whole[at.O_M_LARGEST] :]
     squares, loud = (
         scratch[20 * at.MOST_MODES : 20 * at.MOST_MODES + n],
         scratch[21 * at.MOST_MODES : 21 * at.MOST_MODES + n],
     )
     loudest = 0.0
-    for m in range(n):
+    for m in range(alive):  # beyond, z is another voice's
         squares[m] = z[m] * z[m] + z[n + m] * z[n + m]
         size = 0.0
         for which in range(2):
@@ -492,13 +496,13 @@ def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.nda
         loudest = max(loudest, loud[m])
     row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
     columns = 0
-    for m in range(n):
+    for m in range(alive):
         if squares[m] * largest[m] * loudest > INAUDIBLE:
             column_list[columns] = m
             columns += 1
     kept = 0
     change = voice[rows + at.CHANGE * n :]
-    for j in range(n):
+    for j in range(alive):
         effect = 0.0
         for place in range(columns):
             m = column_list[place]
@@ -533,7 +537,11 @@ def _modulate(
     row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
     change, next_change = voice[rows + at.CHANGE * n :], voice[rows + (at.CHANGE + 1) * n :]
     squares = scratch[(at.SCRATCH_ROWS + 2 * quantum) * at.MOST_MODES :].view(np.float32)
-    columns = counts[at.COLUMNS]
+    alive, columns, rows_kept = counts[at.ALIVE], counts[at.COLUMNS], counts[at.ROWS]
+    while columns > 0 and column_list[columns - 1] >= alive:  # died since the lists, which ascend, were made
+        columns -= 1
+    while rows_kept > 0 and row_list[rows_kept - 1] >= alive:
+        rows_kept -= 1
     for place in range(columns):
         m = column_list[place]
         real, imaginary = squares[2 * place * quantum :], squares[(2 * place + 1) * quantum :]
@@ -542,7 +550,7 @@ def _modulate(
             real[frame] = a * a - b * b
             imaginary[frame] = np.float32(2) * a * b
     growth, turn = scratch[22 * at.MOST_MODES :].view(np.float32), scratch[23 * at.MOST_MODES :].view(np.float32)
-    for place in range(counts[at.ROWS]):
+    for place in range(rows_kept):
         j = row_list[place]
         start = change[j]
         step = (next_change[j] - start) / quantum

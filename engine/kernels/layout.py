@@ -1,8 +1,8 @@
 """What lies where: a voice, a program and a mixer are flat arrays of eight-byte numbers, real or whole.
 
 A *program* is what voices of one source share: a model's parameters, or a solver's. A *voice* is one pluck of it as
-it rings. Slots are counted in eight-byte numbers. Whole numbers and real ones share the memory, each slot is always one
-or the other. One thread writes a slot while others may read it; a slot that a command changes is read once a quantum.
+it rings. Slots are counted in eight-byte numbers. Whole numbers and real ones share the memory; each slot is always
+one or the other. One thread writes a slot while others may read it; what a command changes is read once a quantum.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BANK, TRUTH, RENDERED = 0, 1, 2
 STATE = 0  # W
 KIND = 1  # W
 PROGRAM = 2  # W address
-FRAME = 3  # W frames given out since the pluck
+FRAME = 3  # W frames given out since the pluck, without those in which it stood still
 GENERATED = 4  # W frames generated since the pluck: one quantum more where the pick-up senses velocity
 POINTS = 5  # W listening points, 1 or 2
 VELOCITY = 6  # W whether the pick-up senses velocity
@@ -51,7 +51,7 @@ READY = 28  # W of them, set by whoever renders
 LENGTH = 29  # W of them in all; after the last the voice is over
 DRY = 30  # W whether it had nothing to play in the last quantum
 ATTACK = 31  # W frames of the fade-in at the pluck
-BEGAN_FRAME = 32  # W the mixer's frame at which it began
+BEGAN_FRAME = 32  # W the mixer's frame at which it began, after any samples it waited for; -1 until then
 REFRESH = 33  # W quanta until a bank looks again which of its modulation can be heard
 ROWS = 34  # W latents whose modulation can be heard
 COLUMNS = 35  # W latents that can be heard in others' modulation
@@ -59,7 +59,8 @@ BEGIN_AT = 36  # W the mixer's frame before which it waits
 RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
 LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins anew after its last sample
 ALIVE = 39  # W latents up to the last that can be heard
-HEADER = 40
+WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
+HEADER = 41
 
 SETS = 2  # of weights
 

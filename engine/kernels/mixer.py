@@ -20,7 +20,6 @@ CEILING = 10 ** (-0.3 / 20)
 BELIEVED = 100.0  # +40 dBFS: the level that the limiter believes at most, so that one wild sample is soon forgotten
 TONE_HZ, TONE_LEVEL, TONE_FADE = 440.0, 0.1, 960
 UNDERFLOW = 4  # PortAudio's flag
-LATE = 1.5  # blocks that a device's clock may jump before it counts as a gap
 
 
 @njit(**COMPILED)
@@ -58,8 +57,9 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     for place in range(counts[at.M_ACTIVE]):
         address = counts[at.M_VOICES + place]
         voice = carray(pointer(address), (1 << 40,), np.float64)
-        add(voice, mixer, now_s)
-        state = voice.view(np.int64)[at.STATE]
+        state = add(voice, mixer, now_s)
+        fence()
+        voice.view(np.int64)[at.STATE] = state  # one that is over may be freed from here on
         if state == at.SOUNDING or state == at.WAITING:
             counts[at.M_VOICES + kept] = address
             kept += 1

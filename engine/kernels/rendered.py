@@ -26,7 +26,8 @@ def generate(voice: np.ndarray, program: np.ndarray, out: np.ndarray) -> None:
     needed = int((first + 2 * at.QUANTUM) * ratio) + taps + 1
     dry = ready < length and ready < needed
     was_dry = counts[at.DRY]
-    if dry and was_dry:
+    if dry and (was_dry or first == 0):
+        counts[at.DRY] = 1
         out[:] = 0.0
         counts[at.STARVED] += at.QUANTUM
         return

@@ -13,6 +13,7 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 
 MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
+WARMED = 3  # quanta: the one that is heard, and those before and after it
 _END = 960  # frames of the fade of a voice that has become silent
 
 
@@ -51,12 +52,18 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 @njit(**COMPILED)
 def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray) -> None:
-    """As `_generate`, differentiated; the voice is generated a quantum ahead for that."""
+    """As `_generate`, differentiated; the voice is generated a quantum ahead for that.
+
+    What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
+    """
     counts = voice.view(np.int64)
     n, quantum = counts[at.MODES], at.QUANTUM
     begins = counts[at.GENERATED] == counts[at.FRAME]
+    if begins:
+        counts[at.WARM] = 0
     for turn in range(2 if begins else 1):
         _generate(voice, heard, out, scratch)
+        counts[at.WARM] = min(counts[at.WARM] + 1, WARMED) if heard else 0
         for point in range(counts[at.POINTS]):
             slot = at.history(n, point)
             past = voice[slot : slot + 3 * quantum]
@@ -67,6 +74,7 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
             if begins and turn == 0 and counts[at.FRAME] == 0:
                 for frame in range(1, quantum):  # at rest: before the pluck lies the mirror of what follows
                     past[2 * quantum - frame] = past[2 * quantum + frame]
+                counts[at.WARM] = WARMED - 1
     for point in range(counts[at.POINTS]):
         slot = at.history(n, point)
         past = voice[slot : slot + 3 * quantum]
@@ -78,17 +86,16 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 
 @njit(**COMPILED)
-def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> None:
-    """Adds the next quantum of a voice to the mix, (QUANTUM, 2), and says in its state whether it goes on."""
+def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
+    """Adds the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
     counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
     quantum = at.QUANTUM
     out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
     now = mix_counts[at.M_FRAMES]
-    if counts[at.BEGIN_AT] > now and counts[at.FRAME] == 0:
-        counts[at.STATE] = at.OVER if counts[at.RELEASE] > 0 else at.WAITING
-        return
+    if counts[at.BEGIN_AT] > now and counts[at.STATE] == at.WAITING:
+        return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
         counts[at.RELEASE] = counts[at.FADE_FRAMES]
     release = counts[at.RELEASE]
@@ -99,23 +106,22 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> None:
         if release > 0:
             counts[at.FADE_FRAMES] = release
     heard = voice[at.GAIN] != 0 or voice[at.GAIN_TO] != 0
-    starved = counts[at.STARVED]
+    was_dry, generated = counts[at.DRY], counts[at.GENERATED]
     if counts[at.VELOCITY]:
         taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
         _velocity(voice, heard, out, scratch, taps)
     else:
         _generate(voice, heard, out, scratch)
     points = counts[at.POINTS]
-    if starved == 0 and counts[at.STARVED] > 0:
+    if counts[at.DRY] and not was_dry:
         note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
-    if heard:
+    if heard and (not counts[at.VELOCITY] or counts[at.WARM] == WARMED):
         limit = voice[at.LIMIT]
         for point in range(points):
             for frame in range(quantum):
                 if not abs(out[point, frame]) <= limit:  # also where it is not a number
-                    counts[at.STATE] = at.RUNAWAY
                     note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_RUNAWAY)
-                    return
+                    return at.RUNAWAY
         first, attack = counts[at.FRAME], counts[at.ATTACK]
         source, goal, done, length = (
             voice[at.GAIN_FROM],
@@ -133,15 +139,16 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> None:
             mix[frame, 1] += gain * out[points - 1, frame]
         counts[at.GAIN_DONE] = min(done + quantum, length)
         voice[at.GAIN] = goal if done + quantum >= length else source + (goal - source) * ((done + quantum) / length)
-    if counts[at.FRAME] == 0:
-        counts[at.BEGAN_FRAME] = mix_counts[at.M_FRAMES]
-        voice[at.BEGAN_S] = now_s
-    counts[at.FRAME] += quantum
-    counts[at.STATE] = at.SOUNDING
+    if counts[at.GENERATED] > generated:  # else it stands still
+        if counts[at.BEGAN_FRAME] < 0:
+            counts[at.BEGAN_FRAME] = mix_counts[at.M_FRAMES]
+            voice[at.BEGAN_S] = now_s
+        counts[at.FRAME] += quantum
     if release > 0 and (not heard or (voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0)):
-        counts[at.STATE] = at.OVER
-    elif release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
+        return at.OVER
+    if release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
         counts[at.RELEASE] = _END
+    return at.SOUNDING
 
 
 @njit(**COMPILED)
@@ -159,6 +166,10 @@ def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
     """Lets a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
     counts = voice.view(np.int64)
     out = mixer[at.M_OUT : at.M_OUT + 4 * at.QUANTUM].reshape(4, at.QUANTUM)
-    for _ in range((frames + at.QUANTUM // 2) // at.QUANTUM):
+    quanta = (frames + at.QUANTUM // 2) // at.QUANTUM
+    if counts[at.KIND] == at.RENDERED:  # there need not be samples yet
+        counts[at.GENERATED] = quanta * at.QUANTUM
+        quanta = 0
+    for _ in range(quanta):
         _generate(voice, False, out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     counts[at.FRAME] = counts[at.GENERATED]

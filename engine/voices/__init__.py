@@ -10,7 +10,14 @@ offline    a voice for a file
 from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
 from engine.voices.offline import render_voice
-from engine.voices.programs import Program, bank_program, plain_program, rendered_program, truth_program
+from engine.voices.programs import (
+    Program,
+    bank_program,
+    model_program,
+    plain_program,
+    rendered_program,
+    truth_program,
+)
 from engine.voices.voice import Voice
 
 __all__ = [
@@ -20,6 +27,7 @@ __all__ = [
     "Program",
     "Voice",
     "bank_program",
+    "model_program",
     "plain_program",
     "render_voice",
     "rendered_program",

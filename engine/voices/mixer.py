@@ -61,6 +61,8 @@ class Mixer:
     def add(self, *voices: Voice) -> None:
         """Hands voices over: they begin together, with the next quantum. Any thread, at once.
 
+        Those for which there is no room are refused, and over.
+
         Raises:
             ValueError: a voice is of another rate.
         """
@@ -73,6 +75,8 @@ class Mixer:
             for number, voice in enumerate(voices[:room]):
                 counts[at.M_RING + (pushed + number) % at.RING] = voice.address
                 self._voices.append(voice)
+            for voice in voices[room:]:
+                voice.refuse()
             counts[at.M_PUSHED] = pushed + min(len(voices), room)
 
     def forget_ended(self) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from engine.kernels import layout as at
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.preset import PresetInfo
 from engine.sources import ModelSource, Runaway, project
@@ -17,43 +17,50 @@ from engine.voices.mixer import Mixer
 from engine.voices.programs import Program
 from engine.voices.voice import Voice
 
+SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed
 BLOCK_FRAMES = 4096  # between two looks at `advanced`
 
 
 def render_voice(
     program: Program,
-    source: ModelSource,
+    source: ModelSource | None,
     info: PresetInfo,
     pluck: Pluck,
     ear: Ear,
     seconds: float,
     advanced: Callable[[float], None] = lambda share: None,
+    until_db: float | None = None,
 ) -> NDArray[np.float32]:
     """The first seconds of a pluck, (frames, points), ±1 being full scale; no limiter.
 
     Args:
         source: what renders the samples of a program that is not compiled.
         advanced: is told the share that is done now and then; may raise, to end it.
+        until_db: ends, with a little silence, where all of the string has fallen so far below its start.
 
     Raises:
         Runaway: the output stopped being a string's.
     """
     initial_m = project(pluck.displacement(info.grid_points), info.modes)
-    rendered = program.kind == at.RENDERED
-    voice = Voice(program, initial_m, ear, 1.0, seconds + 0.1 if rendered else 0.0, info.rate_hz)
-    if rendered:
+    voice = Voice(program, initial_m, ear, 1.0, seconds + 0.1 if program.rendered else 0.0, info.rate_hz)
+    if program.rendered:
+        assert source is not None
         _fill(voice, source, initial_m, ear, advanced)
     voice.never_ends()
     mixer = Mixer(program.rate_hz, limited=False)
     mixer.add(voice)
     frames = max(1, round(seconds * program.rate_hz))
     out = np.zeros((frames, len(ear.points)), np.float32)
+    loudest_db = -math.inf
     for first in range(0, frames, BLOCK_FRAMES):
         block = mixer.render(min(BLOCK_FRAMES, frames - first))
         if voice.ran_away:
             raise Runaway(voice.seconds)
         out[first : first + len(block)] = block[:, : len(ear.points)]
         advanced((first + len(block)) / frames)
+        loudest_db = max(loudest_db, voice.level_db)
+        if until_db is not None and voice.level_db < loudest_db - until_db:
+            return out[: first + len(block) + round(SILENCE_S * program.rate_hz)]
     return out
 
 

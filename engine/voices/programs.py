@@ -1,15 +1,16 @@
 """Programs: what all voices of one source share, at one sample rate.
 
 A model whose decoder is linear becomes a bank of latents, and the string itself a solver; both are compiled and
-sound at once, at the device's own rate. Any other model is rendered ahead at the rate that it was trained at, and converted.
+sound at once, at the device's own rate. Any other model is rendered ahead at its own rate, and converted.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,6 +25,7 @@ from engine.pluck import FULL_SCALE_M
 from engine.preset import PresetInfo
 from engine.reference import SplittingSolver, default_substeps
 from engine.sine_transform import synthesis_matrix, to_modes
+from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
@@ -31,6 +33,7 @@ FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 
 Array = NDArray[np.float64]
 Strike = Callable[[Tensor], tuple[Array, Array]]
+KEPT_WEIGHTS = 32  # listening points of a program
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +54,27 @@ class Program:
     grid_points: int
     start: Strike
     read: Callable[[Tensor], tuple[Array, Array]]
+    _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
+
+    def weights(self, ear: Ear) -> tuple[Array, Array]:
+        """As `read`, of a pair of listening points; remembered."""
+        if ear not in self._known:
+            if len(self._known) >= KEPT_WEIGHTS:
+                self._known.clear()
+            self._known[ear] = self.read(ear.weights(self.grid_points))
+        return self._known[ear]
+
+    @property
+    def rendered(self) -> bool:
+        """Whether somebody renders the samples of its voices."""
+        return self.kind == at.RENDERED
 
     @property
     def address(self) -> int:
         return int(self.memory.ctypes.data)
 
 
-def bank_program(model: StringModel[object], info: PresetInfo, rate_hz: int) -> Program | None:
+def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Program | None:
     """The program of a model whose latents move by themselves and whose decoder is linear; None for any other."""
     if isinstance(model, DMD) and model.configuration.input == "displacement":
         return _dmd_program(model, info, rate_hz)
@@ -216,6 +233,11 @@ def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) 
         return np.concatenate([found, np.zeros_like(found)], axis=1), np.zeros(len(found))
 
     return Program(at.TRUTH, memory, n, rate_hz, info.grid_points, start, read)
+
+
+def model_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Program:
+    """A bank where the model is one, otherwise for samples that are rendered ahead."""
+    return bank_program(model, info, rate_hz) or rendered_program(info, rate_hz)
 
 
 def rendered_program(info: PresetInfo, rate_hz: int) -> Program:

@@ -18,7 +18,7 @@ ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade w
 FADE_S = 0.020  # another source, another gain
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
 BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
-SHARPEST = 5.0  # times more, of full scale, velocity may be than displacement: shapes of few hundredths of a length
+BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
 class Voice:
@@ -28,6 +28,7 @@ class Voice:
         displacement_m: as it is let go, (grid_points,), projected on the modes in use.
         gain: with which it is heard, 0 for a source that is only kept ready.
         seconds: of a rendered voice: how much room there is for its samples.
+        begin: what `program.start` gives for this displacement, where it is known.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class Voice:
         gain: float = 1.0,
         seconds: float = 0.0,
         source_rate_hz: int = 0,
+        begin: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         n = program.modes
         rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS}.get(program.kind, 0)
@@ -47,12 +49,13 @@ class Voice:
         counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = program.kind, program.address, n
         counts[at.POINTS], counts[at.VELOCITY] = len(ear.points), ear.pickup == "velocity"
         memory[at.WANTED_GAIN] = memory[at.GAIN] = memory[at.GAIN_FROM] = memory[at.GAIN_TO] = gain
+        counts[at.BEGAN_FRAME] = -1
         counts[at.FADE_FRAMES] = round(FADE_S * program.rate_hz)
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         peak = float(displacement_m.abs().max())
-        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (SHARPEST if counts[at.VELOCITY] else 1.0)
-        first, second = program.start(displacement_m)
+        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
+        first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + n], memory[place + n : place + 2 * n] = first, second
         self._samples: NDArray[np.float32] | None = None
@@ -61,7 +64,7 @@ class Voice:
         elif program.kind == at.BANK:
             from engine.kernels.bank import strike
 
-            strike(memory, program.memory, np.empty(at.SCRATCH_SLOTS))
+            strike(memory, program.memory, np.empty(at.SCRATCH_ROWS * at.MOST_MODES))
         else:
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
@@ -89,6 +92,10 @@ class Voice:
         """Whether it sounds no more and its memory may go."""
         return bool(self._counts[at.STATE] in (at.OVER, at.RUNAWAY))
 
+    def refuse(self) -> None:
+        """It is over before it was handed over."""
+        self._counts[at.STATE] = at.OVER
+
     @property
     def ran_away(self) -> bool:
         return bool(self._counts[at.STATE] == at.RUNAWAY)
@@ -110,7 +117,7 @@ class Voice:
     @property
     def struck_to_began_s(self) -> float | None:
         """From the gesture to the callback that gave its first samples to the device; None until then."""
-        if not self._counts[at.FRAME] or not self.memory[at.STRUCK_S]:
+        if self._counts[at.BEGAN_FRAME] < 0 or not self.memory[at.STRUCK_S]:
             return None
         return float(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
 
@@ -142,8 +149,8 @@ class Voice:
 
     @property
     def began_frame(self) -> int:
-        """Of the mixer."""
-        return int(self._counts[at.BEGAN_FRAME])
+        """Of the mixer; 0 until then."""
+        return max(0, int(self._counts[at.BEGAN_FRAME]))
 
     def release(self, seconds: float) -> None:
         """Fades to silence and ends; a release under way goes on."""
@@ -201,7 +208,7 @@ class Voice:
 
     def _set_weights(self, which: int, ear: Ear) -> None:
         n = self.program.modes
-        weights, bias = self.program.read(ear.weights(self.program.grid_points))
+        weights, bias = self.program.weights(ear)
         for point in range(len(ear.points)):
             place = at.HEADER + (which * 2 + point) * 2 * n
             self.memory[place : place + 2 * n] = weights[point]

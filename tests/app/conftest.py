@@ -1,4 +1,4 @@
-"""A window with its controller, a silent player and one small preset."""
+"""A window with its controller, a sound without a device and one small preset."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.audio import AudioDevice, AudioProblem, AudioUnavailable, Player, ProblemKind
+from app.audio import AudioDevice, AudioProblem, AudioUnavailable, ProblemKind, Sound
+from app.audio.output import ClockOutput
+from engine.voices import Mixer
 
-OWN_THREADS = ("render-worker", "audio-feeder", "eigenvalues", "partials", "error-map", "compare")
+OWN_THREADS = (
+    *("render-worker", "render-helper_0", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
+    *("eigenvalues", "partials", "error-map", "compare"),
+)
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
@@ -32,8 +37,26 @@ def no_device(*_: object) -> AudioDevice:
     raise AudioUnavailable(AudioProblem(ProblemKind.NO_DEVICE, "No sound output here.", "Connect one."))
 
 
-def make_player(on_problem: Callable[[AudioProblem], None]) -> Player:
-    return Player(on_problem, look_up=no_device)
+def make_sound(on_problem: Callable[[AudioProblem], None] | None = None) -> Sound:
+    """Its frames are taken at the pace of time, and dropped."""
+    return Sound(on_problem, look_up=no_device)
+
+
+class NumbOutput(ClockOutput):
+    """A device that takes frames at the pace of time, like a real one, and makes no sound."""
+
+    def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
+        super().__init__(mixer)
+        self.device, self.latency_s = device, buffer_s
+        self.gone = False
+
+    def lost(self) -> bool:
+        return self.gone
+
+
+@pytest.fixture
+def numb_output() -> type[NumbOutput]:
+    return NumbOutput
 
 
 @pytest.fixture
@@ -57,7 +80,7 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
     window = MainWindow()
     qtbot.addWidget(window)
     settings = Settings(choices=Choices(seconds=0.5))
-    made = Controller(window, settings, tmp_path / "settings.json", make_player)
+    made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     window.show()
     qtbot.waitExposed(window)
     yield made

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from pytestqt.qtbot import QtBot
 
 from app import audio_control
-from app.audio import AudioDevice, AudioProblem, PlayerStatus, ProblemKind
+from app.audio import AudioDevice, AudioProblem, ProblemKind, SoundStatus
 from app.audio.problems import stalled
 from app.audio_control import AudioControl
 from app.main_window import MainWindow
 from app.settings import DeviceChoice, SoundChoice
+from engine.voices import Gap
 
 SPEAKERS = AudioDevice("Speakers", "ALSA", 48_000)
+GAPS = tuple(Gap(0.5 * number, "device", 2.0) for number in range(4))
 WISH = (DeviceChoice(name="Loud", host_api="JACK"), SoundChoice(rate_hz=96_000, buffer=256))
 
 
-class FakePlayer:
+class FakeSound:
     """Notes what it is asked for; the test says what became of it."""
 
     def __init__(self) -> None:
         self.opened: list[tuple[Any, ...]] = []
         self.tones: list[str] = []
-        self.present = PlayerStatus(device=SPEAKERS, underruns=4)
+        self.present = SoundStatus(device=SPEAKERS, gaps=GAPS)
 
     def open(self, *arguments: Any) -> None:
         self.opened.append(arguments)
@@ -33,85 +36,103 @@ class FakePlayer:
     def sound_tone(self, side: str) -> None:
         self.tones.append(side)
 
-    def status(self) -> PlayerStatus:
+    def status(self) -> SoundStatus:
         return self.present
 
 
 @pytest.fixture
-def player() -> FakePlayer:
-    return FakePlayer()
+def output() -> FakeSound:
+    return FakeSound()
 
 
 @pytest.fixture
-def control(qtbot: QtBot, player: FakePlayer, monkeypatch: pytest.MonkeyPatch) -> Iterator[AudioControl]:
+def control(qtbot: QtBot, output: FakeSound, monkeypatch: pytest.MonkeyPatch) -> Iterator[AudioControl]:
     monkeypatch.setattr(audio_control, "output_devices", lambda rescan=False: [SPEAKERS])
     window = MainWindow()
     qtbot.addWidget(window)
-    made = AudioControl(window, player, None, SoundChoice())  # type: ignore[arg-type]
+    made = AudioControl(window, output, None, SoundChoice())  # type: ignore[arg-type]
     made.open()
     yield made
     if made._dialog is not None:
         made._dialog.close()
 
 
-def test_the_first_opening(control: AudioControl, player: FakePlayer) -> None:
-    assert player.opened == [(None, 0.05, 0, 0, False)]
+def show(control: AudioControl, status: SoundStatus, latencies_s: tuple[float, ...] = ()) -> None:
+    control.show(status, SimpleNamespace(latencies_s=latencies_s), None)  # type: ignore[arg-type]
 
 
-def test_a_choice_is_saved_once_it_plays(control: AudioControl, player: FakePlayer) -> None:
+def test_the_first_opening(control: AudioControl, output: FakeSound) -> None:
+    assert output.opened == [(None, 0.012, 0, 0, False)]
+
+
+def test_a_choice_is_saved_once_it_plays(control: AudioControl, output: FakeSound) -> None:
     control.show_dialog()
     assert control._dialog is not None
     control._dialog.choice_made.emit(*WISH)
-    assert player.opened[-1] == (AudioDevice("Loud", "JACK"), 0.05, 96_000, 256, False)
-    control.show(PlayerStatus(device=SPEAKERS, changes_done=1), None)
+    assert output.opened[-1] == (AudioDevice("Loud", "JACK"), 0.012, 96_000, 256, False)
+    show(control, SoundStatus(device=SPEAKERS, changes_done=1))
     assert (control.device, control.sound) == (None, SoundChoice())
-    control.show(PlayerStatus(device=AudioDevice("Loud", "JACK", 96_000), changes_done=2), None)
+    show(control, SoundStatus(device=AudioDevice("Loud", "JACK", 96_000), changes_done=2))
     assert (control.device, control.sound) == WISH
 
 
-def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, player: FakePlayer) -> None:
+def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, output: FakeSound) -> None:
     control.show_dialog()
     assert control._dialog is not None
     control._dialog.choice_made.emit(*WISH)
-    player.present = PlayerStatus(device=SPEAKERS, changes_done=2, problem="It refuses 96000 Hz.")
+    output.present = SoundStatus(device=SPEAKERS, changes_done=2, problem="It refuses 96000 Hz.")
     control.tell(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
-    control.show(player.present, None)
+    show(control, output.present)
     notices = control._window.notices
     assert "“Speakers” plays on" in notices.text
     assert notices.kept[-1][1] == "code"
     assert (control.device, control.sound) == (None, SoundChoice())
     assert "refuses" in control._dialog._problem_label.text()
     control._dialog.rescan_asked.emit()
-    assert player.opened[-1][:4] == player.opened[-2][:4]
-    control.show(PlayerStatus(device=SPEAKERS, changes_done=3), None)
+    assert output.opened[-1][:4] == output.opened[-2][:4]
+    show(control, SoundStatus(device=SPEAKERS, changes_done=3))
     assert notices.text == ""
 
 
-def test_a_stall_is_told_without_a_word_on_what_plays(control: AudioControl, player: FakePlayer) -> None:
+def test_a_stall_is_told_without_a_word_on_what_plays(control: AudioControl, output: FakeSound) -> None:
     control.tell(stalled("Speakers"))
     notices = control._window.notices
     assert "keeps trying" in notices.text
     assert "plays on" not in notices.text
-    control.show(PlayerStatus(device=SPEAKERS), None)
+    show(control, SoundStatus(device=SPEAKERS))
     assert notices.text == ""
 
 
-def test_looking_again_and_the_tone(control: AudioControl, player: FakePlayer) -> None:
+def test_looking_again_and_the_tone(control: AudioControl, output: FakeSound) -> None:
     control.show_dialog()
     assert control._dialog is not None
     control._dialog.rescan_asked.emit()
-    assert player.opened[-1][-1] is True
+    assert output.opened[-1][-1] is True
     control._dialog.tone_asked.emit("left")
-    assert player.tones == ["left"]
+    assert output.tones == ["left"]
 
 
-def test_underruns_count_from_the_reset(control: AudioControl, player: FakePlayer) -> None:
+def test_gaps_count_from_the_reset(control: AudioControl, output: FakeSound) -> None:
     control.show_dialog()
     assert control._dialog is not None
-    counter = control._dialog._underruns
-    assert counter.text() == "4"
-    control._dialog.underruns_reset.emit()
-    control.show(PlayerStatus(device=SPEAKERS, underruns=5), None)
-    assert counter.text() == "1"
-    control.show(PlayerStatus(device=SPEAKERS, underruns=2), None)  # another stream
-    assert counter.text() == "2"
+    counter = control._dialog._gaps
+    assert counter.text() == "4, the last at 1.5 s: device"
+    control._dialog.gaps_reset.emit()
+    show(control, SoundStatus(device=SPEAKERS, gaps=GAPS))
+    assert counter.text() == "0"
+    late = Gap(7.25, "rendering", 0.0)
+    show(control, SoundStatus(device=SPEAKERS, gaps=(*GAPS, late)))
+    assert counter.text() == "1, the last at 7.2 s: rendering"
+    show(control, SoundStatus(device=SPEAKERS, gaps=(GAPS[-1], late)))  # only so many are remembered
+    assert counter.text() == "1, the last at 7.2 s: rendering"
+    show(control, SoundStatus(device=SPEAKERS, gaps=(late,)))
+    assert counter.text() == "1, the last at 7.2 s: rendering"
+
+
+def test_the_latency_that_was_measured_is_told(control: AudioControl) -> None:
+    control.show_dialog()
+    assert control._dialog is not None
+    facts = control._dialog._state_label
+    assert "key to device" not in facts.text()
+    show(control, SoundStatus(device=SPEAKERS, latency_s=0.012), latencies_s=(0.5, 0.004, 0.0031))
+    assert "48 kHz, buffer 12 ms, key to device 4.0 ms (measured)" in facts.text()

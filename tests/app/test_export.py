@@ -26,9 +26,8 @@ from app.export import (
     write_wav,
 )
 from app.recipe import Recipe
-from engine.pluck import FULL_SCALE_M_S
 from app.wav_chunks import Marker, read_markers
-from engine.pluck import Pluck
+from engine.pluck import FULL_SCALE_M_S, Pluck
 from engine.preset import load_preset
 from engine.sine_transform import listening_weights
 from engine.sources import FULL_SCALE_M, ModelSource, StringSource, TruthSource, project

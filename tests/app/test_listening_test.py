@@ -1,33 +1,27 @@
-"""The listening test in the window: it has the player for itself, nothing behind it tells, and all is restored."""
+"""The listening test in the window: it has the sound for itself, nothing behind it tells, and all is restored."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.audio import AudioDevice, Player
-from app.audio.silent import SilentOutput
+from app.audio import AudioDevice, Sound
+from app.audio.output import Output
 from app.controller import Controller
 from app.main_window import MainWindow
 from app.session import Choices
 from app.settings import AbxChoices, Settings, load_settings
 from app.views.abx_dialog import AbxDialog
+from engine.voices import Mixer
+
+Open = Callable[[AudioDevice, float, Mixer], Output]
 
 
-def numb_player(on_problem: object) -> Player:
-    """With a device that makes no sound."""
-    device = AudioDevice("Headphones", "Test API", 48_000)
-
-    def open_output(*_: object) -> SilentOutput:
-        output = SilentOutput(48_000)
-        output.device = device
-        return output
-
-    return Player(look_up=lambda *_: device, open_output=open_output)
+HEADPHONES = AudioDevice("Headphones", "Test API", 48_000)
 
 
 @pytest.fixture
@@ -40,11 +34,15 @@ def window(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[MainWi
 
 
 @pytest.fixture
-def heard(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> Controller:
-    """A controller whose pluck is rendered."""
+def heard(qtbot: QtBot, window: MainWindow, tmp_path: Path, numb_output: Open) -> Controller:
+    """A controller whose pluck is rendered, with a device that makes no sound."""
+
+    def make_sound(on_problem: object) -> Sound:
+        return Sound(look_up=lambda *_: HEADPHONES, open_output=numb_output)
+
     abx = AbxChoices(trials=2, folder=str(tmp_path / "records"))
     settings = Settings(choices=Choices(seconds=0.5, volume_db=-6), abx=abx)
-    made = Controller(window, settings, tmp_path / "settings.json", numb_player)
+    made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     qtbot.waitUntil(lambda: "error of this pluck" in window.error_label.text(), timeout=20_000)
     return made
 
@@ -57,6 +55,11 @@ def open_test(qtbot: QtBot, controller: Controller) -> AbxDialog:
     return dialog
 
 
+def sounds(controller: Controller) -> bool:
+    """Whether the mixer has a voice that is not silent."""
+    return any(voice.sounding for voice in controller.sound.mixer.voices)
+
+
 def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> None:
     window = heard.window
     heard.pluck()
@@ -67,7 +70,7 @@ def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> 
     before = heard.session.choices
     for key in (Qt.Key.Key_X, Qt.Key.Key_A, Qt.Key.Key_B, Qt.Key.Key_X):
         qtbot.keyClick(dialog._trial, key)
-        qtbot.waitUntil(lambda: heard.player.status().playing, timeout=5_000)
+        qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
         heard._tick()
         assert window.transport.meter._peak_db == -60
         assert not window.transport.meter.limit_light
@@ -75,27 +78,33 @@ def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> 
     dialog.abandon()
 
 
-def test_the_player_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:
+def test_the_sound_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:
+    heard.pluck()
+    qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
     dialog = open_test(qtbot, heard)
+    assert not heard.performance.playing
+    qtbot.waitUntil(lambda: not sounds(heard), timeout=5_000)
     dialog._setup.audition_asked.emit("B")
-    qtbot.waitUntil(lambda: heard.player.status().source == "B", timeout=5_000)
+    qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
     dialog._setup._trials.setValue(25)
     qtbot.keyClick(dialog, Qt.Key.Key_Escape)
-    qtbot.waitUntil(lambda: heard.player.status().source == "model", timeout=5_000)
-    assert not heard.player.status().playing
+    qtbot.waitUntil(lambda: not sounds(heard), timeout=5_000)
     heard.pluck()
-    qtbot.waitUntil(lambda: heard.player.status().position_s > 0.3, timeout=5_000)
-    qtbot.waitUntil(lambda: not heard.player.status().playing, timeout=5_000)  # the loop is off again
+    qtbot.waitUntil(lambda: heard.performance.position_s > 0.3, timeout=5_000)
     heard.window.close()
     assert load_settings(tmp_path / "settings.json")[0].abx.trials == 25
 
 
-def test_a_new_sound_meanwhile_goes_to_the_test(qtbot: QtBot, heard: Controller) -> None:
+def test_instruments_are_silent_meanwhile_and_the_test_keeps_its_pluck(qtbot: QtBot, heard: Controller) -> None:
     dialog = open_test(qtbot, heard)
-    first = dialog._stimuli
-    heard.session.update(listen=0.6)
-    qtbot.waitUntil(lambda: dialog._stimuli not in (None, first), timeout=10_000)
-    assert heard.player.status().source != "model"
+    heard.instruments.perform({"position": 0.6, "amplitude_mm": 8.0}, True)  # a MIDI keyboard
+    qtbot.waitUntil(lambda: heard.session.choices.position == 0.6, timeout=5_000)
+    assert not heard.performance.playing
+    assert not sounds(heard)
+    first, model = dialog._stimuli, dialog._rendering.result()["model"]
+    assert first is not None
+    dialog._ask_for_sound()  # as after a change of the device's rate
+    assert (dialog._rendering.result(20)["model"] == model).all()
     dialog.abandon()
 
 
@@ -109,8 +118,8 @@ def test_closing_the_window_keeps_an_incomplete_record(qtbot: QtBot, heard: Cont
     assert '"complete": false' in path.read_text()
 
 
-def test_without_a_sound_it_is_not_opened(qtbot: QtBot, heard: Controller) -> None:
+def test_it_waits_for_no_picture(qtbot: QtBot, heard: Controller) -> None:
     heard.session.update(preset="second")
-    heard.window.abx_asked.emit()
-    assert heard.window.findChild(AbxDialog) is None
-    assert "wait until the pluck is rendered" in heard.window.notices.text
+    dialog = open_test(qtbot, heard)
+    assert [candidate.label for candidate in dialog._setup.pair]
+    dialog.abandon()

@@ -52,7 +52,7 @@ def walk(window: MainWindow, start: QWidget) -> list[QWidget]:
 
 def test_the_window_shows_without_the_engine() -> None:
     code = (
-        "import sys, app.main, app.main_window, app.appearance, app.audio_control\n"
+        "import sys, app.main, app.main_window, app.appearance\n"
         "assert not {'torch', 'scipy', 'numba', 'pyqtgraph'} & set(sys.modules), 'too much'"
     )
     if sys.platform != "win32":  # there torch must come before Qt

@@ -84,20 +84,54 @@ def backend() -> FakeBackend:
     return FakeBackend()
 
 
+Played = list[tuple[dict[str, Any], threading.Thread]]
+
+
 @pytest.fixture
-def midi(qtbot: QtBot, backend: FakeBackend) -> MidiControl:
-    choices = MidiChoices(port="Keys:Keys 9:0")
-    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: ["a", "b"], None, lambda: backend)
+def played() -> Played:
+    """Notes, and the threads that they were played in."""
+    return []
 
 
-def test_messages_reach_the_windows_thread(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+def control(choices: MidiChoices, presets: list[str], played: Played, load: Callable[[], FakeBackend]) -> MidiControl:
+    def play(changes: dict[str, Any]) -> None:
+        played.append((changes, threading.current_thread()))
+
+    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: presets, play, load=load)
+
+
+@pytest.fixture
+def midi(qtbot: QtBot, backend: FakeBackend, played: Played) -> MidiControl:
+    return control(MidiChoices(port="Keys:Keys 9:0"), ["a", "b"], played, lambda: backend)
+
+
+def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
+    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, played: Played
+) -> None:
+    """The window may be busy with anything; it hears nothing of it here."""
     midi.start()
-    threads = []
-    midi.performed.connect(lambda changes, plucks: threads.append(threading.current_thread()))
-    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+    with qtbot.assertNotEmitted(midi.performed, wait=50):
         backend.send("note_on", note=96, velocity=127)
-    assert performed.args == [{"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}, True]
+        ((changes, thread),) = played
+        assert changes == {"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}
+        assert thread is not threading.main_thread()
+        backend.send("note_on", note=96, velocity=0)  # a key is let go
+        backend.send("note_off", note=96, velocity=64)
+    assert len(played) == 1
+
+
+def test_controllers_reach_the_windows_thread(
+    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, played: Played
+) -> None:
+    midi.start()
+    midi._remember(midi.choices.learned("width", 74))
+    threads = []
+    midi.performed.connect(lambda changes: threads.append(threading.current_thread()))
+    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+        backend.send("control_change", control=74, value=0)
+    assert performed.args == [{"width": pytest.approx(0.02)}]
     assert threads == [threading.main_thread()]
+    assert played == []
 
 
 def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
@@ -118,7 +152,7 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     assert taught.text() == "Controller 74"
     with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
         backend.send("control_change", control=74, value=0)
-    assert performed.args == [{"width": pytest.approx(0.02)}, False]
+    assert performed.args == [{"width": pytest.approx(0.02)}]
     qtbot.mouseClick(forget, Qt.MouseButton.LeftButton)
     assert midi.choices.controllers == {}
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
@@ -136,7 +170,7 @@ def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
             raise MidiUnavailable("Get them with: pip install mido python-rtmidi")
         return FakeBackend()
 
-    midi = MidiControl(MidiChoices(), lambda: Reach((0.3, 0.7), (1, 10)), lambda: [], None, load)
+    midi = control(MidiChoices(), [], [], load)
     midi.show_dialog(window)
     dialog = midi._dialog
     assert dialog is not None

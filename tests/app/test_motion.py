@@ -6,8 +6,9 @@ import torch
 
 from app.analysis.heard import HeardMotion
 from app.motion import Envelope, Strobe, frame_at
-from app.rendering import DIFFERENCE, Take
+from app.rendering import Take
 from app.rendering.take import Motion
+from app.sound_names import DIFFERENCE
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
 from engine.string import StringParameters

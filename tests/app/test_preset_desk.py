@@ -43,7 +43,7 @@ def test_arrows_load_from_the_search_and_enter_closes(
     qtbot.keyClick(browser.search, KEY.Key_Down)
     assert controller.session.choices.preset == "second"
     assert browser.isVisible()
-    assert not controller.player.status().playing
+    assert not controller.performance.playing
     qtbot.keyClick(browser.search, KEY.Key_Down)
     assert controller.session.choices.preset == "second"
     qtbot.keyClick(browser.list, KEY.Key_Up)
@@ -56,7 +56,7 @@ def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller
     qtbot.keyClick(browser.search, KEY.Key_Space)
     assert browser.isVisible()
     assert browser.search.text() == ""
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
 
 
 def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from app.analysis.heard import HeardMotion, HeardSignal
-from app.rendering import DIFFERENCE, Take
-from engine.voices import Ear
+from app.rendering import Take
 from app.rendering.take import Motion
 from app.rendering.velocity import Differentiator
+from app.sound_names import DIFFERENCE
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
 from engine.string import StringParameters
+from engine.voices import Ear
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,
                   TrainedRange(None, None, (1e-3, 1e-2)), "paper", 0)  # fmt: skip

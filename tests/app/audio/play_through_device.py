@@ -15,9 +15,9 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from app.audio.stream import OutputStream
 
 from app.audio import AudioProblem, Player, Track
-from app.audio.stream import OutputStream
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:

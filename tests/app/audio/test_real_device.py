@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from app.audio.stream import BLOCK_FRAMES
 
 import app
 from app.audio import AudioUnavailable, Mixer, Track, output_devices
-from app.audio.stream import BLOCK_FRAMES
 
 RATE_HZ = 44_100  # what PortAudio calls the default rate of an ALSA plugin
 SECONDS = 2.0

@@ -52,7 +52,7 @@ def test_a_click_plucks_there(qtbot: QtBot, controller: Controller, shown: Any) 
     assert choices.amplitude_mm == pytest.approx(8, rel=0.05)
     qtbot.waitUntil(lambda: shown.map._present == (choices.position, choices.amplitude_mm))
     assert choices.position == round(choices.position, 3)  # no more digits than can be read
-    qtbot.waitUntil(lambda: controller.player.status().playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
 
 
 def test_arrows_move_a_cursor_and_enter_plucks(qtbot: QtBot, controller: Controller, shown: Any) -> None:

@@ -29,13 +29,13 @@ from app.panels import (
 )
 from app.panels.spectrum import EVERY
 from app.rendering import Take
-from engine.voices import Ear
 from app.rendering.take import Motion
 from app.session import Choices, Session
 from app.shown import ShownSource
 from app.views.space_time_view import AUTO
 from engine.pluck import Pluck
 from engine.preset import read_info
+from engine.voices import Ear
 
 LEFT = Qt.MouseButton.LeftButton
 FRAMES = 4001  # a second
@@ -455,7 +455,7 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
             timeout=20_000,
         )
         plots[1].seek_asked.emit(0.1)
-        qtbot.waitUntil(lambda: controller.player.status().position_s < 0.2, timeout=5_000)
+        qtbot.waitUntil(lambda: controller.performance.position_s < 0.2, timeout=5_000)
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from engine.voices import Ear
 from app.rendering.velocity import REACH_FRAMES, Differentiator
 from engine.sine_transform import listening_weights, to_grid
+from engine.voices import Ear
 
 POINTS = 101
 

@@ -20,11 +20,10 @@ from app.rendering import job as job_module
 from app.rendering import worker as worker_module
 from app.rendering.line import Line
 from app.rendering.velocity import Differentiator
-from engine.pluck import FULL_SCALE_M_S
 from engine.metrics import ErrorSums
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
-from engine.pluck import Pluck
+from engine.pluck import FULL_SCALE_M_S, Pluck
 from engine.preset import load_preset
 from engine.sources import FULL_SCALE_M
 

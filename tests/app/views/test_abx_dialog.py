@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
@@ -15,10 +17,12 @@ from app.abx.record import AbxRecord, HeardPluck, load_record
 from app.abx.sound import Candidate
 from app.abx.subject import Subject
 from app.abx.trials import draw_order
-from app.audio import AudioDevice, Player, Track
-from app.audio.silent import SilentOutput
+from app.audio import AudioDevice, Sound
+from app.audio.output import Output
 from app.settings import AbxChoices
 from app.views.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
+from engine.kernels import layout as at
+from engine.voices import Mixer
 
 RATE_HZ = 48_000
 FRAMES = 4800
@@ -26,55 +30,44 @@ HEADPHONES = AudioDevice("Headphones", "Test API", RATE_HZ)
 PLUCK = HeardPluck(position=0.4, amplitude_mm=4, shape="gaussian", width=0.06, listen=0.37, seconds=0.1)
 CANDIDATES = tuple(Candidate(name, name.capitalize(), "small", "0f" * 32) for name in ("model", "truth"))
 Open = Callable[..., AbxDialog]
-
-
-class NumbOutput(SilentOutput):
-    """A device that takes its time and makes no sound."""
-
-    def __init__(self, device: AudioDevice, _buffer_s: float) -> None:
-        super().__init__(device.default_rate_hz)
-        self.device = device
-        self.gone = False
-
-    def lost(self) -> bool:
-        return self.gone
+Sounds = Mapping[str, NDArray[np.float32]]
 
 
 @pytest.fixture
-def outputs() -> list[NumbOutput]:
-    return []
-
-
-@pytest.fixture
-def player(outputs: list[NumbOutput], qtbot: QtBot) -> Iterator[Player]:
-    def open_output(device: AudioDevice, buffer_s: float) -> NumbOutput:
-        outputs.append(NumbOutput(device, buffer_s))
-        return outputs[-1]
-
-    with Player(look_up=lambda *_: HEADPHONES, open_output=open_output) as made:
+def sound(numb_output: Callable[[AudioDevice, float, Mixer], Output], qtbot: QtBot) -> Iterator[Sound]:
+    with Sound(look_up=lambda *_: HEADPHONES, open_output=numb_output) as made:
         made.open()
         qtbot.waitUntil(lambda: made.status().device is not None)
         yield made
 
 
-def track_of(model_hz: float = 401.0, truth_hz: float = 400.0) -> Track:
-    track = Track(RATE_HZ, FRAMES, ("model", "truth"))
-    time_s = np.arange(FRAMES) / RATE_HZ
-    track.append({"model": 0.2 * np.sin(6.28 * model_hz * time_s), "truth": 0.3 * np.sin(6.28 * truth_hz * time_s)})
-    return track
+def sounds_of(model_hz: float = 401.0, truth_hz: float = 400.0) -> Sounds:
+    time_s = np.arange(FRAMES)[:, None] / RATE_HZ
+    sounds = {"model": 0.2 * np.sin(6.28 * model_hz * time_s), "truth": 0.3 * np.sin(6.28 * truth_hz * time_s)}
+    return {source: samples.astype(np.float32) for source, samples in sounds.items()}
+
+
+def done(sounds: Sounds) -> Future[Sounds]:
+    rendered: Future[Sounds] = Future()
+    rendered.set_result(sounds)
+    return rendered
 
 
 @pytest.fixture
-def open_dialog(qtbot: QtBot, player: Player, tmp_path: Path) -> Open:
+def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
     def open_dialog(
-        seed: int = 1, trials: int = 3, track: Track | None = None, through: Player = player
+        seed: int = 1, trials: int = 3, rendered: Future[Sounds] | None = None, through: Sound = sound
     ) -> AbxDialog:
         choices = AbxChoices(trials=trials, folder=str(tmp_path / "records"))
-        dialog = AbxDialog(through, Subject(CANDIDATES, PLUCK, 0.0), choices, seed=lambda: seed)
+        rendering = rendered or done(sounds_of())
+        dialog = AbxDialog(
+            through, Subject(CANDIDATES, PLUCK, 0.0), choices, lambda rate_hz: rendering, seed=lambda: seed
+        )
         qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
-        dialog.set_track(track or track_of())
         dialog.open()
         qtbot.waitExposed(dialog)
+        if rendered is None and through is sound:
+            qtbot.waitUntil(dialog._setup.start.isEnabled)
         return dialog
 
     return open_dialog
@@ -125,12 +118,18 @@ def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Pat
 
 
 @pytest.mark.parametrize("key", ["a", "b", "x"])
-def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, player: Player, key: str) -> None:
+def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, sound: Sound, key: str) -> None:
     dialog = open_dialog(seed=2)
     start(dialog)
     assert draw_order(2, 3)[0] == "B"
     press(qtbot, dialog, "a" if key != "a" else "b", key)
-    qtbot.waitUntil(lambda: player.status().playing and player.status().source == ("A" if key == "a" else "B"))
+    assert dialog._pair is not None
+    voices = dialog._pair._voices
+    qtbot.waitUntil(lambda: all(voice.sounding for voice in voices.values()))
+    assert {name: voice.memory[at.WANTED_GAIN] for name, voice in voices.items()} == (
+        {"A": 1.0, "B": 0.0} if key == "a" else {"A": 0.0, "B": 1.0}
+    )
+    assert len({voice.began_frame for voice in voices.values()}) == 1
 
 
 def test_x_must_be_heard_before_it_is_judged(qtbot: QtBot, open_dialog: Open) -> None:
@@ -185,44 +184,70 @@ def test_a_test_that_is_stopped_is_incomplete(
     assert not dialog.isVisible()
 
 
-def test_a_device_that_vanishes_ends_the_test(
-    qtbot: QtBot, open_dialog: Open, player: Player, outputs: list[NumbOutput], tmp_path: Path
-) -> None:
+def test_a_device_that_vanishes_ends_the_test(qtbot: QtBot, open_dialog: Open, sound: Sound, tmp_path: Path) -> None:
     dialog = open_dialog()
     start(dialog)
     press(qtbot, dialog, "x", "1", "x")
     other = AudioDevice("Loudspeaker", "Test API", RATE_HZ)
-    player._look_up = lambda *_: other
-    player.open(other)
+    sound._look_up = lambda *_: other
+    sound.open(other)
     qtbot.waitUntil(lambda: not dialog.testing)
     assert saved(tmp_path).remark == DEVICE_CHANGED
     assert saved(tmp_path).through.device == "Headphones"
 
 
 def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> None:
-    with Player() as silent:
+    with Sound() as silent:
         dialog = open_dialog(through=silent)
+        qtbot.waitUntil(lambda: NO_DEVICE in texts(dialog))
         assert not dialog._setup.start.isEnabled()
-        assert NO_DEVICE in texts(dialog)
 
 
 @pytest.mark.parametrize(("model_hz", "message", "can_start"), [(400.0, SAME, False), (900.0, TRIVIAL, True)])
-def test_a_test_without_a_point_is_told(open_dialog: Open, model_hz: float, message: str, can_start: bool) -> None:
-    track = Track(RATE_HZ, FRAMES, ("model", "truth"))
-    sounds = track_of(model_hz)
-    for_model = sounds.read("model" if model_hz != 400 else "truth", 0, FRAMES)
-    track.append({"model": for_model, "truth": sounds.read("truth", 0, FRAMES)})
-    dialog = open_dialog(track=track)
-    assert message in texts(dialog)
+def test_a_test_without_a_point_is_told(
+    qtbot: QtBot, open_dialog: Open, model_hz: float, message: str, can_start: bool
+) -> None:
+    sounds = sounds_of(model_hz)
+    if model_hz == 400:
+        sounds = dict.fromkeys(sounds, sounds["truth"])
+    dialog = open_dialog(rendered=done(sounds))
+    qtbot.waitUntil(lambda: message in texts(dialog))
     assert dialog._setup.start.isEnabled() == can_start
 
 
-def test_a_growing_sound_is_waited_for(qtbot: QtBot, open_dialog: Open) -> None:
-    growing, done = Track(RATE_HZ, FRAMES, ("model", "truth")), track_of()
-    dialog = open_dialog(track=growing)
-    assert "still being rendered" in texts(dialog)
-    growing.append({name: done.read(name, 0, FRAMES) for name in done.sources})
+def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open) -> None:
+    rendered: Future[Sounds] = Future()
+    dialog = open_dialog(rendered=rendered)
+    qtbot.waitUntil(lambda: "still being rendered" in texts(dialog))
+    rendered.set_result(sounds_of())
     qtbot.waitUntil(dialog._setup.start.isEnabled)
+
+
+def test_a_sound_that_cannot_be_rendered_is_told(qtbot: QtBot, open_dialog: Open) -> None:
+    rendered: Future[Sounds] = Future()
+    rendered.set_exception(RuntimeError("the model's output runs away 0.1 s after the pluck"))
+    dialog = open_dialog(rendered=rendered)
+    qtbot.waitUntil(lambda: "runs away" in texts(dialog))
+    assert not dialog._setup.start.isEnabled()
+
+
+def test_at_another_rate_of_the_device_it_is_rendered_anew(qtbot: QtBot, sound: Sound, tmp_path: Path) -> None:
+    asked: list[int] = []
+
+    def render(rate_hz: int) -> Future[Sounds]:
+        asked.append(rate_hz)
+        return done(sounds_of())
+
+    dialog = AbxDialog(sound, Subject(CANDIDATES, PLUCK, 0.0), AbxChoices(folder=str(tmp_path)), render)
+    qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
+    dialog.open()
+    for rate_hz, channels in ((44_100, 2), (44_100, 1)):
+        other = AudioDevice("Loudspeaker", "Test API", rate_hz, channels)
+        sound._look_up = lambda *_, other=other: other  # type: ignore[misc]
+        sound.open(other)
+        qtbot.waitUntil(lambda channels=channels: sound.mixer.channels == channels and sound.rate_hz == 44_100)
+        qtbot.waitUntil(lambda: dialog._pair is not None and dialog._pair.mixer is sound.mixer)
+    assert asked == [RATE_HZ, 44_100]
 
 
 def test_a_record_that_cannot_be_written_is_told_and_saved_elsewhere(

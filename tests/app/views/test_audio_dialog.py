@@ -11,8 +11,9 @@ from app.settings import DeviceChoice, SoundChoice
 from app.views.audio_dialog import AudioDialog, AudioState
 
 LOUD, SOFT = DeviceChoice(name="Loud", host_api="ALSA"), DeviceChoice(name="Soft", host_api="JACK")
-PLAYING = AudioState("“Loud” (ALSA)", "48 kHz, latency 12 ms", "", 3)
-SILENT = AudioState("", "", "It is in use by another program.", 0)
+GAPS = ("1.2 s: device", "3.4 s: rendering", "5.6 s: runaway")
+PLAYING = AudioState("“Loud” (ALSA)", "48 kHz, buffer 12 ms", "", GAPS, 0.254)
+SILENT = AudioState("", "", "It is in use by another program.", (), 0.0)
 
 
 @pytest.fixture
@@ -59,11 +60,21 @@ def test_a_fault_is_told_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDial
         button(dialog, "Look again").click()
 
 
+def test_gaps_are_told_with_time_and_cause_and_the_load_as_a_share(dialog: AudioDialog) -> None:
+    dialog.show_state(PLAYING)
+    assert dialog._gaps.text() == "3, the last at 5.6 s: runaway"
+    assert all(gap in dialog._gaps.toolTip() for gap in GAPS)
+    assert dialog._load.text() == "25 %"
+    assert "buffer 12 ms" in dialog._state_label.text()
+    dialog.show_state(SILENT)
+    assert dialog._gaps.text() == "0"
+    assert GAPS[0] not in dialog._gaps.toolTip()
+
+
 def test_the_tone_and_the_counter(qtbot: QtBot, dialog: AudioDialog) -> None:
     dialog.show_state(PLAYING)
-    assert dialog._underruns.text() == "3"
     with qtbot.waitSignal(dialog.tone_asked) as asked:
         button(dialog, "Right").click()
     assert asked.args == ["right"]
-    with qtbot.waitSignal(dialog.underruns_reset):
+    with qtbot.waitSignal(dialog.gaps_reset):
         button(dialog, "Reset").click()
