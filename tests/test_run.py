@@ -146,7 +146,7 @@ def test_kernels_that_were_not_compiled_are_compiled_at_the_next_start(run, monk
 
     run.COMPILED.unlink()
     monkeypatch.setattr(run, "run_step", failing)
-    with pytest.raises(run.SetupError, match="delete .venv"):
+    with pytest.raises(run.SetupError, match=r"delete \.venv"):
         run.prepare("start", True)
     assert not run.compiled()
 

@@ -1,16 +1,18 @@
-"""A restless user for minutes: plucks and changes of everything, and whether the app bears it.
+"""A restless user, or one who plays without a pause, for minutes; and whether the app bears it.
 
-Everything happens as by a user's hands, through session and controller, with a pretended device that asks for sound
-at its pace. What is random follows from the seed; how far the rendering of each pluck gets depends on the machine.
+Everything happens as by a user's hands, through window, session and controller. The sound goes through PortAudio into
+a private sound card; all that it was given is recorded, by a process of its own, and looked at for holes. What is
+random follows from the seed.
 
-After each minute the user rests on the same short pluck, and the process is weighed: in between, takes of up to
-hundreds of MiB come and go with what is chosen.
+The restless user rests after each minute on the same short pluck, and the process is weighed: in between, motions of
+up to hundreds of MiB come and go with what is chosen. Who plays does not rest but at the beginning and at the end.
 """
 
 from __future__ import annotations
 
 import gc
 import sys
+import tempfile
 import threading
 import time
 import traceback
@@ -19,23 +21,41 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from random import Random
 from types import TracebackType
 
+import numpy as np
 import psutil
-from PySide6.QtCore import QMessageLogContext, QObject, QTimer, QtMsgType, qInstallMessageHandler
+from PySide6.QtCore import (
+    QCoreApplication,
+    QEvent,
+    QMessageLogContext,
+    QObject,
+    Qt,
+    QTimer,
+    QtMsgType,
+    Signal,
+    qInstallMessageHandler,
+)
+from PySide6.QtGui import QKeyEvent, QKeySequence
 
 from app.bench.machine import Machine
-from app.bench.pretended_device import PretendedCard
+from app.bench.play import analysis, hands
+from app.bench.play.children import Missing, need_programs
+from app.bench.play.recording import recording_aside
+from app.bench.play.sound_server import RATE_HZ, sound_server
 from app.bench.random_changes import Repertoire, random_change
 from app.bench.stage import Stage, opened
+from app.main_window import MainWindow
 from app.panels.rack import LEFT, RIGHT
 from app.session import Choices
-from app.settings import Settings
+from app.settings import Settings, SoundChoice
 
-BLOCK_FRAMES = 512
+PROGRAMS = ("pulseaudio", "pacat", "parec")
 SIZE = (1280, 800)
 EVERY_S = 0.5
+RATE_OF_PLAYING_HZ = 12.0
 LOOK_EVERY_S = 0.02
 WEIGH_EVERY_S = 1.0
 PART_S = 60.0  # between two rests; in the first, every kind of thing is loaded once, and caches are filled
@@ -46,13 +66,33 @@ MIB = 2**20
 
 
 @dataclass(frozen=True)
+class Holes:
+    """What the recording and the app itself tell of silences that nobody asked for.
+
+    Attributes:
+        heard: in the recording: of one who plays all silences, of a restless user those that begin or end at once.
+        heard_ms, longest_ms: of them together, and of the longest.
+        heard_at_s: since the recording began.
+        told: by the app's mixer, by cause; of very many the latest.
+    """
+
+    seconds: float
+    heard: int
+    heard_ms: float
+    longest_ms: float
+    heard_at_s: tuple[float, ...]
+    told: dict[str, int]
+
+    @property
+    def a_minute(self) -> float:
+        return 60 * self.heard / self.seconds
+
+
+@dataclass(frozen=True)
 class Soak:
     """What came of it.
 
     Attributes:
-        underruns: blocks that were not ready when the device asked.
-        late_callbacks: the device itself was held up by more than a block: not seen as underruns.
-        waited_share: of the time in which rendering lagged behind what was to be heard.
         longest_stall_s: for which the window did nothing.
         at_rest_mib: resident memory at each rest.
         settled_mib, end_mib: at the first and at the last.
@@ -67,12 +107,11 @@ class Soak:
     machine: Machine
     platform: str
     seed: int
+    playing: bool
     seconds: float
     plucks: int
     changes: int
-    underruns: int
-    late_callbacks: int
-    waited_share: float
+    holes: Holes
     longest_stall_s: float
     at_rest_mib: tuple[float, ...]
     settled_mib: float
@@ -84,36 +123,46 @@ class Soak:
     notices: tuple[tuple[str, int], ...]
 
 
-def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soak:
-    """The window for so long, then closed."""
+def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str], None]) -> Soak:
+    """The window for so long, then closed. `playing`: without a pause, instead of restlessly.
+
+    Raises:
+        Missing: a program is not there, or the app does not play into the private sound card.
+    """
+    need_programs(*PROGRAMS)
     threads_before = set(threading.enumerate())
-    machine = Machine.here()
-    with collected_faults() as faults, opened(Settings(), card := PretendedCard(BLOCK_FRAMES), SIZE) as stage:
-        user = _User(stage, Random(seed))
-        watch = _Watch(stage, seconds, report)
-        underruns, late = _underruns(card)
-        parts = max(2, round(seconds / PART_S))
-        at_rest_mib = []
-        for _ in range(parts):
-            user.go_on()
-            stage.run_for(seconds / parts)
-            user.stop()
-            at_rest_mib.append(_weighed_at_rest(stage))
-        watch.stop()
-        underruns_after, late_after = _underruns(card)
-        notices, platform = stage.window.notices.notices, stage.platform
-        faults.update({notice.details: notice.times for notice in notices if "Traceback" in notice.details})
+    settings = Settings(sound=SoundChoice(rate_hz=RATE_HZ))
+    random = Random(seed)
+    with tempfile.TemporaryDirectory(prefix="soak") as folder, sound_server(Path(folder)) as server, server.adopted():
+        file = Path(folder) / "recording"
+        with collected_faults() as faults, opened(settings, SIZE) as stage:
+            if stage.controller.sound.status().device is None:
+                raise Missing(f"the app plays no sound ({stage.window.notices.text}); install libasound2-plugins")
+            at_rest_mib = [_weighed_at_rest(stage)] if playing else []
+            watch = _Watch(stage, seconds, report)
+            gaps_before = len(stage.controller.sound.status().gaps)
+            with recording_aside(server, file):
+                if playing:
+                    changes, plucks = 0, _play(stage, random, seconds)
+                else:
+                    changes, plucks = _be_restless(stage, random, seconds, at_rest_mib)
+                gaps = stage.controller.sound.status().gaps[gaps_before:]
+            watch.stop()
+            if playing:
+                at_rest_mib.append(_weighed_at_rest(stage))
+            notices, platform = stage.window.notices.notices, stage.platform
+            faults.update({notice.details: notice.times for notice in notices if "Traceback" in notice.details})
+        holes = _holes(file, playing, Counter(gap.cause for gap in gaps))
     left = [thread.name for thread in threading.enumerate() if thread not in threads_before]
     return Soak(
-        machine,
+        Machine.here(),
         platform,
         seed,
+        playing,
         seconds,
-        user.plucks,
-        user.changes,
-        underruns_after - underruns,
-        late_after - late,
-        watch.waiting / max(1, watch.looks),
+        plucks,
+        changes,
+        holes,
         watch.longest_stall_s,
         tuple(at_rest_mib),
         at_rest_mib[0],
@@ -124,6 +173,65 @@ def soak(seconds: float, seed: int, report: Callable[[float, str], None]) -> Soa
         tuple(faults.items()),
         tuple((notice.message, notice.times) for notice in notices),
     )
+
+
+def _holes(file: Path, playing: bool, told: Counter[str]) -> Holes:
+    sound = np.memmap(file, np.float32, "r", shape=(file.stat().st_size // 4,))
+    found = [silence for silence in analysis.silences(sound, RATE_HZ) if playing or silence.sharp]
+    lengths_ms = [1000 * silence.frames / RATE_HZ for silence in found]
+    return Holes(
+        len(sound) / RATE_HZ,
+        len(found),
+        sum(lengths_ms),
+        max(lengths_ms, default=0.0),
+        tuple(round(silence.start / RATE_HZ, 3) for silence in found),
+        dict(told),
+    )
+
+
+def _play(stage: Stage, random: Random, seconds: float) -> int:
+    """Presses keys from another thread, as they come from outside; returns how many."""
+    steps_s = hands.steady(random, RATE_OF_PLAYING_HZ, seconds)
+    thread = threading.Thread(target=hands.play, args=(_Keys(stage.window), random, steps_s), name="hands")
+    thread.start()
+    stage.wait_for(lambda: not thread.is_alive(), "the end of playing", seconds)
+    stage.run_for(analysis.SOUNDS_S)
+    return len(steps_s)
+
+
+class _Keys(QObject):
+    """A keyboard for another thread, whose keys come to the window by Qt's queue."""
+
+    _pressed = Signal(str, bool)
+
+    def __init__(self, window: MainWindow) -> None:
+        super().__init__(window)
+        self._window = window
+        self._pressed.connect(self._send, Qt.ConnectionType.QueuedConnection)
+
+    def key(self, name: str, down: bool) -> float:
+        """By the name of its sign; returns when it was sent."""
+        now_s = time.monotonic()
+        self._pressed.emit({"semicolon": ";"}.get(name, name), down)
+        return now_s
+
+    def _send(self, sign: str, down: bool) -> None:
+        kind = QEvent.Type.KeyPress if down else QEvent.Type.KeyRelease
+        key = Qt.Key(QKeySequence(sign)[0].key())
+        event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, sign)
+        QCoreApplication.sendEvent(self._window.focusWidget() or self._window, event)
+
+
+def _be_restless(stage: Stage, random: Random, seconds: float, at_rest_mib: list[float]) -> tuple[int, int]:
+    """Returns how many changes and plucks there were, and adds what the process weighs at each rest."""
+    user = _User(stage, random)
+    parts = max(2, round(seconds / PART_S))
+    for _ in range(parts):
+        user.go_on()
+        stage.run_for(seconds / parts)
+        user.stop()
+        at_rest_mib.append(_weighed_at_rest(stage))
+    return user.changes, user.plucks
 
 
 class _User(QObject):
@@ -156,7 +264,7 @@ class _User(QObject):
         self.plucks += 1
         stage.window.pluck_asked.emit()
         if random.random() < 0.2:
-            stage.controller.player.seek(random.uniform(0, session.choices.seconds))
+            stage.controller.performance.seek(random.uniform(0, session.choices.seconds))
         if random.random() < 0.05:
             stage.window.play_asked.emit()  # stops it
         if random.random() < 0.1:
@@ -164,14 +272,13 @@ class _User(QObject):
 
 
 class _Watch(QObject):
-    """Looks at the player and at the window's own pace often, at memory every second."""
+    """Looks at the window's own pace often, at memory every second."""
 
     def __init__(self, stage: Stage, seconds: float, report: Callable[[float, str], None]) -> None:
         super().__init__(stage.window)
-        self.looks = self.waiting = 0
         self.longest_stall_s = 0.0
         self.peak_mib = 0.0
-        self._stage, self._seconds, self._report = stage, seconds, report
+        self._seconds, self._report = seconds, report
         self._begun_s = self._looked_s = self._weighed_s = time.monotonic()
         self._timer = QTimer(self, interval=round(1000 * LOOK_EVERY_S))
         self._timer.timeout.connect(self._look)
@@ -184,8 +291,6 @@ class _Watch(QObject):
         now_s = time.monotonic()
         self.longest_stall_s = max(self.longest_stall_s, now_s - self._looked_s - LOOK_EVERY_S)
         self._looked_s = now_s
-        self.looks += 1
-        self.waiting += self._stage.controller.player.status().waiting
         if now_s - self._weighed_s >= min(WEIGH_EVERY_S, self._seconds / 10):
             self._weighed_s, weight_mib = now_s, _resident_mib()
             self.peak_mib = max(self.peak_mib, weight_mib)
@@ -198,12 +303,11 @@ def _weighed_at_rest(stage: Stage) -> float:
     session = stage.controller.session
     before = session.choices
     rest = Choices(preset=stage.controller.library.entries[0].name, seconds=REST_PLUCK_S)
-    stage.controller.player.stop()
-    stage.window.error_label.clear()
+    stage.controller.performance.stop()
     session.update(**rest.model_dump())
     stage.controller.pluck()
     stage.wait_until_rendered()
-    stage.controller.player.stop()
+    stage.controller.performance.stop()
     stage.run_for(REST_S)
     gc.collect()
     weight_mib = _resident_mib()
@@ -237,12 +341,6 @@ def collected_faults() -> Iterator[Counter[str]]:
     finally:
         sys.excepthook, threading.excepthook = before[:2]
         qInstallMessageHandler(before[2])
-
-
-def _underruns(card: PretendedCard) -> tuple[int, int]:
-    assert card.output is not None
-    assert card.stream is not None
-    return card.output.underruns, card.stream.late
 
 
 def _resident_mib() -> float:

@@ -1,4 +1,4 @@
-"""The real window with its controller, and a pretended sound device: what benchmarks of the app drive."""
+"""The real window with its controller: what benchmarks of the app drive."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ import torch
 from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
+from app.audio import AudioDevice, Sound
+from app.audio.problems import no_device
 from app.bench.display import choose_display
-from app.bench.pretended_device import PretendedCard
-from app.controller import Controller
-from app.main import SWITCH_INTERVAL_S, load_engine
+from app.controller import Controller, ProblemListener
+from app.main import load_engine
 from app.main_window import MainWindow
 from app.memory import collect_anywhere, collect_between_events, return_large_blocks
 from app.settings import Settings
@@ -34,7 +35,6 @@ class Stage:
 
     window: MainWindow
     controller: Controller
-    card: PretendedCard
     platform: str  # Qt's: "xcb", "offscreen", …
 
     def run_for(self, seconds: float) -> None:
@@ -42,28 +42,44 @@ class Stage:
         QTimer.singleShot(round(1000 * seconds), loop.quit)
         loop.exec()
 
-    def wait_for(self, condition: Callable[[], bool], what: str) -> None:
-        """Raises TimeoutError, with the latest notice, where `condition` does not come true."""
-        loop, timer, until_s = QEventLoop(), QTimer(interval=LOOK_MS), time.monotonic() + PATIENCE_S
+    def wait_for(self, condition: Callable[[], bool], what: str, seconds: float = 0.0) -> None:
+        """Raises TimeoutError, with the latest notice, where `condition` does not come true.
+
+        `seconds`: how long it should take.
+        """
+        patience_s = seconds + PATIENCE_S
+        loop, timer, until_s = QEventLoop(), QTimer(interval=LOOK_MS), time.monotonic() + patience_s
         timer.timeout.connect(lambda: loop.quit() if condition() or time.monotonic() > until_s else None)
         timer.start()
         loop.exec()
         timer.stop()
         if not condition():
-            raise TimeoutError(f"{what} did not come within {PATIENCE_S:g} s; {self.window.notices.text}")
+            raise TimeoutError(f"{what} did not come within {patience_s:g} s; {self.window.notices.text}")
 
     def wait_until_rendered(self) -> None:
-        self.wait_for(lambda: self.window.error_label.text().startswith("error"), "the rendering of a pluck")
+        """Until the motion of what is chosen is whole, and a pluck of it would sound at once."""
+        stage = self.controller.performance
+        self.wait_for(lambda: stage.ready and stage.settled and stage.at_hand, "the rendering of a pluck")
+
+
+def silent(on_problem: ProblemListener) -> Sound:
+    """A sound without a device, as on a computer that has none: a clock takes its frames."""
+
+    def look_up(_device: AudioDevice | None, _rescan: bool) -> AudioDevice:
+        raise no_device()
+
+    return Sound(on_problem, look_up=look_up)
 
 
 @contextmanager
-def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> Iterator[Stage]:
+def opened(
+    settings: Settings, size: tuple[int, int], make_sound: Callable[[ProblemListener], Sound] = Sound
+) -> Iterator[Stage]:
     """The window, alive and with its first pluck rendered, `size` in pixels; afterwards it is closed and gone."""
     choose_display()
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
-    interval_s, threads = sys.getswitchinterval(), torch.get_num_threads()
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    threads = torch.get_num_threads()
     return_large_blocks()
     load_engine()
     apply_theme(application, settings.look.face)
@@ -73,10 +89,9 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
     with tempfile.TemporaryDirectory() as folder:
         try:
             window.show()
-            controller = Controller(window, settings, Path(folder) / "settings.json", card.player)
+            controller = Controller(window, settings, Path(folder) / "settings.json", make_sound)
             collector = collect_between_events()
-            stage = Stage(window, controller, card, application.platformName())
-            stage.wait_for(lambda: card.stream is not None, "the pretended device")
+            stage = Stage(window, controller, application.platformName())
             stage.wait_until_rendered()
             yield stage
             collector.timer.stop()
@@ -85,5 +100,4 @@ def opened(settings: Settings, card: PretendedCard, size: tuple[int, int]) -> It
             window.deleteLater()
             QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
             collect_anywhere()
-            sys.setswitchinterval(interval_s)
             torch.set_num_threads(threads)

@@ -1,4 +1,4 @@
-"""bench solver, render, train, app, play, soak: what the program costs here."""
+"""bench solver, render, voices, train, app, play, soak: what the program costs here."""
 
 from __future__ import annotations
 
@@ -100,6 +100,40 @@ def render(json: Json = False) -> None:
 
 
 @bench.command()
+def voices(json: Json = False) -> None:
+    """What a voice of a model or the truth costs and how exact it is, how many fit on a core, what a strike costs."""
+    from app.bench import voices as bench
+
+    with progress("bench voices") as report:
+        found = bench.measure(report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    rows = [
+        (
+            v.preset,
+            v.kind,
+            v.modes,
+            *(f"{100 * part:.2f}" for part in (v.onset, v.first_second, v.later, v.mean)),
+            v.voices_at(bench.MODEL_SHARE),
+            v.voices_at(bench.TRUTH_SHARE),
+            f"{v.error:.1e}",
+        )
+        for v in found.voices
+    ]
+    ages = ("to 0.05 s, %", "to 1 s, %", "1 to 4 s, %", "to 4 s, %")
+    print_table(("preset", "voice", "modes", *ages, "at 25 %", "at 50 %", "error"), rows)
+    print_table(
+        ("strike of both", "median ms", "worst ms"), [(s.preset, s.median_ms, s.worst_ms) for s in found.strikes]
+    )
+    print(
+        f"targets: {bench.MODEL_VOICES} model voices at {bench.MODEL_SHARE:.0%} of a core,"
+        f" {bench.TRUTH_VOICES} truth voices at {bench.TRUTH_SHARE:.0%} and an error of {bench.TRUTH_ERROR:g} at most"
+    )
+
+
+@bench.command()
 def train(json: Json = False) -> None:
     """Seconds of a train step of every model: 50 trajectories, 400 frames."""
     from app.bench.train import measure
@@ -121,7 +155,7 @@ def app(
     seconds: Annotated[float, typer.Option(min=0.1, help="How long the picture is watched.")] = 5.0,
     starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 3,
 ) -> None:
-    """The window: its start, how soon a pluck sounds, how smoothly the picture moves. It opens for a minute."""
+    """The window: how soon it is there and can be plucked, how smoothly the picture moves. It opens for a minute."""
     from app.bench.app import measure
 
     with progress("bench app") as report:
@@ -210,23 +244,31 @@ def _spread_rows(name: str, spreads: Sequence[Spread | None]) -> list[tuple[obje
 def soak(
     json: Json = False,
     minutes: Annotated[float, typer.Option(min=0.01, help="How long.")] = 10.0,
+    playing: Annotated[bool, typer.Option("--playing", help="Twelve keys a second, without a pause.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
 ) -> None:
-    """The window under a restless user: underruns, memory, threads, faults. Status 1 where there were faults."""
+    """The window under a restless user: holes in the sound, memory, threads, faults. Status 1 where there are faults.
+
+    Linux only; needs PulseAudio, and touches nothing of the sound in use.
+    """
     from app.bench.soak import soak as run_soak
 
     with progress("bench soak") as report:
-        found = run_soak(60 * minutes, seed, report)
+        found = run_soak(60 * minutes, seed, playing, report)
     if json:
-        print_json(asdict(found))
+        print_json({**asdict(found), "holes": {**asdict(found.holes), "a_minute": found.holes.a_minute}})
     else:
         _print_machine(found.machine)
+        holes = found.holes
         rows = [
             ("plucks", found.plucks, None),
             ("changes", found.changes, None),
-            ("underruns", found.underruns, 0),
-            ("late callbacks of the device", found.late_callbacks, None),
-            ("share of the time waiting for rendering", found.waited_share, 0),
+            ("holes in the recording", holes.heard, 0),
+            ("holes a minute", holes.a_minute, 0),
+            ("holes together, ms", holes.heard_ms, 0),
+            ("longest hole, ms", holes.longest_ms, 0),
+            ("gaps that the mixer tells", sum(holes.told.values()), 0),
+            *((f"of them {cause}", count, None) for cause, count in holes.told.items()),
             ("longest stall of the window, s", found.longest_stall_s, 0.1),
             ("memory when settled, MiB", found.settled_mib, None),
             ("memory at the end, MiB", found.end_mib, None),
@@ -236,6 +278,7 @@ def soak(
             ("faults", sum(times for _, times in found.faults), 0),
         ]
         print_table(("what", "here", "target"), rows)
+        print("memory at rest, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.at_rest_mib))
         for kind, told in (("fault", found.faults), ("notice", found.notices)):
             for text, times in told:
                 print(f"{kind}, {times} times: {text}")

@@ -20,8 +20,8 @@ from app.precedence import Rank, step_back
 from engine.pluck import FULL_SCALE_M
 from engine.sources import ModelSource, Runaway, SourceState
 from engine.voices import Voice
+from engine.voices.offline import AHEAD_FIRST, AHEAD_FRAMES
 
-FIRST_FRAMES, BLOCK_FRAMES = 256, 1024
 LEAST_S = 0.06  # rendered before it begins
 CARE = 0.9  # of its speed that is counted on
 SILENT = 1e-5  # of full scale
@@ -94,7 +94,7 @@ class AheadVoice:
             self._state = self.source.start(self.initial_m[None])
             block = (self.initial_m.double() @ self.weights)[None]
         else:
-            steps = min(BLOCK_FRAMES if self.done > FIRST_FRAMES else FIRST_FRAMES, self.voice.room)
+            steps = min(AHEAD_FRAMES if self.done > AHEAD_FIRST else AHEAD_FIRST, self.voice.room)
             try:
                 frames, self._state = self.source.advance(self._state, steps, self.weights)
                 block = frames[0].double()
@@ -106,7 +106,7 @@ class AheadVoice:
         self._take(samples)
         self._frames.append(samples)
         self._spent_s += time.monotonic() - began_s
-        if self.voice.room == 0 or (self.done > FIRST_FRAMES and float(np.abs(samples).max()) < SILENT):
+        if self.voice.room == 0 or (self.done > AHEAD_FIRST and float(np.abs(samples).max()) < SILENT):
             self.voice.end_here()
             self.finished = True
 

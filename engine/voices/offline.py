@@ -19,6 +19,8 @@ from engine.voices.voice import Voice
 
 SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed
 BLOCK_FRAMES = 4096  # between two looks at `advanced`
+AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # at a time of samples that are rendered ahead: for ears and files alike
+FILLING = 0.9  # share of the work that these samples are
 
 
 def render_voice(
@@ -57,7 +59,8 @@ def render_voice(
         if voice.ran_away:
             raise Runaway(voice.seconds)
         out[first : first + len(block)] = block[:, : len(ear.points)]
-        advanced((first + len(block)) / frames)
+        share = (first + len(block)) / frames
+        advanced(FILLING + (1 - FILLING) * share if program.rendered else share)
         loudest_db = max(loudest_db, voice.level_db)
         if until_db is not None and voice.level_db < loudest_db - until_db:
             return out[: first + len(block) + round(SILENCE_S * program.rate_hz)]
@@ -71,6 +74,7 @@ def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanc
     voice.append(((initial_m.double() @ weights)[None] / FULL_SCALE_M).float().numpy())
     total = voice.room
     while voice.room:
-        frames, state = source.advance(state, min(BLOCK_FRAMES, voice.room), weights)
+        steps = AHEAD_FIRST if voice.room == total else AHEAD_FRAMES
+        frames, state = source.advance(state, min(steps, voice.room), weights)
         voice.append((frames[0].double() / FULL_SCALE_M).float().numpy())
-        advanced(0.99 * (1 - voice.room / max(total, 1)))
+        advanced(FILLING * (1 - voice.room / total))

@@ -17,20 +17,23 @@ from app.export import (
     ExportCancelled,
     ExportError,
     SoundRequest,
+    Source,
     WavSettings,
     default_file_name,
     export_sound,
     export_sounds,
-    render_signal,
     render_sound,
     write_wav,
 )
+from app.playing.ahead import AheadVoice
 from app.recipe import Recipe
 from app.wav_chunks import Marker, read_markers
 from engine.pluck import FULL_SCALE_M_S, Pluck
-from engine.preset import load_preset
+from engine.preset import SHIPPED, load_preset
 from engine.sine_transform import listening_weights
-from engine.sources import FULL_SCALE_M, ModelSource, StringSource, TruthSource, project
+from engine.sources import FULL_SCALE_M, ModelSource, TruthSource, project
+from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program
+from engine.voices.voice import ATTACK_S
 
 PLAIN = WavSettings("32f", fade_out_s=0)
 
@@ -40,28 +43,48 @@ def request_(small_preset: Path) -> SoundRequest:
     return SoundRequest(load_preset(small_preset), Pluck(0.35, 4.0), listen=0.37, seconds=0.2)
 
 
-def test_the_first_sample_is_the_pluck_itself(request_: SoundRequest) -> None:
-    info = request_.preset.info
-    shape_m = project(request_.pluck.displacement(101), info.modes)
-    for source in ("model", "truth"):
-        signal = render_sound(replace(request_, listen=0.4, source=source))  # type: ignore[arg-type]
-        assert signal[0] * FULL_SCALE_M == pytest.approx(float(shape_m[40]), abs=1e-12)
-        assert len(signal) == 800
-
-
-@pytest.mark.parametrize("block", [1, 64, 65, 300])
-@pytest.mark.parametrize("kind", [ModelSource, TruthSource])
-def test_the_signal_is_the_whole_motion_at_the_listening_point_for_any_block(
-    request_: SoundRequest, kind: type[StringSource], block: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
+    request_: SoundRequest, kind: Source
 ) -> None:
     preset = request_.preset
-    source = ModelSource(preset) if kind is ModelSource else TruthSource(preset.info)
+    source = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
     start_m = project(request_.pluck.displacement(101), 10)
-    frames, _ = source.advance(source.start(start_m[None]), 299)
+    frames, _ = source.advance(source.start(start_m[None]), 799)
     whole_m = torch.cat([start_m[None], frames[0].double()]) @ listening_weights(torch.tensor([0.37]), 101)[:, 0]
-    monkeypatch.setattr(sound, "BLOCK_FRAMES", block)
-    signal = render_signal(source, start_m, 300 / 4000, 0.37)
-    assert signal == pytest.approx(whole_m.numpy() / FULL_SCALE_M, abs=1e-6)
+    found = render_sound(replace(request_, source=kind))
+    assert len(found) == 800
+    attack = round(ATTACK_S * preset.info.rate_hz)
+    assert found[attack:] == pytest.approx(whole_m.numpy()[attack:] / FULL_SCALE_M, abs=2e-5)
+    assert (np.abs(found[:attack]) < np.abs(whole_m.numpy()[:attack]) / FULL_SCALE_M).all()
+
+
+COMPILED = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+
+
+@pytest.mark.parametrize(("preset", "kind"), [("compiled", "model"), ("compiled", "truth"), ("small", "model")])
+def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
+    request_: SoundRequest, preset: str, kind: Source, tmp_path: Path
+) -> None:
+    asked = replace(request_, source=kind)
+    if preset == "compiled":
+        asked = replace(asked, preset=load_preset(COMPILED))
+    model, info = asked.preset.model, asked.preset.info
+    export_sound(asked, tmp_path / "a.wav", WavSettings("32f", 48_000, fade_out_s=0))
+    exported, _ = soundfile.read(tmp_path / "a.wav", dtype="float32")
+    program = truth_program(info, 48_000) if kind == "truth" else model_program(model, info, 48_000)
+    assert program.rendered == (preset == "small")
+    initial_m, ear = project(asked.pluck.displacement(101), info.modes), Ear((0.37,))
+    voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
+    if program.rendered:
+        source = ModelSource(asked.preset)
+        ahead = AheadVoice(voice, source, initial_m, ear.weights(101), (), lambda: None, lambda error: None)
+        while not ahead.finished:
+            ahead.advance()
+    mixer = Mixer(48_000)
+    mixer.add(voice)
+    played = np.concatenate([mixer.render(frames) for frames in (256, 100, 7, 9237)])
+    assert (played[:, 0] == exported).all()
 
 
 def test_the_difference_is_model_minus_truth(request_: SoundRequest) -> None:
@@ -106,7 +129,7 @@ def test_normalising_keeps_the_ratio_of_model_and_truth(request_: SoundRequest, 
 
 
 def test_progress_rises_to_one(request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sound, "BLOCK_FRAMES", 100)
+    monkeypatch.setattr(offline, "BLOCK_FRAMES", 100)
     shares: list[float] = []
     export_sound(replace(request_, source="difference"), tmp_path / "a.wav", progress=shares.append)
     assert shares == sorted(shares)

@@ -20,6 +20,8 @@ from engine.sources import project
 from engine.string import StringParameters
 from engine.voices import Ear, Mixer, Program, Voice, bank_program
 
+PLUCK, EAR = Pluck(0.3), Ear((0.37,))
+
 
 @pytest.fixture
 def preset_file(small_preset: Path, tmp_path: Path) -> Path:
@@ -91,9 +93,7 @@ def small_info() -> Callable[[bool], PresetInfo]:
 def strike() -> Callable[..., Voice]:
     """A voice of a shipped preset's model: strike(name, pluck=…, rate_hz=…, ear=…, gain=…)."""
 
-    def made(
-        name: str, pluck: Pluck = Pluck(0.3), rate_hz: int = 48_000, ear: Ear = Ear((0.37,)), gain: float = 1.0
-    ) -> Voice:
+    def made(name: str, pluck: Pluck = PLUCK, rate_hz: int = 48_000, ear: Ear = EAR, gain: float = 1.0) -> Voice:
         return Voice(_bank(name, rate_hz), _initial_m(_shipped(name).info, pluck), ear, gain)
 
     return made

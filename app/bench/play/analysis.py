@@ -33,6 +33,10 @@ STANDS_OUT = 6.0  # times what is nearby
 MOSTLY = 0.9
 FAINTEST_CLICK = 1e-4
 FAINTEST_PLUCK = 1e-6
+LOOKED_AT = 1 << 20  # frames
+EDGE_S, AROUND_S = 0.00025, 0.03
+AT_ONCE = 0.08  # of what sounds around it: a fade, or an attack, is nowhere near that yet
+FAINTEST_EDGE = 1e-6
 ATTACK_S = 0.006  # of a pluck
 LATEST_S = 0.5  # after its key, for a pluck to be one
 EARLY_OR_LATE_S = 0.04  # a pluck among others, against what is usual
@@ -59,6 +63,43 @@ def holes(sound: NDArray[np.float32], expected: Sequence[Span], rate_hz: int) ->
     shortest = round(SHORTEST_HOLE_S * rate_hz)
     found = [_moved(run, span.start) for span in expected for run in _runs(silent[span.start : span.end])]
     return [run for run in found if run.frames >= shortest]
+
+
+@dataclass(frozen=True)
+class Silence(Span):
+    """Nothing at all for a millisecond or more, between sounds.
+
+    `sharp`: it begins or ends at once, as nothing does that a program fades.
+    """
+
+    sharp: bool
+
+
+def silences(sound: NDArray[np.float32], rate_hz: int) -> list[Silence]:
+    """Of one channel, (frames,), which may be a file of any length: little of it is looked at at a time."""
+    runs: list[Span] = []
+    for first in range(0, len(sound), LOOKED_AT):
+        for run in _runs(np.abs(sound[first : first + LOOKED_AT]) < ZERO):
+            here = _moved(run, first)
+            if runs and runs[-1].end == here.start:
+                here = Span(runs.pop().start, here.end)
+            runs.append(here)
+    shortest, around = round(SHORTEST_HOLE_S * rate_hz), round(AROUND_S * rate_hz)
+
+    def sharp(edge: NDArray[np.float32]) -> bool:
+        """Of what sounds nearby, the nearest first."""
+        level = np.abs(edge[: round(EDGE_S * rate_hz)]).max()
+        return bool(level > max(AT_ONCE * np.abs(edge).max(), FAINTEST_EDGE))
+
+    return [
+        Silence(
+            run.start,
+            run.end,
+            sharp(sound[max(run.start - around, 0) : run.start][::-1]) or sharp(sound[run.end : run.end + around]),
+        )
+        for run in runs
+        if run.frames >= shortest and run.start > 0 and run.end < len(sound)
+    ]
 
 
 def expected_sound(sound: NDArray[np.float32], keys: Sequence[int], rate_hz: int) -> list[Span]:

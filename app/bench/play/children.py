@@ -22,12 +22,14 @@ class Missing(RuntimeError):
     """Something of the computer that the benchmark cannot do without."""
 
 
-def need_programs() -> None:
-    """Raises `Missing` with the names of all programs that are absent, and what to install."""
-    absent = [program for program in PACKAGES if shutil.which(program) is None]
+def need_programs(*programs: str) -> None:
+    """Raises `Missing` with the names of those that are absent, of all if none are named, and what to install."""
+    absent = [program for program in programs or PACKAGES if shutil.which(program) is None]
     if absent:
         packages = " ".join(sorted({PACKAGES[program] for program in absent}))
-        raise Missing(f"bench play needs {', '.join(absent)}: install {packages} (on Debian: apt install {packages})")
+        raise Missing(
+            f"this benchmark needs {', '.join(absent)}: install {packages} (on Debian: apt install {packages})"
+        )
 
 
 @contextlib.contextmanager

@@ -121,12 +121,22 @@ class Recording:
 @contextlib.contextmanager
 def recording(server: SoundServer, path: Path) -> Iterator[Recording]:
     """Records into `path` until the block ends."""
-    command = ["parec", "--raw", "-d", f"{SINK}.monitor", f"--format={FORMAT}", f"--rate={RATE_HZ}"]
-    command += [f"--channels={CHANNELS}", f"--latency-msec={LATENCY_MS}"]
     reading, writing = _pipe()
-    with reading, child(command, server.environment, stdout=writing):
+    with reading, child(_recorder(CHANNELS), server.environment, stdout=writing):
         writing.close()
         yield Recording(reading, path)
+
+
+@contextlib.contextmanager
+def recording_aside(server: SoundServer, path: Path) -> Iterator[None]:
+    """Records both channels' mean, float32 (frames,), into `path`, in which this process has no part."""
+    with path.open("wb") as file, child(_recorder(1), server.environment, stdout=file):
+        yield
+
+
+def _recorder(channels: int) -> list[str]:
+    command = ["parec", "--raw", "-d", f"{SINK}.monitor", f"--format={FORMAT}", f"--rate={RATE_HZ}"]
+    return [*command, f"--channels={channels}", f"--latency-msec={LATENCY_MS}"]
 
 
 def _pipe() -> tuple[IO[bytes], IO[bytes]]:

@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,6 +32,23 @@ class SoundServer:
     """`environment` of processes that are to play into it."""
 
     environment: dict[str, str]
+
+    @contextlib.contextmanager
+    def adopted(self) -> Iterator[None]:
+        """This process plays into it too. To be entered before PortAudio is loaded.
+
+        Raises:
+            Missing: It is loaded.
+        """
+        if "sounddevice" in sys.modules:
+            raise Missing("PortAudio has been loaded, and plays elsewhere; use a process of its own")
+        before = dict(os.environ)
+        os.environ.update(self.environment)
+        try:
+            yield
+        finally:
+            os.environ.clear()
+            os.environ.update(before)
 
     def buffered_s(self) -> float | None:
         """Sound of the one client that plays which the server keeps ready, or None where not one client plays."""

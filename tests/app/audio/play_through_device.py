@@ -1,23 +1,66 @@
-"""Plays a track through the default device and prints what the player says, as JSON.
+"""Strikes two notes that overlap through the default device and prints what the sound says, as JSON.
 
 A script of its own, because ALSA and PulseAudio read their settings once per process:
 
-    python play_through_device.py TRACK.npz switch        select the truth on the way, play to the end
-    python play_through_device.py TRACK.npz kill PID      end the sound server PID on the way
-    python play_through_device.py TRACK.npz live OUT.npy  pluck, switch, loop; OUT: what the mixer gave
+    python play_through_device.py RATE switch      the first note changes from the model to the truth on the way
+    python play_through_device.py RATE kill PID    the sound server PID is ended instead
 """
+
+from __future__ import annotations
 
 import json
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-from app.audio.stream import OutputStream
+from numpy.typing import NDArray
 
-from app.audio import AudioProblem, Player, Track
+from app.audio import AudioProblem, Sound
+from engine.pluck import Pluck
+from engine.preset import SHIPPED, load_preset
+from engine.sources import project
+from engine.voices import Ear, Mixer, Program, Voice, bank_program, truth_program
+
+PRESET = "nylon_nonlinear_gaussian_4k_koopman_integrated"
+EAR = Ear((0.37, 0.7))
+PLUCKS = (Pluck(0.3), Pluck(0.6, 3.0))
+SECOND_S, SWITCH_S, RELEASE_S, END_S = 0.3, 0.7, 1.1, 1.3  # after the first note began
+
+
+def notes(rate_hz: int, first_frame: int) -> tuple[Voice, Voice, Voice]:
+    """The first note as model and, unheard, as truth, and the second one. They know when they begin and end."""
+    preset = load_preset(SHIPPED / f"{PRESET}.safetensors")
+    bank = bank_program(preset.model, preset.info, rate_hz)
+    assert bank is not None
+    truth = truth_program(preset.info, rate_hz)
+
+    def struck(program: Program, pluck: Pluck, gain: float, begin_s: float) -> Voice:
+        initial_m = project(pluck.displacement(preset.info.grid_points), preset.info.modes)
+        voice = Voice(program, initial_m, EAR, gain)
+        voice.begin_at(first_frame + round(begin_s * rate_hz))
+        voice.release_at(first_frame + round(RELEASE_S * rate_hz))
+        return voice
+
+    first, second = PLUCKS
+    return struck(bank, first, 0.5, 0.0), struck(truth, first, 0.0, 0.0), struck(truth, second, 0.5, SECOND_S)
+
+
+def switch(model: Voice, truth: Voice) -> None:
+    model.set_gain(0.0)
+    truth.set_gain(0.5)
+
+
+def expected(rate_hz: int, switch_frame: int) -> NDArray[np.float32]:
+    """What a mixer without a device makes of the same notes, switched at a frame; from the first one's first on."""
+    mixer = Mixer(rate_hz)
+    model, truth, second = notes(rate_hz, 0)
+    mixer.add(model, truth, second)
+    before = mixer.render(switch_frame)
+    switch(model, truth)
+    return np.concatenate([before, mixer.render(round(END_S * rate_hz) - switch_frame)])
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
@@ -26,76 +69,39 @@ def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
         time.sleep(0.005)
 
 
-def kept_blocks() -> list[np.ndarray]:
-    """All blocks that go to any device from now on, without those that were replaced unheard."""
-    blocks: list[np.ndarray] = []
-    write, replace = OutputStream.write, OutputStream.replace
-
-    def keep(stream: OutputStream, block: np.ndarray) -> None:
-        write(stream, block)
-        blocks.append(block)
-
-    def change(stream: OutputStream, count: int, others: Sequence[np.ndarray] = ()) -> bool:
-        done = replace(stream, count, others)
-        if done:
-            del blocks[max(0, len(blocks) - count) :]  # more, where some came before this began
-            blocks.extend(others)
-        return done
-
-    OutputStream.write, OutputStream.replace = keep, change  # type: ignore[method-assign]
-    return blocks
-
-
-def play_live(player: Player, track: Track, out_file: str) -> None:
-    blocks = kept_blocks()
-    player.set_loop(True)
-    for source in ("truth", "model", "truth"):
-        player.load(track, ring=True)
-        player.play()
-        time.sleep(0.4)
-        player.select(source)
-        time.sleep(0.4)
-    wait_until(lambda: player.status().position_s > 1.8)
-    wait_until(lambda: player.status().position_s < 0.5)  # the loop
-    player.stop()
-    time.sleep(0.5)
-    np.save(out_file, np.concatenate(blocks))
-
-
-def main(track_file: str, action: str, *argument: str) -> None:
-    sources = np.load(track_file)
+def main(rate: str, action: str, *argument: str) -> None:
     problems: list[AudioProblem] = []
-    with Player(problems.append) as player:
-        player.open(buffer_s=0.2)  # the computer may be busy with other tests
-        wait_until(lambda: player.status().device is not None or problems != [])
-        track = Track(player.rate_hz, sources["model"].size, ("model", "truth"))
-        track.append(sources)
+    with Sound(problems.append) as sound:
+        sound.open(buffer_s=0.1, rate_hz=int(rate))  # the computer may be busy with other tests
+        wait_until(lambda: sound.status().device is not None or problems != [])
         time.sleep(0.3)  # let the device settle
-        player.load(track)
-        player.play()
-        wait_until(lambda: player.status().position_s > 0.4)
-        if action == "live":
-            play_live(player, track, argument[0])
-        elif action == "kill":
+        mixer = sound.mixer
+        first_frame = round((mixer.seconds + 0.3) * mixer.rate_hz)
+        first_frame += -first_frame % 64
+        voices = notes(mixer.rate_hz, first_frame)
+        mixer.add(*voices)
+        begin_s = first_frame / mixer.rate_hz
+        wait_until(lambda: mixer.seconds > begin_s + SWITCH_S)
+        earliest_s = mixer.seconds
+        if action == "kill":
             os.kill(int(argument[0]), signal.SIGKILL)
-            wait_until(lambda: player.status().device is None)
-        else:
-            player.select("truth")
-        if action != "live":
-            wait_until(lambda: player.status().position_s >= track.length_frames / track.rate_hz)
-        time.sleep(0.2)  # the end is still on its way through the sound server
-        status = player.status()
-    print(
-        json.dumps(
-            {
-                "rate_hz": status.rate_hz,
-                "underruns": status.underruns,
-                "position_s": status.position_s,
-                "problems": [problem.kind for problem in problems],
-                "details": [problem.detail for problem in problems],
-            }
-        )
-    )
+            wait_until(lambda: sound.status().device is None)
+        switch(*voices[:2])
+        latest_s = mixer.seconds
+        wait_until(lambda: mixer.seconds > begin_s + END_S)
+        time.sleep(0.4)  # the end is still on its way through the sound server
+        status = sound.status()
+        said = {
+            "rate_hz": status.rate_hz,
+            "gaps": len(status.gaps),
+            "underflows": mixer.underflows,
+            "over": [voice.over for voice in voices],
+            "late_frames": [voice.began_frame - first_frame for voice in voices],
+            "switched": [round((time_s - begin_s) * mixer.rate_hz) for time_s in (earliest_s, latest_s)],
+            "problems": [problem.kind for problem in problems],
+            "details": [problem.detail for problem in problems],
+        }
+    print(json.dumps(said))
 
 
 if __name__ == "__main__":

@@ -11,11 +11,35 @@ import pytest
 
 import app
 from app.audio import AudioUnavailable, ProblemKind, default_device, find, output_devices
-from app.audio.devices import AudioDevice, open_device
+from app.audio.devices import AudioDevice, close_device, open_device
+from app.audio.output import DeviceOutput
+from engine.kernels.layout import M_CALLS
+from engine.kernels.mixer import call
+from engine.voices import Mixer
 
 
 class PortAudioError(Exception):
     pass
+
+
+class FakeStream:
+    """What `sounddevice` opens; the device itself calls the mixer."""
+
+    latency, time, cpu_load, active = 0.02, 3.0, 0.1, False
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def start(self) -> None:
+        self.asked.append("start")
+        self.active = True
+
+    def abort(self) -> None:
+        self.asked.append("abort")
+        raise PortAudioError("it cannot even stop")
+
+    def close(self) -> None:
+        self.asked.append("close")
 
 
 class FakeSoundDevice(SimpleNamespace):
@@ -25,6 +49,8 @@ class FakeSoundDevice(SimpleNamespace):
 
     def __init__(self, entries: list[tuple[str, int, int]], default: int = -1) -> None:
         super().__init__(default=SimpleNamespace(device={"output": default}), opened=[], restarts=0)
+        self.streams: list[FakeStream] = []
+        self._ffi = SimpleNamespace(cast=lambda kind, address: (kind, address))
         self.entries = entries
         self.refusal: Exception | None = None
 
@@ -45,11 +71,12 @@ class FakeSoundDevice(SimpleNamespace):
         ]
         return entries if index is None else entries[index]
 
-    def OutputStream(self, **options: Any) -> SimpleNamespace:
+    def _StreamBase(self, **options: Any) -> FakeStream:
         self.opened.append(options)
         if self.refusal is not None:
             raise self.refusal
-        return SimpleNamespace()
+        self.streams.append(FakeStream())
+        return self.streams[-1]
 
     def _terminate(self) -> None:
         self.restarts += 1
@@ -62,7 +89,13 @@ class FakeSoundDevice(SimpleNamespace):
 def sounddevice(monkeypatch: pytest.MonkeyPatch) -> FakeSoundDevice:
     fake = FakeSoundDevice([("Microphone", 0, 0), ("HDMI", 0, 8), ("Speakers", 0, 2), ("Speakers", 1, 1)], 2)
     monkeypatch.setitem(sys.modules, "sounddevice", fake)
+    monkeypatch.setattr("app.audio.devices._streams", set())
     return fake
+
+
+@pytest.fixture
+def mixer() -> Mixer:
+    return Mixer(48_000)
 
 
 def test_outputs_are_listed_with_the_default_first(sounddevice: FakeSoundDevice) -> None:
@@ -76,20 +109,77 @@ def test_outputs_are_listed_with_the_default_first(sounddevice: FakeSoundDevice)
     assert default_device().name == "HDMI"
 
 
-def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSoundDevice) -> None:
+def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
     wanted = find("Speakers", "ALSA")
     sounddevice.entries.insert(0, ("Webcam", 0, 2))
-    open_device(wanted, 0.05, 256, lambda *_: None)
+    open_device(wanted, 0.05, mixer)
     (options,) = sounddevice.opened
     assert options["device"] == 3
     assert options["samplerate"] == 48_000
-    assert options["blocksize"] == 256
-    assert options["channels"] == 2
+    assert options["blocksize"] == 1200  # half of the buffer
+    assert (options["channels"], options["dtype"]) == (2, "float32")
     assert options["latency"] == 0.05
-    open_device(wanted, 0.02, 256, lambda *_: None)
-    assert sounddevice.opened[1]["latency"] == 0.035
-    open_device(wanted, 0.005, 256, lambda *_: None)
-    assert sounddevice.opened[2]["latency"] == 0.01  # asked to be prompt
+    open_device(wanted, 0.005, mixer)
+    assert (sounddevice.opened[1]["latency"], sounddevice.opened[1]["blocksize"]) == (0.01, 120)
+    open_device(wanted, 0.0, mixer)
+    assert sounddevice.opened[2]["blocksize"] == 64
+
+
+def test_the_device_calls_the_compiled_mixer_itself(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
+    open_device(find("HDMI", "ALSA"), 0.05, mixer)
+    (options,) = sounddevice.opened
+    assert options["callback"] == ("PaStreamCallback*", call.address)
+    assert options["userdata"] == ("void*", mixer.address)
+    assert options["channels"] == 2  # of its eight
+
+
+def test_nothing_is_looked_for_anew_while_a_stream_is_open(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
+    stream = open_device(find("Speakers", "ALSA"), 0.05, mixer)
+    output_devices(rescan=True)
+    assert sounddevice.restarts == 0
+    close_device(stream)
+    assert sounddevice.streams[0].asked == ["abort", "close"]  # though it could not stop
+    output_devices(rescan=True)
+    assert sounddevice.restarts == 1
+
+
+def test_an_output_plays_stalls_and_is_lost(
+    sounddevice: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 100.0
+    monkeypatch.setattr("app.audio.output.time.monotonic", lambda: now_s)
+    output = DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
+    (stream,) = sounddevice.streams
+    assert (output.latency_s, output.now_s(), output.load()) == (0.02, 3.0, 0.1)
+    assert not output.stalled() and not output.lost()
+    now_s += 3.0
+    assert output.stalled() and not output.lost()
+    mixer.memory.view("int64")[M_CALLS] += 1
+    assert not output.stalled()
+    now_s += 7.0
+    assert output.lost()
+    mixer.memory.view("int64")[M_CALLS] += 1
+    assert not output.lost()
+    stream.active = False
+    assert output.lost()
+    output.close()
+    assert stream.asked == ["start", "abort", "close"]
+    with pytest.raises(RuntimeError, match="closed"):
+        output.now_s()  # its memory is PortAudio's again
+
+
+def test_an_output_that_does_not_start_is_freed(
+    sounddevice: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(self: FakeStream) -> None:
+        raise PortAudioError("busy", -9985)
+
+    monkeypatch.setattr(FakeStream, "start", refuse)
+    with pytest.raises(AudioUnavailable, match="in use by another program"):
+        DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
+    assert sounddevice.streams[0].asked == ["abort", "close"]
+    output_devices(rescan=True)
+    assert sounddevice.restarts == 1
 
 
 def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> None:
@@ -99,9 +189,9 @@ def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> N
     assert sounddevice.restarts == 1
 
 
-def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice) -> None:
+def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
     with pytest.raises(AudioUnavailable, match="“Headset” is no longer there") as caught:
-        open_device(AudioDevice("Headset", "ALSA", 48_000), 0.05, 256, lambda *_: None)
+        open_device(AudioDevice("Headset", "ALSA", 48_000), 0.05, mixer)
     assert caught.value.kind is ProblemKind.VANISHED
 
 
@@ -120,11 +210,11 @@ def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice) -> None:
     ],
 )
 def test_refusals_are_explained(
-    sounddevice: FakeSoundDevice, error: Exception, kind: ProblemKind, message: str
+    sounddevice: FakeSoundDevice, mixer: Mixer, error: Exception, kind: ProblemKind, message: str
 ) -> None:
     sounddevice.refusal = error
     with pytest.raises(AudioUnavailable, match=message) as caught:
-        open_device(find("Speakers", "ALSA"), 0.05, 256, lambda *_: None)
+        open_device(find("Speakers", "ALSA"), 0.05, mixer)
     assert caught.value.kind is kind
     assert caught.value.detail == str(error)
     assert caught.value.remedy in str(caught.value)

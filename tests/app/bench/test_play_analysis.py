@@ -82,6 +82,21 @@ def test_silence_before_and_after_playing_is_no_hole(clean: NDArray[np.float32],
     assert found_in(sound, later)[0] == []
 
 
+def test_silences_are_found_with_how_they_begin_and_end(
+    clean: NDArray[np.float32], keys: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(analysis, "LOOKED_AT", 1001)  # silences lie across what is looked at
+    sound = clean[keys[0] + LATE :, 0].copy()
+    sound[60_000:60_500] = 0
+    sound[70_000:70_040] = 0  # less than a millisecond
+    fade = np.linspace(1, 0, 576)  # 12 ms
+    sound[80_000:80_576] *= fade
+    sound[80_576:90_000] = 0
+    sound[90_000:90_576] *= fade[::-1]
+    found = analysis.silences(np.concatenate([np.zeros(5000, np.float32), sound]), RATE_HZ)
+    assert [(each.start, each.end, each.sharp) for each in found] == [(65_000, 65_500, True), (85_575, 95_001, False)]
+
+
 @pytest.mark.parametrize("frames", [240, 960, 4800])
 def test_a_fade_is_found_where_it_is(clean: NDArray[np.float32], keys: list[int], frames: int) -> None:
     sound = clean.copy()

@@ -1,28 +1,83 @@
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import subprocess
+import sys
 import threading
 import warnings
+from collections import Counter
+from pathlib import Path
 from random import Random
 
+import numpy as np
 import pytest
 from PySide6.QtCore import qWarning
 
 from app.bench.random_changes import Repertoire, random_change
-from app.bench.soak import collected_faults
+from app.bench.soak import PROGRAMS, _holes, collected_faults
 from app.session import Choices, Session
 
 REPERTOIRE = Repertoire(("first", "second"), ("spectrum", "partials"), ("waveform", "compare"))
 
 
-def test_a_short_soak_plucks_and_reports(bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.bench.soak.EVERY_S", 0.1)
-    found = bench("soak", "--minutes", 0.03, "--seed", 3)
+RUN = """
+import sys
+from pathlib import Path
+import app.bench.soak, app.cli, app.library
+app.library.SHIPPED = Path(sys.argv[1])
+app.bench.soak.EVERY_S = 0.1
+app.bench.soak.REST_S = 0.2
+sys.exit(app.cli.main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.skipif(any(shutil.which(name) is None for name in PROGRAMS), reason="no PulseAudio")
+@pytest.mark.parametrize("how", [(), ("--playing",)])
+def test_a_short_soak_plays_into_the_private_card_and_reports(
+    small_preset: Path, tmp_path: Path, how: tuple[str, ...]
+) -> None:
+    """In a process of its own, where PortAudio has not been loaded yet."""
+    (tmp_path / "presets").mkdir()
+    for name in ("first", "second"):
+        shutil.copy(small_preset, tmp_path / "presets" / f"{name}.safetensors")
+    words = ["bench", "soak", "--minutes", "0.03", "--seed", "3", "--json", *how]
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(tmp_path / "presets"), *words],
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    if "libasound2-plugins" in done.stderr:
+        pytest.skip("ALSA does not play into PulseAudio here")
+    assert done.returncode == 0, done.stderr + done.stdout
+    found = json.loads(done.stdout)
     assert found["faults"] == []
     assert found["threads_left"] == []
     assert found["plucks"] > 2
     assert found["end_mib"] > 0
     assert found["drift_mib"] >= 0
     assert found["seed"] == 3
+    assert found["holes"]["seconds"] > 1.0  # it was recorded
+    assert found["holes"]["heard"] == len(found["holes"]["heard_at_s"])
+
+
+def test_the_recording_is_judged_by_who_played(tmp_path: Path) -> None:
+    sound = np.sin(np.arange(48_000) * 0.05).astype(np.float32)
+    sound[10_000:10_480] = 0
+    sound[20_000:20_960] = 0
+    sound[19_000:20_000] *= np.linspace(1, 0, 1000, dtype=np.float32)
+    sound[20_960:21_960] *= np.linspace(0, 1, 1000, dtype=np.float32)
+    (tmp_path / "recording").write_bytes(sound.tobytes())
+    told = Counter({"device": 1})
+    playing, restless = (_holes(tmp_path / "recording", playing, told) for playing in (True, False))
+    assert (playing.heard, restless.heard) == (2, 1)
+    assert restless.heard_ms == pytest.approx(10, abs=0.1)
+    assert playing.longest_ms == pytest.approx(20, abs=0.1)
+    assert restless.a_minute == 60
+    assert restless.told == {"device": 1}
 
 
 def test_random_changes_are_allowed_and_touch_everything() -> None:

@@ -18,6 +18,7 @@ from engine.preset import PresetInfo
 from engine.voices import Ear, Mixer, Program, Voice, plain_program, rendered_program
 
 RATE_HZ = 48_000
+MIDDLE = Ear((0.5,))
 Info = Callable[[bool], PresetInfo]
 Rung = Callable[..., NDArray[np.float64]]
 
@@ -33,7 +34,7 @@ def band_limited(rate_hz: int, seconds: float) -> NDArray[np.float32]:
     return (0.05 * np.cos(2 * np.pi * rates_hz * time_s[:, None]).sum(1, keepdims=True)).astype(np.float32)
 
 
-def waiting(program: Program, seconds: float, source_rate_hz: int, ear: Ear = Ear((0.5,))) -> Voice:
+def waiting(program: Program, seconds: float, source_rate_hz: int, ear: Ear = MIDDLE) -> Voice:
     """Without any samples yet."""
     voice = Voice(program, torch.full((41,), FULL_SCALE_M), ear, 1.0, seconds, source_rate_hz)
     voice.never_ends()

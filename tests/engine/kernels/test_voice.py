@@ -140,9 +140,7 @@ def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, run
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 2])
-def test_another_listening_point_is_faded_to_and_then_exact(
-    kind: str, solo: int, struck: Strike, rung: Rung
-) -> None:
+def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
     here, there = Ear((0.3, 0.6)), Ear((0.45, 0.2), solo=solo)
     moved, mixer = struck(kind, here), Mixer(RATE_HZ, limited=False)
     mixer.add(moved)
@@ -298,3 +296,53 @@ def test_a_runaway_never_reaches_the_mix(
     expected = rung(len(parts) * 64 + 640, strike(STEEL))
     np.testing.assert_allclose(mixer.render(640), expected[-640:], atol=1e-6)  # the other voice goes on
     np.testing.assert_allclose(parts[-1], expected[-704:-640], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_whatever_is_asked_of_voices_each_minds_its_own_business(
+    seed: int, strike: Strike, small_info: Callable[[bool], PresetInfo], initial_m: Initial
+) -> None:
+    """The mix is the sum of what each voice is alone, when the same is asked of it at the same frames."""
+
+    def voice_of(number: int) -> Voice:
+        choice = np.random.default_rng([seed, number])
+        pickup = "velocity" if choice.random() < 0.4 else "displacement"
+        ear = Ear((choice.uniform(0.1, 0.9),) * choice.integers(1, 3), pickup, int(choice.choice([0, 0, 5])))
+        pluck, gain = Pluck(choice.uniform(0.1, 0.9), choice.uniform(1, 12)), float(choice.choice([0.0, 0.5, 1.0]))
+        kind = choice.choice(["knowing", "blind", "steel", "truth", "samples"])
+        if kind == "samples":
+            voice = Voice.of_samples(plain_program(RATE_HZ), choice.uniform(-1, 1, (6000, 1)).astype(np.float32))
+            voice.start_with_gain(gain)
+        elif kind == "truth":
+            info = small_info(True)
+            voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
+        else:
+            name = {"knowing": KNOWING, "blind": f"{KNOWING}_blind", "steel": STEEL}[str(kind)]
+            voice = strike(name, pluck, ear=ear, gain=gain)
+        voice.begin_at(int(choice.integers(0, 4000)))
+        if choice.random() < 0.3:
+            voice.skip(choice.uniform(0.1, 0.5), Mixer(RATE_HZ).memory)
+        return voice
+
+    def rendered(numbers: list[int]) -> Signal:
+        mixer, voices = Mixer(RATE_HZ, limited=False), {number: voice_of(number) for number in numbers}
+        mixer.add(*voices.values())
+        parts = []
+        for step in range(24):
+            for number, voice in voices.items():
+                choice = np.random.default_rng([seed, number, step])
+                what = choice.integers(0, 12)
+                if what < 3:
+                    voice.set_gain(float(choice.choice([0.0, 0.3, 1.0])))
+                elif what == 3:
+                    points = tuple(choice.uniform(0, 1, len(voice.ear.points)))
+                    voice.listen(Ear(points, voice.ear.pickup, int(choice.choice([0, 0, 3]))))
+                elif what == 4:
+                    voice.release(0.02)
+            parts.append(mixer.render(1024))
+        assert mixer.new_gaps() == []
+        return np.concatenate(parts).astype(np.float64)
+
+    everyone = list(range(8))
+    alone = sum(rendered([number]) for number in everyone)
+    np.testing.assert_allclose(rendered(everyone), alone, atol=2e-6)

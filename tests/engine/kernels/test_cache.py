@@ -1,0 +1,58 @@
+"""Where compiled functions are kept; in processes of their own, since that is settled when the first is made."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from engine.kernels import cache, warm
+
+
+def told(code: str, **environment: str) -> str:
+    paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **paths, **environment}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_it_is_told_without_the_compiler() -> None:
+    code = "import sys; from engine.kernels import cache; cache.is_whole(); print('numba' in sys.modules)"
+    assert told(code) == "False"
+
+
+def test_all_compiled_functions_are_kept_in_one_folder() -> None:
+    code = (
+        "from engine.models._diagonal_kernel import listen; from engine.reference._splitting_kernel import advance;"
+        "from engine.kernels import cache;"
+        "print(all(str(cache.folder()) in f._cache.cache_path for f in (listen, advance)))"
+    )
+    assert told(code) == "True"
+
+
+def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> None:
+    code = (
+        "from engine.kernels import cache, compiled;"
+        "print(cache.folder(), compiled.config.CACHE_DIR, cache.is_whole(), cache.set_whole(), cache.is_whole())"
+    )
+    assert told(code, NUMBA_CACHE_DIR=str(tmp_path)) == f"{tmp_path} {tmp_path} False None True"
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_all_is_compiled_once(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(cache, "is_whole", lambda: whole)
+    for place, name in ((warm, "voices"), (warm, "models"), (cache, "set_whole")):
+        monkeypatch.setattr(place, name, lambda name=name: done.append(name))
+    warm.warm()
+    assert done == ([] if whole else ["voices", "models", "set_whole"])
+
+
+def test_every_kind_of_voice_and_compiled_model_runs() -> None:
+    warm.voices()
+    warm.models()

@@ -1,0 +1,246 @@
+"""The sum of all voices, and what is done to it: volume, limiter, tone, and the guards."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.kernels import layout as at
+from engine.kernels.mixer import BELIEVED, CEILING, TONE_FADE, TONE_HZ, TONE_LEVEL, UNDERFLOW, call
+from engine.voices import Mixer, Voice, plain_program
+from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
+
+RATE_HZ = 48_000
+
+
+def noise(frames: int, points: int = 2, level: float = 0.4) -> NDArray[np.float32]:
+    return np.random.default_rng(1).uniform(-level, level, (frames, points)).astype(np.float32)
+
+
+def of(samples: NDArray[np.float32], gain: float = 1.0) -> Voice:
+    voice = Voice.of_samples(plain_program(RATE_HZ), samples)
+    voice.start_with_gain(gain)
+    voice.memory.view(np.int64)[at.ATTACK] = 0
+    return voice
+
+
+def ask(mixer: Mixer, frames: int, flags: int = 0, now_s: float = 0.0) -> NDArray[np.float32]:
+    """What a device does: it calls the compiled callback with its own memory."""
+    out = np.full(frames * mixer.channels, np.nan, np.float32)
+    times = np.array([0.0, now_s, now_s + 0.01])
+    kind = ctypes.CFUNCTYPE(
+        ctypes.c_int32,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_uint64,
+        ctypes.c_void_p,
+        ctypes.c_uint64,
+        ctypes.c_void_p,
+    )
+    assert kind(call.address)(None, out.ctypes.data, frames, times.ctypes.data, flags, mixer.address) == 0
+    return out.reshape(frames, mixer.channels)
+
+
+def test_voices_of_one_hand_over_begin_with_the_same_frame() -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.add(of(noise(2000)))
+    mixer.render(100)
+    together = [of(noise(2000, level=0.1)) for _ in range(5)]
+    mixer.add(*together)
+    mixer.render(100)
+    assert [voice.began_frame for voice in together] == [128] * 5
+
+
+def test_below_the_ceiling_every_sample_is_as_it_was_given() -> None:
+    one, other = noise(5000), noise(5000)[::-1].copy()
+    mixer = Mixer(RATE_HZ)
+    mixer.add(of(one), of(other, 0.5))
+    expected = one.astype(np.float64) + 0.5 * other
+    np.testing.assert_array_equal(mixer.render(5000), expected.astype(np.float32))
+    assert mixer.take_reduction_db() == 0.0
+    assert mixer.take_peak() == np.abs(expected).max()
+    assert mixer.take_peak() == 0.0
+
+
+def test_nothing_exceeds_the_ceiling_and_the_gain_comes_back() -> None:
+    samples = noise(24_000, level=0.9)
+    samples[1000:1200] *= 20
+    mixer = Mixer(RATE_HZ)
+    mixer.add(of(samples))
+    found = mixer.render(24_000)
+    assert np.abs(found).max() <= np.float32(CEILING)
+    loudest = float(np.abs(samples).max())
+    assert mixer.take_reduction_db() == pytest.approx(20 * np.log10(loudest / CEILING), abs=1e-6)
+    assert mixer.take_reduction_db() < 20.0
+    np.testing.assert_array_equal(found[:1000], samples[:1000])
+    np.testing.assert_array_equal(found[-2000:], samples[-2000:])
+    gain = found[1200:6000, 0] / samples[1200:6000, 0]
+    # both sides by the same gain, so the image does not move; and it only grows
+    np.testing.assert_allclose(found[1200:6000, 1] / samples[1200:6000, 1], gain, rtol=1e-4)
+    assert (np.diff(gain) > -1e-4).all()
+    release = np.exp(np.arange(1000) / (LIMITER_RELEASE_S * RATE_HZ))
+    np.testing.assert_allclose(gain[:1000], gain[0] * release, rtol=1e-4)
+
+
+def test_one_wild_sample_is_soon_forgotten() -> None:
+    mixer = Mixer(RATE_HZ)
+    wild = np.full((48_000, 1), 0.5, np.float32)
+    wild[100] = 19.0
+    mixer.add(of(wild, 20_000.0))  # a gain that nothing in the app asks for
+    mixer.render(128)
+    level = float(mixer.memory[at.M_LIMITER])
+    assert level <= BELIEVED
+
+
+def test_a_file_is_not_limited() -> None:
+    samples = 10 * noise(1000)
+    mixer = Mixer(RATE_HZ, limited=False)
+    mixer.add(of(samples))
+    np.testing.assert_array_equal(mixer.render(1000), samples)
+
+
+def test_the_volume_glides_and_arrives() -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.add(of(np.full((48_000, 2), 0.5, np.float32)))
+    mixer.render(640)
+    mixer.set_volume(0.2)
+    found = mixer.render(20_000)[:, 0]
+    glide = 0.2 + 0.8 * np.exp(-np.arange(1, 3001) / (VOLUME_SMOOTHING_S * RATE_HZ))
+    np.testing.assert_allclose(found[:3000], 0.5 * glide, atol=1e-6)
+    assert (found[15_000:] == np.float32(0.1)).all()
+    mixer.set_volume(0.0)
+    mixer.render(20_000)
+    assert not mixer.render(1000).any()
+
+
+def test_one_channel_is_the_mean_of_both() -> None:
+    samples = noise(1000)
+    mixer = Mixer(RATE_HZ, channels=1)
+    mixer.add(of(samples))
+    found = mixer.render(1000)
+    assert found.shape == (1000, 1)
+    np.testing.assert_array_equal(found[:, 0], samples.astype(np.float64).mean(1).astype(np.float32))
+
+
+def test_other_channels_are_silent() -> None:
+    samples = noise(1000)
+    mixer = Mixer(RATE_HZ, channels=4)
+    mixer.add(of(samples))
+    found = mixer.render(1000)
+    np.testing.assert_array_equal(found[:, :2], samples)
+    assert not found[:, 2:].any()
+
+
+@pytest.mark.parametrize(("side", "sounds"), [("left", (1, 0)), ("right", (0, 1)), ("both", (1, 1))])
+def test_the_tone_sounds_on_its_side_for_a_second(side: str, sounds: tuple[int, int]) -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.sound_tone(side)
+    found = mixer.render(RATE_HZ + 1000)
+    frame = np.arange(RATE_HZ + 1000)
+    envelope = np.clip(np.minimum(frame, RATE_HZ - frame) / TONE_FADE, 0, 1)
+    tone = TONE_LEVEL * envelope * np.sin(2 * np.pi * TONE_HZ * frame / RATE_HZ)
+    np.testing.assert_allclose(found, tone[:, None] * sounds, atol=1e-6)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e7])
+def test_what_is_no_number_is_silence(value: float) -> None:
+    """A gain that is not a number gets past the voices' own guard."""
+    mixer, other = Mixer(RATE_HZ), noise(1000)
+    mixer.add(of(noise(64), value), of(other))
+    found = mixer.render(1000)
+    assert np.isfinite(found).all()
+    assert mixer.non_finite > 0
+    np.testing.assert_array_equal(found[64 + 960 :], other[64 + 960 :])
+
+
+def test_a_device_is_given_what_a_file_is() -> None:
+    called, rendered = Mixer(RATE_HZ), Mixer(RATE_HZ)
+    for mixer in (called, rendered):
+        mixer.add(of(noise(3000)))
+    blocks = [ask(called, frames, now_s=number / 100) for number, frames in enumerate((256, 1, 63, 480, 1000))]
+    np.testing.assert_array_equal(np.concatenate(blocks), rendered.render(1800))
+    assert called.calls == 5
+    assert called.seconds == 1800 / RATE_HZ
+    assert called.output_latency_s == pytest.approx(0.01)
+
+
+def test_a_voice_says_when_the_device_had_its_first_samples() -> None:
+    mixer, voice = Mixer(RATE_HZ), of(noise(3000))
+    voice.set_struck(2.0)
+    assert voice.struck_to_began_s is None
+    ask(mixer, 64, now_s=1.99)
+    mixer.add(voice)
+    ask(mixer, 64, now_s=2.004)
+    ask(mixer, 64, now_s=2.006)
+    assert voice.struck_to_began_s == pytest.approx(0.004)
+    assert voice.seconds == 128 / RATE_HZ
+
+
+def test_an_underflow_counts_as_a_gap_where_something_sounds() -> None:
+    mixer = Mixer(RATE_HZ)
+    ask(mixer, 480, UNDERFLOW)  # the very first call: nothing was missed
+    ask(mixer, 480, UNDERFLOW, now_s=0.01)
+    assert (mixer.underflows, mixer.new_gaps()) == (1, [])
+    mixer.add(of(noise(9600)))
+    ask(mixer, 480, now_s=0.02)
+    ask(mixer, 480, UNDERFLOW, now_s=0.045)
+    (gap,) = mixer.new_gaps()
+    assert (gap.cause, gap.time_s) == ("device", 3 * 480 / RATE_HZ)
+    assert gap.milliseconds == pytest.approx(15.0, abs=1e-6)
+    assert mixer.new_gaps() == []
+
+
+def test_of_very_many_gaps_the_latest_are_told() -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.add(of(noise(48_000)))
+    for number in range(at.GAPS + 20):
+        ask(mixer, 64, UNDERFLOW, now_s=number / 100)
+    gaps = mixer.new_gaps()
+    assert len(gaps) == at.GAPS
+    assert gaps[-1].time_s == (at.GAPS + 19) * 64 / RATE_HZ
+
+
+def test_beyond_the_last_place_voices_are_refused_and_over() -> None:
+    mixer = Mixer(RATE_HZ)
+    voices = [of(noise(2000, level=0.001)) for _ in range(at.MOST_VOICES + 3)]
+    mixer.add(*voices)
+    mixer.render(64)
+    assert [voice.over for voice in voices] == [False] * at.MOST_VOICES + [True] * 3
+    assert len(mixer.voices) == at.MOST_VOICES
+    mixer.render(4000)
+    assert mixer.voices == []
+    late = of(noise(2000))
+    mixer.add(late)
+    assert mixer.render(640).any()
+
+
+def test_a_full_ring_refuses_and_tells() -> None:
+    mixer = Mixer(RATE_HZ)
+    samples = noise(64)
+    voices = [of(samples) for _ in range(at.RING + 2)]
+    mixer.add(*voices)  # and nobody takes any
+    assert [voice.over for voice in voices] == [False] * at.RING + [True] * 2
+    another = of(samples)
+    mixer.add(another)
+    assert another.over
+    mixer.render(64)
+    again = of(samples)
+    mixer.add(again)
+    assert not again.over
+
+
+def test_ended_voices_are_forgotten_and_the_others_go_on() -> None:
+    mixer, lasting = Mixer(RATE_HZ), noise(20_000)
+    mixer.add(of(noise(640)), of(lasting), of(noise(64)))
+    mixer.render(6400)
+    mixer.forget_ended()
+    assert len(mixer.voices) == 1
+    np.testing.assert_array_equal(mixer.render(6400), lasting[6400:12_800])
+
+
+def test_another_rate_is_refused() -> None:
+    with pytest.raises(ValueError, match="48000 Hz, the mixer 44100 Hz"):
+        Mixer(44_100).add(of(noise(64)))
