@@ -258,7 +258,7 @@ def test_levels_are_matched_once_they_are_known(
     preset = load_preset(bank)
     loud = tmp_path / "loud.safetensors"
     with torch.no_grad():
-        preset.model.decoder.weight.mul_(3.0)  # type: ignore[union-attr, operator]
+        preset.model.decoder.weight.mul_(12.0)  # type: ignore[union-attr, operator]
     save_preset(loud, preset.info, preset.model)
     notes.prepare(loud)
     stroke = stroke_of(loud, amplitude_mm=8.0)
@@ -270,7 +270,7 @@ def test_levels_are_matched_once_they_are_known(
     wait(lambda: note.match is not None)
     assert note.match is not None
     assert note.match["truth"] == 1.0
-    assert note.match["model"] == pytest.approx(1 / 3, rel=0.1)
+    assert note.match["model"] == pytest.approx(1 / 12, rel=0.02)
     assert gains(note) == {"model": note.match["model"], "truth": 0.0}
     assert notes.match_of(stroke) == note.match
     again = notes.strike(stroke)
