@@ -38,7 +38,7 @@ from PySide6.QtCore import (
     Signal,
     qInstallMessageHandler,
 )
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtGui import QKeyEvent
 
 from app.bench.machine import Machine
 from app.bench.play import analysis, hands
@@ -217,8 +217,7 @@ class _Keys(QObject):
 
     def _send(self, sign: str, down: bool) -> None:
         kind = QEvent.Type.KeyPress if down else QEvent.Type.KeyRelease
-        key = Qt.Key(QKeySequence(sign)[0].key())
-        event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, sign)
+        event = QKeyEvent(kind, ord(sign.upper()), Qt.KeyboardModifier.NoModifier, sign)  # Qt's letters are ASCII's
         QCoreApplication.sendEvent(self._window.focusWidget() or self._window, event)
 
 

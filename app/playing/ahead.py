@@ -23,7 +23,7 @@ from engine.voices import Voice
 from engine.voices.offline import AHEAD_FIRST, AHEAD_FRAMES
 
 LEAST_S = 0.06  # rendered before it begins
-CARE = 0.9  # of its speed that is counted on
+CARE = 0.75  # of its speed that is counted on: the computer has other things to do as well
 SILENT = 1e-5  # of full scale
 KEPT = 32  # plucks that need not be rendered again
 
@@ -62,8 +62,9 @@ class AheadVoice:
 
     @property
     def speed(self) -> float:
-        """Seconds of sound in a second of rendering; 0 before the first block."""
-        return self.rendered_s / self._spent_s if self._spent_s > 0 else 0.0
+        """Seconds of sound in a second of rendering, without the first, short block; 0 before there is another."""
+        timed = self.done - 1 - AHEAD_FIRST
+        return timed / self.source.rate_hz / self._spent_s if timed > 0 and self._spent_s > 0 else 0.0
 
     @property
     def wanted_s(self) -> float:
@@ -81,7 +82,7 @@ class AheadVoice:
 
     @property
     def may_begin(self) -> bool:
-        return self.finished or self.rendered_s >= self.wanted_s
+        return self.finished or (self.speed > 0 and self.rendered_s >= self.wanted_s)
 
     @property
     def lead_s(self) -> float:
@@ -105,7 +106,8 @@ class AheadVoice:
         samples = (block / FULL_SCALE_M).float().numpy()
         self._take(samples)
         self._frames.append(samples)
-        self._spent_s += time.monotonic() - began_s
+        if self.done > 1 + AHEAD_FIRST:
+            self._spent_s += time.monotonic() - began_s
         if self.voice.room == 0 or (self.done > AHEAD_FIRST and float(np.abs(samples).max()) < SILENT):
             self.voice.end_here()
             self.finished = True

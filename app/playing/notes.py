@@ -235,6 +235,8 @@ class Notes:
                     if latency_s is not None:
                         note.timed = True
                         self._latencies_s.append(latency_s)
+                if note.ahead and note.match is None and not note.pending:
+                    self._wish_match(note)
                 if self._ear is not None:
                     for voice in note.voices.values():
                         voice.listen(self._ear)
@@ -387,14 +389,15 @@ class Notes:
     def _wish_match(self, note: Note) -> None:
         key = note.stroke.matching_key
         with self._lock:
-            if not self._mix.matched or note.match is not None or key in self._matching or len(self._matching) > 8:
+            known = note.match is not None or key in self._matching or len(self._matching) > 8
+            if not self._mix.matched or known or not all(each.rendered_s >= MATCHED_S for each in note.ahead):
                 return
             self._matching.add(key)
         self._submit(lambda: self._match(note, key))
 
     def _match(self, note: Note, key: tuple[object, ...]) -> None:
         try:
-            levels = {source: self._level(note.stroke, source) for source in note.voices}
+            levels = {source: self._level(note, source) for source in note.voices}
             found = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
         finally:
             with self._lock:
@@ -408,13 +411,14 @@ class Notes:
                     each.match = found
                     self._apply_mix(each)
 
-    def _level(self, stroke: Stroke, source: str) -> float:
-        """Root mean square of the first second; 0 of what is rendered ahead: it is left as it is."""
+    def _level(self, note: Note, source: str) -> float:
+        """Root mean square of the first second; 0, so that it is left as it is, where it is not known."""
+        stroke = note.stroke
         path, kind = stroke.path(source), "truth" if source == "truth" else "model"
         rate_hz = min(self._sound.rate_hz, 48_000)
         program = self._sources.program(path, kind, rate_hz)
         if program.rendered:
-            return 0.0
+            return note.voices[source].level_of_samples(MATCHED_S) if stroke.ear.pickup == "displacement" else 0.0
         mixer = Mixer(rate_hz, limited=False)
         initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
         mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))

@@ -59,6 +59,7 @@ class Voice:
         place = _state(n)
         memory[place : place + n], memory[place + n : place + 2 * n] = first, second
         self._samples: NDArray[np.float32] | None = None
+        self._source_rate_hz = source_rate_hz
         if program.kind == at.TRUTH:
             counts[at.MOVING] = n
         elif program.kind == at.BANK:
@@ -180,6 +181,12 @@ class Voice:
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
         self._counts[at.READY] = ready + count
+
+    def level_of_samples(self, seconds: float) -> float:
+        """Root mean square of what a rendered voice was given for its first seconds."""
+        assert self._samples is not None
+        frames = min(int(self._counts[at.READY]), round(seconds * self._source_rate_hz))
+        return math.sqrt(float(np.square(self._samples[:frames], dtype=np.float64).mean())) if frames else 0.0
 
     @property
     def room(self) -> int:
