@@ -390,14 +390,19 @@ class Notes:
         key = note.stroke.matching_key
         with self._lock:
             known = note.match is not None or key in self._matching or len(self._matching) > 8
-            if not self._mix.matched or known or not all(each.rendered_s >= MATCHED_S for each in note.ahead):
+            if (
+                not self._mix.matched
+                or known
+                or not all(each.finished or each.rendered_s >= MATCHED_S for each in note.ahead)
+            ):
                 return
             self._matching.add(key)
-        self._submit(lambda: self._match(note, key))
+        self._submit(self._guarded(lambda: self._match(note, key)))
 
     def _match(self, note: Note, key: tuple[object, ...]) -> None:
         try:
-            levels = {source: self._level(note, source) for source in note.voices}
+            seconds = min([MATCHED_S, *(each.rendered_s for each in note.ahead)])  # a pluck may be shorter
+            levels = {source: self._level(note, source, seconds) for source in note.voices}
             found = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
         finally:
             with self._lock:
@@ -411,18 +416,18 @@ class Notes:
                     each.match = found
                     self._apply_mix(each)
 
-    def _level(self, note: Note, source: str) -> float:
-        """Root mean square of the first second; 0, so that it is left as it is, where it is not known."""
+    def _level(self, note: Note, source: str, seconds: float) -> float:
+        """Root mean square of the first seconds; 0, so that it is left as it is, where it is not known."""
         stroke = note.stroke
         path, kind = stroke.path(source), "truth" if source == "truth" else "model"
         rate_hz = min(self._sound.rate_hz, 48_000)
         program = self._sources.program(path, kind, rate_hz)
         if program.rendered:
-            return note.voices[source].level_of_samples(MATCHED_S) if stroke.ear.pickup == "displacement" else 0.0
+            return note.voices[source].level_of_samples(seconds) if stroke.ear.pickup == "displacement" else 0.0
         mixer = Mixer(rate_hz, limited=False)
         initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
         mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))
-        sound = mixer.render(round(MATCHED_S * rate_hz))
+        sound = mixer.render(round(seconds * rate_hz))
         return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))
 
 
