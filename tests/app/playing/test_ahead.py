@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from app.playing import Sources
-from app.playing.ahead import LEAST_S, Ahead, AheadVoice
+from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
 from engine.pluck import Pluck
@@ -113,15 +113,13 @@ def test_a_slow_model_begins_when_the_rest_will_be_ready_in_time(
     ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow_down(monkeypatch, speed=0.8)
-    voice, told = make(seconds=0.6)
+    voice, told = make(seconds=1.0)
     ahead.render(voice)
-    wait(lambda: voice.done > 0)
     wait(lambda: voice.waits_s > 0)
     wait(lambda: voice.begun)
     (begun_s,) = told.begun_s
-    assert begun_s > LEAST_S
-    assert begun_s == pytest.approx(0.3, abs=0.29), "some of it is rendered while it is heard"
-    assert voice.rendered_s >= voice.wanted_s
+    assert 1 - CARE * 0.8 <= begun_s < 1.0, "some of it is rendered while it is heard"
+    assert voice.waits_s == 0
 
 
 def test_what_was_rendered_once_is_there_at_once(ahead: Ahead, make: Make, wait: Wait) -> None:

@@ -280,6 +280,25 @@ def test_levels_are_matched_once_they_are_known(
     assert gains(again)["model"] == 1.0
 
 
+@pytest.mark.parametrize("seconds", [0.5, 1.5])
+def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(
+    notes: Notes, small_preset: Path, stroke_of: StrokeOf, wait: Wait, seconds: float
+) -> None:
+    """All of it, where that is short."""
+    notes.set_mix(Mix("model", matched=True))
+    note = notes.strike(stroke_of(small_preset, position=0.43, seconds=seconds))
+    wait(lambda: not note.pending)
+
+    def matched() -> bool:
+        notes.poll()
+        return note.match is not None
+
+    wait(matched)
+    assert note.match is not None
+    assert note.match["model"] == pytest.approx(1.0, abs=0.3)
+    assert note.match["model"] != 1.0
+
+
 def test_a_listening_point_moves_while_it_rings(
     notes: Notes, sound: Any, sources: Sources, bank: Path, stroke_of: StrokeOf
 ) -> None:
@@ -455,7 +474,7 @@ def test_notes_ring_on_where_the_device_changes_its_rate(
 def test_another_rate_while_a_model_is_rendered(
     notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait, slow_model: None
 ) -> None:
-    note = notes.strike(stroke_of(small_preset, seconds=0.3))
+    note = notes.strike(stroke_of(small_preset, seconds=0.6))
     wait(lambda: note.waits_s > 0)
     sound.mixer = Mixer(44_100)
     wait(lambda: not note.pending)
