@@ -18,6 +18,7 @@ from engine.kernels.voice import add, note_gap
 
 CEILING = 10 ** (-0.3 / 20)
 BELIEVED = 100.0  # +40 dBFS: the level that the limiter believes at most, so that one wild sample is soon forgotten
+ATTACK = 1 / 48  # the most that the limiter's gain falls in a frame, where it can know beforehand
 TONE_HZ, TONE_LEVEL, TONE_FADE = 440.0, 0.1, 960
 UNDERFLOW = 4  # PortAudio's flag
 
@@ -93,6 +94,8 @@ def _finish(mixer: np.ndarray) -> None:
     volume, wanted, smoothing = mixer[at.M_VOLUME], mixer[at.M_WANTED_VOLUME], mixer[at.M_SMOOTHING]
     level, release = mixer[at.M_LIMITER], mixer[at.M_RELEASE]
     reduction, peak = mixer[at.M_REDUCTION], mixer[at.M_PEAK]
+    gains = mixer[at.M_GAINS : at.M_GAINS + at.QUANTUM]
+    limited = False
     for frame in range(at.QUANTUM):
         if volume != wanted:
             volume = wanted + (volume - wanted) * smoothing
@@ -114,13 +117,21 @@ def _finish(mixer: np.ndarray) -> None:
             counts[at.M_NON_FINITE] += 1
         loudest = min(max(abs(left), abs(right)), BELIEVED)
         level = max(loudest, release * level)
+        gains[frame] = 1.0
         if level > CEILING and counts[at.M_LIMITING]:
-            gain = CEILING / level
-            reduction = min(reduction, gain)
-            left = min(max(left * gain, -CEILING), CEILING)
-            right = min(max(right * gain, -CEILING), CEILING)
-        peak = max(peak, abs(left), abs(right))
+            gains[frame] = CEILING / level
+            limited = True
         mixer[at.M_MIX + 2 * frame], mixer[at.M_MIX + 2 * frame + 1] = left, right
+    if limited:  # a gain that falls within the quantum begins to do so before its peak, where there is time
+        for frame in range(at.QUANTUM - 2, -1, -1):
+            gains[frame] = min(gains[frame], gains[frame + 1] + ATTACK)
+        for frame in range(at.QUANTUM):
+            gain = gains[frame]
+            reduction = min(reduction, gain)
+            for slot in range(at.M_MIX + 2 * frame, at.M_MIX + 2 * frame + 2):
+                mixer[slot] = min(max(mixer[slot] * gain, -CEILING), CEILING)
+    for slot in range(at.M_MIX, at.M_MIX + 2 * at.QUANTUM):
+        peak = max(peak, abs(mixer[slot]))
     mixer[at.M_VOLUME], mixer[at.M_LIMITER] = volume, level
     mixer[at.M_REDUCTION], mixer[at.M_PEAK] = reduction, peak
 

@@ -26,6 +26,7 @@ from app.bench.machine import Machine
 from app.bench.play import analysis, hands
 from app.bench.play.calibration import Holding, Transit, click_through, transit
 from app.bench.play.children import child, need_programs
+from app.bench.play.control import steady_tone
 from app.bench.play.picture import picture_lags
 from app.bench.play.recording import CardClock, Recording, recording
 from app.bench.play.screen import Screen, private_screen
@@ -75,6 +76,7 @@ class Phase:
         fades: falls of the level by 40 dB that come back, other than holes.
         clicks: steps that are no pluck's beginning.
         cpu_cores: of the program, while it was played.
+        control_holes: of a steady tone that another process plays meanwhile in the same way.
     """
 
     busy: bool
@@ -96,6 +98,9 @@ class Phase:
     click_times_s: tuple[float, ...]
     loudest: float
     cpu_cores: float
+    control_holes: int
+    control_holes_ms: float
+    control_longest_ms: float
 
 
 @dataclass(frozen=True)
@@ -164,6 +169,7 @@ def measure(
         choices = Choices()
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         started_s = time.monotonic()
+        control = stack.enter_context(steady_tone(server, folder, buffer))
         process = stack.enter_context(_app(folder, settings, server, screen))
         window, window_s = _open_window(screen, process)
         _try_keys(screen, recorded, process, started_s)
@@ -178,7 +184,7 @@ def measure(
         tell("analysis")
         clock, way = recorded.clock(), transit(clicks, recorded)
         sound = recorded.sound()
-        phases = tuple(_judged(p, sound, clock, way) for p in played)
+        phases = tuple(_judged(p, sound, clock, way, _control_holes_ms(p, control)) for p in played)
         first = np.flatnonzero(np.abs(sound[(start := clock.frame(started_s)) :, 0]) > analysis.FAINTEST_PLUCK)
         lags_s = [
             changed_s - clock.time_s(heard)
@@ -311,7 +317,14 @@ def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> float | None
     return (_cpu_s(process) - before_cpu_s) / (time.monotonic() - before_s)
 
 
-def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit) -> Phase:
+def _control_holes_ms(played: _Played, control: Recording) -> list[float]:
+    """Holes of the steady tone while the app was played."""
+    clock, sound = control.clock(), control.sound()
+    part = sound[clock.frame(played.keys_s[0]) : clock.frame(played.keys_s[-1] + analysis.SOUNDS_S), 0]
+    return [silence.frames * 1000 / RATE_HZ for silence in analysis.silences(part, RATE_HZ)]
+
+
+def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, control_ms: list[float]) -> Phase:
     keys = [clock.frame(key_s) for key_s in played.singles_s]
     onsets = [analysis.onset(sound[:, 0], key, RATE_HZ) for key in keys]
     latencies_s = [
@@ -359,4 +372,7 @@ def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit) 
         tuple(since_s(click) for click in clicks),
         float(np.abs(part).max()),
         played.cpu_cores,
+        len(control_ms),
+        sum(control_ms),
+        max(control_ms, default=0.0),
     )

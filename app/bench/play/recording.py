@@ -119,10 +119,10 @@ class Recording:
 
 
 @contextlib.contextmanager
-def recording(server: SoundServer, path: Path) -> Iterator[Recording]:
-    """Records into `path` until the block ends."""
+def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Recording]:
+    """Records what a sink is given into `path` until the block ends."""
     reading, writing = _pipe()
-    with reading, child(_recorder(CHANNELS), server.environment, stdout=writing):
+    with reading, child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
         writing.close()
         yield Recording(reading, path)
 
@@ -130,12 +130,12 @@ def recording(server: SoundServer, path: Path) -> Iterator[Recording]:
 @contextlib.contextmanager
 def recording_aside(server: SoundServer, path: Path) -> Iterator[None]:
     """Records both channels' mean, float32 (frames,), into `path`, in which this process has no part."""
-    with path.open("wb") as file, child(_recorder(1), server.environment, stdout=file):
+    with path.open("wb") as file, child(_recorder(1, SINK), server.environment, stdout=file):
         yield
 
 
-def _recorder(channels: int) -> list[str]:
-    command = ["parec", "--raw", "-d", f"{SINK}.monitor", f"--format={FORMAT}", f"--rate={RATE_HZ}"]
+def _recorder(channels: int, sink: str) -> list[str]:
+    command = ["parec", "--raw", "-d", f"{sink}.monitor", f"--format={FORMAT}", f"--rate={RATE_HZ}"]
     return [*command, f"--channels={channels}", f"--latency-msec={LATENCY_MS}"]
 
 

@@ -23,6 +23,7 @@ RATE_HZ = 48_000
 CHANNELS = 2
 FORMAT = "float32le"
 SINK = "test"
+FIRST_SINK = 0  # as pactl counts: the app's
 SILENCE = "silence"
 START_PATIENCE_S = 10.0
 
@@ -55,7 +56,8 @@ class SoundServer:
         command = ["pactl", "--format=json", "list", "sink-inputs"]
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True)
         try:
-            others = [c for c in json.loads(done.stdout) if c["properties"].get("media.name") != SILENCE]
+            clients = json.loads(done.stdout)
+            others = [c for c in clients if c["sink"] == FIRST_SINK and c["properties"].get("media.name") != SILENCE]
             [client] = others
             return float(client["buffer_latency_usec"]) * 1e-6
         except (ValueError, KeyError, TypeError):
