@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -45,6 +46,7 @@ from engine.preset import SHIPPED
 
 FRAME_MS = 16
 IDLE_MS = 100  # between two looks while nothing moves
+FACTS_EVERY = 6  # ticks, for what is read and not watched
 LIVELY_S = 1.0  # after the last movement pictures go on at full pace
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
@@ -82,6 +84,8 @@ class Controller(QObject):
         self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
         self._lively_until_s = 0.0
+        self._ticks = 0
+        self._elapsed_before_s = 0.0
         self._peak_db = METER_FLOOR_DB
         self._abx: AbxDialog | None = None  # while it is open, the sound is its own
         self._help: HelpDialog | None = None
@@ -301,13 +305,20 @@ class Controller(QObject):
         playing, take = performance.playing, performance.take
         window.transport.show_playing(playing)
         self._show_level(elapsed_s)
-        mix, choices = mix_of(self.session.choices), self.session.choices
-        window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
-        self.audio.show(status, performance.notes, take)
+        self._ticks += 1
+        if self._ticks % FACTS_EVERY == 0:
+            mix, choices = mix_of(self.session.choices), self.session.choices
+            window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
+            self.audio.show(status, performance.notes, take)
         moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
+        of_decks = replace(moment, elapsed_s=elapsed_s + self._elapsed_before_s)
+        self._elapsed_before_s = elapsed_s
         for panel in self.panels:
             if panel.view.isVisible():
-                panel.show_moment(moment)
+                if isinstance(panel, StringPanel):
+                    panel.show_moment(moment)
+                elif panel.on_the_left == bool(self._ticks % 2):  # by turns: no picture keeps a key waiting for long
+                    panel.show_moment(of_decks)
         if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
             self._lively_until_s = now_s + LIVELY_S
         wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from app.audio import Sound
+from app.keyboard import PLACES, Reach
 from app.library import Library, PresetEntry
 from app.main_window import MainWindow
 from app.panels import Panel, StringPanel
@@ -31,6 +32,7 @@ from engine.pluck import Pluck
 MotionKey = tuple[str, Pluck, int]  # the preset's name, the pluck, the number of frames
 LOOP_AHEAD_S = 0.5  # the next turn of a loop is handed over so long before it begins
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
+KEY_FIELDS = {"preset", "amplitude_mm", "shape", "width"}  # what the keys' plucks depend on beside their places
 MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
 
@@ -191,6 +193,11 @@ class Performance(QObject):
             self.notes.set_mix(mix_of(choices))
         if names & EAR_FIELDS:
             self.notes.listen(ear_of(choices))
+        if names & KEY_FIELDS and entry is not None:
+            reach = Reach.of(entry.info)
+            places = (reach.place(number / (PLACES - 1)) for number in range(PLACES))
+            plucks = [replace(choices.pluck, position=place) for place in places]
+            self.notes.prepare_plucks(entry.path, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
         if entry is not None and render_request(choices, entry.path, self._library) != self._asked:

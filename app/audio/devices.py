@@ -16,6 +16,7 @@ from app.audio.problems import no_device, not_started, portaudio_missing, refuse
 from engine.voices.mixer import Mixer
 
 SMALLEST_BLOCK = 64
+PERIODS = 4  # of a buffer: a pluck waits for the next
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
     """Opens, but does not start, a float32 stream at the device's own rate, so that no rate is forced on it.
 
     The device calls the compiled mixer itself, in its own thread: the interpreter has no part in it. Its buffer is
-    `buffer_s`, or what it calls low latency where that is longer; half of it is asked for at a time.
+    `buffer_s`, or what it calls low latency where that is longer; a quarter of it is asked for at a time.
 
     Raises:
         AudioUnavailable: With the reason in plain words.
@@ -87,7 +88,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
         index, _ = _find(device.name, device.host_api)
         ffi, channels = sounddevice._ffi, min(device.channels, 2)
         low_s = sounddevice.query_devices(index)["default_low_output_latency"]
-        frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / 2))
+        frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
         try:
             # made for other libraries to hand over a callback of their own, as rtmixer does
             stream: RawStream = sounddevice._StreamBase(

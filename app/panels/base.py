@@ -47,6 +47,7 @@ class Panel(QObject):
     title: ClassVar[str]  # on its tab
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     view: QWidget
+    on_the_left = False  # in which deck
 
     seek_asked = Signal(float)  # move the playhead to this time in s
     pluck_asked = Signal()
@@ -67,7 +68,7 @@ class Panel(QObject):
         """All of it is there."""
 
     def show_moment(self, moment: Moment) -> None:
-        """Sixty times a second, while the panel can be seen."""
+        """Sixty times a second for the string, thirty for the others, while the panel can be seen."""
 
     def close(self) -> None:
         """The window closes."""

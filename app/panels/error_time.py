@@ -12,7 +12,7 @@ from app.rendering import Take
 from app.session import Session
 from app.views.error_time_view import LONG_S, ErrorTimeView, percent
 
-EVERY = 6  # moments
+EVERY = 3  # moments
 
 
 class ErrorTimePanel(Panel):

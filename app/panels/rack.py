@@ -29,6 +29,7 @@ def fill(window: MainWindow, session: Session, library: Library) -> list[Panel]:
     for choice, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
         for panel in (kind(session, library) for kind in kinds):
             deck.add(panel.key, panel.title, panel.view)
+            panel.on_the_left = deck is window.left
             panels.append(panel)
         deck.chosen.connect(lambda key, choice=choice: session.update(**{choice: key}))
     return panels

@@ -11,7 +11,7 @@ from app.session import Session
 from app.views.space_time_view import SpaceTimeView
 
 MM = 1000.0
-EVERY = 6  # moments
+EVERY = 3  # moments
 
 
 class SpaceTimePanel(Panel):

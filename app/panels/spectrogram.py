@@ -13,7 +13,7 @@ from app.session import Session
 from app.shown import ear, full_scale_words
 from app.views.spectrogram_view import SpectrogramView
 
-EVERY = 6  # moments
+EVERY = 3  # moments
 ROWS = 320
 MOST_COLUMNS = 600  # drawn at a time: what is there already when the panel is opened comes in a few steps
 

@@ -1,4 +1,4 @@
-"""The spectrum of what the slots hold, as it is heard at the playhead; fifteen times a second."""
+"""The spectrum of what the slots hold, as it is heard at the playhead."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.session import Session
 from app.shown import LEGEND_FIELDS, ear, full_scale_words, part_words, shown_sources
 from app.views.spectrum_view import SpectrumView, analyser_at
 
-EVERY = 4  # moments
+EVERY = 2  # moments
 
 
 class SpectrumPanel(Panel):

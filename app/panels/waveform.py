@@ -15,7 +15,7 @@ from app.session import Session
 from app.shown import LEGEND_FIELDS, ear, part_words, readable_unit, shown_sources
 from app.views.waveform_view import WaveformView
 
-EVERY = 3  # moments
+EVERY = 2  # moments
 MOST_FRAMES = 32_768  # at a time: what is new after the listening point has moved comes in a few steps
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound

@@ -10,7 +10,7 @@ import math
 import threading
 import traceback
 from collections import OrderedDict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
 from app.precedence import Rank, step_back
 from engine.kernels.layout import QUANTUM
+from engine.pluck import Pluck
 from engine.preset import PresetError
 from engine.voices import Ear, Mixer, Voice, render_voice
 
@@ -134,6 +135,7 @@ class Notes:
         self._latencies_s: deque[float] = deque(maxlen=100)
         self._helper = ThreadPoolExecutor(1, "notes-helper", step_back, (Rank.BACKGROUND,))
         self._closed = False
+        self._wished_plucks: object = None
 
     # Gestures
 
@@ -169,6 +171,19 @@ class Notes:
         for path in paths:
             if not self._sources.has(path, rate_hz):
                 self._submit(self._guarded(lambda path=path: self._sources.prepare(path, rate_hz)))  # type: ignore[misc]
+
+    def prepare_plucks(self, path: Path, plucks: Sequence[Pluck]) -> None:
+        """Computes in the background what voices of these plucks set out from; the latest wish counts."""
+        rate_hz = self._sound.rate_hz
+        wish = self._wished_plucks = object()
+
+        def work() -> None:
+            for pluck in plucks:
+                for kind in ("model", "truth"):
+                    if not self._closed and wish is self._wished_plucks:
+                        self._sources.begin(path, kind, rate_hz, pluck)
+
+        self._submit(self._guarded(work))
 
     def stop(self, seconds: float = STOP_S) -> None:
         """All fade out; what waits is not heard."""

@@ -23,6 +23,7 @@ from app.settings import Buffer
 SINK = "control"
 TONE_HZ = 440
 LEVEL = 0.1
+PATIENCE_S = 20.0
 
 
 @contextlib.contextmanager
@@ -34,6 +35,7 @@ def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[R
     with (folder / "control.log").open("wb") as log, recording(server, folder / "control", SINK) as recorded:
         command = [sys.executable, "-m", "app.bench.play.control", str(buffer)]
         with child(command, environment, stdout=log, stderr=log):
+            recorded.wait_for_sound(0.0, PATIENCE_S)  # its start is not to be beside the app's
             yield recorded
 
 

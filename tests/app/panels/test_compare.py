@@ -13,9 +13,11 @@ from app.controller import Controller
 
 
 @pytest.fixture
-def shown(controller: Controller) -> Any:
+def shown(qtbot: QtBot, controller: Controller) -> Any:
     controller.session.update(right_view="compare")
-    return next(panel.view for panel in controller.panels if panel.key == "compare")
+    view = next(panel.view for panel in controller.panels if panel.key == "compare")
+    qtbot.waitUntil(lambda: bool(view.table.rows))  # type: ignore[attr-defined]
+    return view
 
 
 def figures(shown: Any) -> dict[object, tuple[Any, ...]]:
