@@ -116,7 +116,7 @@ def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSou
     (options,) = sounddevice.opened
     assert options["device"] == 3
     assert options["samplerate"] == 48_000
-    assert options["blocksize"] == 600  # half of the buffer
+    assert options["blocksize"] == 600  # a quarter of the buffer
     assert (options["channels"], options["dtype"]) == (2, "float32")
     assert options["latency"] == 0.05
     open_device(wanted, 0.005, mixer)
