@@ -46,26 +46,25 @@ class Line:
         """How many more frames there are before a time."""
         return max(0, min(self.frames, math.ceil(time_s * self.rate_hz)) - self.done)
 
-    def advance(self, frames: int, readout: Tensor | None = None) -> NDArray[np.float32]:
-        """The next `frames` in m, (frames, grid_points), or (frames, points) where `readout` says."""
-        points = self.grid_points if readout is None else readout.shape[1]
-        blocks = [torch.zeros(0, points)]
+    def advance(self, frames: int) -> NDArray[np.float32]:
+        """The next `frames` in m, (frames, grid_points)."""
+        blocks = [torch.zeros(0, self.grid_points)]
         first = self.done == 0 and frames > 0
         if first:
-            blocks.append((self._initial if readout is None else self._initial @ readout).float())
+            blocks.append(self._initial.float())
         if frames > first:
-            blocks.append(self._steps(frames - first, points, readout).float())
+            blocks.append(self._steps(frames - first).float())
         self.done += frames
         return torch.cat(blocks).numpy()
 
-    def _steps(self, steps: int, points: int, readout: Tensor | None) -> Tensor:
+    def _steps(self, steps: int) -> Tensor:
         if self._source is not None and self._state is not None and self.ends_s is None:
             try:
-                block, self._state = self._source.advance(self._state, steps, readout)
+                block, self._state = self._source.advance(self._state, steps)
                 return block[0]
             except Runaway:  # at rest from here on: it must never reach a loudspeaker
                 self.ends_s = max(self.done - 1, 0) / self.rate_hz
-        return torch.zeros(steps, points)
+        return torch.zeros(steps, self.grid_points)
 
 
 @lru_cache(maxsize=8)  # every source of a take begins with the same
