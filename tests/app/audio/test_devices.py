@@ -120,7 +120,7 @@ def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSou
     assert (options["channels"], options["dtype"]) == (2, "float32")
     assert options["latency"] == 0.05
     open_device(wanted, 0.005, mixer)
-    assert (sounddevice.opened[1]["latency"], sounddevice.opened[1]["blocksize"]) == (0.01, 120)
+    assert (sounddevice.opened[1]["latency"], sounddevice.opened[1]["blocksize"]) == (0.01, 64)
     open_device(wanted, 0.0, mixer)
     assert sounddevice.opened[2]["blocksize"] == 64
 
