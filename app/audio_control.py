@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # of the device's own buffer; sound waits for nothing else
 LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
-EVERY = 30  # moments between two looks at the list of devices
+LIST_EVERY = 5  # calls of `show` between two looks at the list of devices
 
 
 class AudioControl(QObject):
@@ -65,7 +65,7 @@ class AudioControl(QObject):
         self._window.notices.tell(self._notice, problem.detail)
 
     def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
-        """The present state, sixty times a second."""
+        """The present state, ten times a second."""
         if status.problem is None:
             if self._notice:
                 self._window.notices.withdraw(self._notice)  # the sound is back
@@ -78,7 +78,7 @@ class AudioControl(QObject):
         if self._dialog is not None and self._dialog.isVisible():
             self._moments += 1
             self._dialog.show_state(self._state(status))
-            if self._moments % EVERY == 0 and self._listed is not None:
+            if self._moments % LIST_EVERY == 0 and self._listed is not None:
                 self._list_devices()
 
     def show_dialog(self) -> None:

@@ -1,7 +1,7 @@
 """Where everything is connected: session, performance, sound, panels and window.
 
     widgets ── intents ──► session ── changed ──► controller ──► performance, sound, panels, widgets
-    a timer ── 60 times a second ──► the panels that can be seen, meter
+    a timer ── 60 times a second, 10 when all is still ──► the panels that can be seen, meter
 
 Everything here runs in the window's thread.
 """
@@ -46,7 +46,7 @@ from engine.preset import SHIPPED
 
 FRAME_MS = 16
 IDLE_MS = 100  # between two looks while nothing moves
-FACTS_EVERY = 6  # ticks, for what is read and not watched
+FACTS_S = 0.1  # between two looks at what is read and not watched
 LIVELY_S = 1.0  # after the last movement pictures go on at full pace
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
@@ -85,6 +85,7 @@ class Controller(QObject):
         self._timer.timeout.connect(self._tick)
         self._lively_until_s = 0.0
         self._ticks = 0
+        self._facts_due_s = 0.0
         self._elapsed_before_s = 0.0
         self._peak_db = METER_FLOOR_DB
         self._abx: AbxDialog | None = None  # while it is open, the sound is its own
@@ -306,7 +307,8 @@ class Controller(QObject):
         window.transport.show_playing(playing)
         self._show_level(elapsed_s)
         self._ticks += 1
-        if self._ticks % FACTS_EVERY == 0:
+        if now_s >= self._facts_due_s:
+            self._facts_due_s = now_s + FACTS_S
             mix, choices = mix_of(self.session.choices), self.session.choices
             window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
             self.audio.show(status, performance.notes, take)

@@ -18,7 +18,7 @@ from app.audio import Sound
 from app.keyboard import PLACES, Reach
 from app.library import Library, PresetEntry
 from app.main_window import MainWindow
-from app.panels import Panel, StringPanel
+from app.panels import Panel
 from app.playing import Note, Notes, Sources, Stroke
 from app.preset_words import percent
 from app.render_mail import RenderMail
@@ -59,7 +59,6 @@ class Performance(QObject):
         super().__init__(window)
         self._window, self._session, self._library, self._sound = window, session, library, sound
         self._panels = panels
-        self._string = next(panel for panel in panels if isinstance(panel, StringPanel))
         self._asked: RenderRequest | None = None
         self._shown = _Shown()
         self._latest: Note | None = None  # struck last

@@ -27,7 +27,7 @@ class Candidate:
     """What can be A or B.
 
     Attributes:
-        source: its name in the track.
+        source: its name among the sounds of a pluck.
         label: its name for people.
         preset, preset_sha256: what made it; of the truth, the preset whose string it is.
     """
@@ -91,12 +91,8 @@ def make_stimuli(
         made,
         (min(0.0, 20 * math.log10(gains[0])), min(0.0, 20 * math.log10(gains[1]))),  # not a rounding above 0
         same=bool(np.array_equal(made["A"], made["B"])),
-        trivial=_convergence(_mono(gains[0] * a), _mono(gains[1] * b)) > TRIVIAL_CONVERGENCE,
+        trivial=_convergence(gains[0] * a.mean(axis=1), gains[1] * b.mean(axis=1)) > TRIVIAL_CONVERGENCE,
     )
-
-
-def _mono(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    return samples if samples.ndim == 1 else samples.mean(axis=1)
 
 
 def _convergence(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -37,7 +37,7 @@ class SoundStatus:
 
     Attributes:
         device: None: silent.
-        rate_hz: of the mixer; opening a device may change it, and all voices end then.
+        rate_hz: of the mixer; opening a device may change it, and most voices end then.
         latency_s: the device's buffer.
         gaps: silences that nobody asked for, of this run.
         load: the share of the device's time that the mixer takes.
@@ -118,7 +118,7 @@ class Sound:
         """Changes to another device, known by name and host API, or, for None, to the system's default.
 
         The present one is taken again if a new one, or a new rate or buffer, is refused; then `on_problem` hears of
-        it. What rings goes on where the rate stays, and ends where it changes.
+        it. What rings goes on where the rate stays. Where it changes, voices end, and notes go on as new ones.
 
         Args:
             buffer_s: the device's buffer: longer is safer, shorter more prompt.

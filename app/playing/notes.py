@@ -89,10 +89,6 @@ class Note:
         return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
 
     @property
-    def ran_away(self) -> bool:
-        return any(voice.ran_away for voice in self.voices.values())
-
-    @property
     def began_frame(self) -> int:
         """Of the mixer; 0 before it began."""
         return max((voice.began_frame for voice in self.voices.values()), default=0)

@@ -5,24 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-REACH_FRAMES = 32  # of the filter to either side
-_KAISER_BETA = 8.0
+from engine.voices.derivative import REACH_FRAMES, differentiator_taps
 
 
 class Differentiator:
-    """The derivative of a band-limited signal: a Kaiser-windowed ideal differentiator of 65 taps.
+    """The derivative of a band-limited signal.
 
-    Its phase is exact (the taps are odd about the middle) and its gain is true within 0.05 % up to 0.9 of half
-    the rate. Before its first frame a string is at rest, and one without damping would move through that frame
+    Before its first frame a string is at rest, and one without damping would move through that frame
     symmetrically in time, so the signal is continued backwards as its mirror image: the velocity begins at zero.
     Behind its last frame the signal is turned about that frame, which keeps its slope.
     """
 
     def __init__(self, rate_hz: int) -> None:
-        distance = np.arange(1, REACH_FRAMES + 1)
-        window = np.kaiser(2 * REACH_FRAMES + 1, _KAISER_BETA)[REACH_FRAMES + 1 :]
-        half = rate_hz * np.where(distance % 2, 1.0, -1.0) / distance * window
-        self._taps = np.concatenate([-half[::-1], [0.0], half])[::-1]
+        self._taps = differentiator_taps(rate_hz)[::-1]  # `np.convolve` turns them again
         self._kept: NDArray[np.float64] | None = None  # the last inputs, mirrored where there are none before
         self._early: list[NDArray[np.float64]] = []  # inputs until there are enough of them for the mirror
 

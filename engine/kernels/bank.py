@@ -25,7 +25,7 @@ DEAD = math.log(4e-7)  # of full scale: a latent that is quieter is left out
 LOOK_EVERY = 8  # quanta
 NO_FIXED_POINT = 3e-4  # nepers: the second step would change a smaller change by less than its square
 STRAIGHT = 5e-6  # radians and nepers of a segment that may come from a cubic term that is left out
-_PI, _TWO_PI, _QUARTER = math.pi, 2 * math.pi, math.pi / 4
+_TWO_PI = 2 * math.pi
 
 
 @njit(inline="always", **COMPILED)

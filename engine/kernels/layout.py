@@ -62,8 +62,6 @@ ALIVE = 39  # W latents up to the last that can be heard
 WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
 HEADER = 41
 
-SETS = 2  # of weights
-
 
 @njit(inline="always", **COMPILED)
 def weights(modes: int, which: int, point: int, part: int) -> int:
@@ -98,8 +96,7 @@ ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
 CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
 BANK_ROWS = 21
 
-# Rows of the truth's state
-AMPLITUDE, SPEED = 0, 1
+# Rows of the truth's state: amplitude and speed
 TRUTH_ROWS = 2
 
 # Slots of a bank's program

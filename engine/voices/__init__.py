@@ -4,6 +4,7 @@ programs   what all voices of a source share, made from a preset for one sample 
 ear        where and how a string is heard
 voice      one pluck of a program
 mixer      the sum: what a device plays
+derivative velocity from displacement
 offline    a voice for a file
 """
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout as at
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.voices.derivative import differentiator_taps
 from engine.voices.voice import Voice
 
 LIMITER_RELEASE_S = 0.08
 VOLUME_SMOOTHING_S = 0.015
-KAISER_BETA = 8.0
 CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUNAWAY: "runaway"}
 
 
@@ -48,7 +48,8 @@ class Mixer:
         memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
         memory[at.M_SMOOTHING] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
         counts[at.M_TONE_FRAME] = counts[at.M_TONE_LENGTH] = 0
-        memory[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1] = _differentiator(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
+        taps = differentiator_taps(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
+        memory[at.M_TAPS : at.M_TAPS + len(taps)] = taps
 
     @property
     def channels(self) -> int:
@@ -155,14 +156,3 @@ class Mixer:
     def non_finite(self) -> int:
         """Samples that were replaced by silence."""
         return int(self._counts[at.M_NON_FINITE])
-
-
-def _differentiator(rate_hz: int) -> NDArray[np.float64]:
-    """Taps of the derivative of a band-limited signal, per second: a Kaiser-windowed ideal differentiator.
-
-    Its phase is exact (the taps are odd about the middle) and its gain true within 0.05 % up to 0.9 of half the rate.
-    """
-    distance = np.arange(1, at.REACH + 1)
-    window = np.kaiser(2 * at.REACH + 1, KAISER_BETA)[at.REACH + 1 :]
-    half = rate_hz * np.where(distance % 2, 1.0, -1.0) / distance * window
-    return np.concatenate([-half[::-1], [0.0], half])
