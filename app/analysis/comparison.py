@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from app.analysis.job import Cancelled, Job
-from app.library import PresetEntry
+from app.presets.library import PresetEntry
 from app.rendering.job import BLOCK_FRAMES
 from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck

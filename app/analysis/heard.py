@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from app.rendering import SOURCES, Take
 from app.rendering.take import Motion
 from app.rendering.velocity import REACH_FRAMES, Differentiator
-from app.sound_names import DIFFERENCE
+from app.shared.vocabulary import DIFFERENCE
 from engine.voices import Ear
 
 

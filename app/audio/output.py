@@ -9,7 +9,7 @@ from typing import Protocol
 
 from app.audio.devices import AudioDevice, close_device, open_device
 from app.audio.problems import refused
-from app.precedence import native_threads, put_first
+from app.shared.thread_priority import native_threads, put_first
 from engine.voices.mixer import Mixer
 
 STALLED_AFTER_S = 2.5  # without a call: longer than any start of a sound server that was seen

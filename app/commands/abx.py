@@ -18,7 +18,7 @@ def group() -> None:
 @abx.command()
 def show(file: Annotated[Path, typer.Argument(metavar="FILE", help="A record that the app has saved.")]) -> None:
     """Check a record and print it in words."""
-    from app.abx.record import load_record
-    from app.abx.text import as_text
+    from app.analysis.abx.record import load_record
+    from app.analysis.abx.text import as_text
 
     print(as_text(load_record(file)), end="")

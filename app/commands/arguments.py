@@ -45,7 +45,7 @@ def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width
 
 def open_preset(name_or_path: str) -> Preset:
     """The preset of a name (the user's own among them) or a path. Raises PresetError."""
-    from app.preset_folders import usable_files
+    from app.presets.folders import usable_files
     from engine.preset import find_preset, load_preset
 
     return load_preset(find_preset(name_or_path, usable_files()))

@@ -11,7 +11,7 @@ from numpy.lib import format as npy
 from torch import Tensor
 
 from app.commands.console import Failure, Report
-from app.whole_file import whole_file
+from app.shared.whole_file import whole_file
 
 LARGEST_RESULT_BYTES = 4 * 2**30
 BYTES_AT_ONCE = 16 * 2**20  # of a result; the file does not depend on it

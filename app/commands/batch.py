@@ -24,7 +24,7 @@ from app.commands.render import (
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
-    from app.sound import Source
+    from app.export.sound import Source
 
 
 def batch(
@@ -55,9 +55,9 @@ def batch(
         for height in heights:
             pluck = arguments.check_pluck(place, height, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
-    from app.batch import INDEX, BatchPlan, run_batch
-    from app.preset_folders import usable_files
-    from app.wav import WavSettings
+    from app.export.batch import INDEX, BatchPlan, run_batch
+    from app.export.wav import WavSettings
+    from app.presets.folders import usable_files
     from engine.preset import find_preset
 
     files = usable_files()
@@ -109,7 +109,7 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 
 def _sources(text: str) -> tuple[Source, ...]:
-    from app.sound import SOURCES
+    from app.export.sound import SOURCES
 
     known = {str(source): source for source in SOURCES}
     for word in _words(text):

@@ -12,8 +12,8 @@ from app.commands.arguments import Json
 from app.commands.console import print_json, print_table, progress
 
 if TYPE_CHECKING:
-    from app.bench.machine import Machine
-    from app.bench.play.measure import Spread
+    from app.commands.benchmarks.machine import Machine
+    from app.commands.benchmarks.play.measure import Spread
 
 bench = typer.Typer(help="Measure speed on this machine: medians of repeats.", no_args_is_help=True)
 
@@ -25,7 +25,7 @@ def solver(
     steps: Annotated[int, typer.Option(min=1, help="Samples of each trajectory.")] = 4000,
 ) -> None:
     """Cost and error of the fast solver against DOP853, on the worst case of the paper's data sets."""
-    from app.bench.solver import measure
+    from app.commands.benchmarks.solver import measure
 
     with progress("bench solver") as report:
         found = measure(batch, steps, report)
@@ -73,7 +73,7 @@ def solver(
 @bench.command()
 def render(json: Json = False) -> None:
     """Real-time factor (below 1 is faster than it sounds) and first-block latency of every model, on one thread."""
-    from app.bench.render import measure
+    from app.commands.benchmarks.render import measure
 
     with progress("bench render") as report:
         found = measure(report)
@@ -102,7 +102,7 @@ def render(json: Json = False) -> None:
 @bench.command()
 def voices(json: Json = False) -> None:
     """What a voice of a model or the truth costs and how exact it is, how many fit on a core, what a strike costs."""
-    from app.bench import voices as bench
+    from app.commands.benchmarks import voices as bench
 
     with progress("bench voices") as report:
         found = bench.measure(report)
@@ -136,7 +136,7 @@ def voices(json: Json = False) -> None:
 @bench.command()
 def train(json: Json = False) -> None:
     """Seconds of a train step of every model: 50 trajectories, 400 frames."""
-    from app.bench.train import measure
+    from app.commands.benchmarks.train import measure
 
     with progress("bench train") as report:
         found = measure(report)
@@ -156,7 +156,7 @@ def app(
     starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 3,
 ) -> None:
     """The window: how soon it is there and can be plucked, how smoothly the picture moves. It opens for a minute."""
-    from app.bench.app import measure
+    from app.commands.benchmarks.app import measure
 
     with progress("bench app") as report:
         found = measure(starts, seconds, report)
@@ -188,8 +188,8 @@ def play(
     """
     from pydantic import ValidationError
 
-    from app.bench.play.measure import measure
-    from app.settings import SoundChoice
+    from app.audio.choices import SoundChoice
+    from app.commands.benchmarks.play.measure import measure
 
     try:
         chosen = SoundChoice.model_validate({"buffer": int(buffer) if buffer.isdecimal() else buffer}).buffer
@@ -254,7 +254,7 @@ def soak(
 
     Linux only; needs PulseAudio, and touches nothing of the sound in use.
     """
-    from app.bench.soak import soak as run_soak
+    from app.commands.benchmarks.soak import soak as run_soak
 
     with progress("bench soak") as report:
         found = run_soak(60 * minutes, seed, playing, report)

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from app.shared.durations import duration
+
 LINE_EVERY_S = 10.0  # of progress, where standard error is not a terminal
 WIDTH_WITHOUT_TERMINAL = 1000  # a line stays a line
 
@@ -97,14 +99,6 @@ def _left(started: float, share: float, left_s: float | None) -> str:
             return ""
         left_s = (time.monotonic() - started) * (1 - share) / share
     return f"{duration(left_s)} left"
-
-
-def duration(seconds: float) -> str:
-    """A time in words: "8.2 s", "3 min 20 s", "2 h 5 min"."""
-    if seconds < 60:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def number(value: float | None) -> str:

@@ -57,7 +57,7 @@ def evaluate(
     configuration = _data_of(loaded)
     splits = ("validation", "test") if split == "both" else (split,)
     _check_trajectories(trajectories, configuration, splits)
-    from app.whole_file import whole_file
+    from app.shared.whole_file import whole_file
 
     with nullcontext() if table is None else whole_file(table) as file:
         data = replace(load_data(configuration, cache), scale_m=info.scale_m)

@@ -16,8 +16,8 @@ def info(
     json: Json = False,
 ) -> None:
     """Show the recipe of a WAV file; `render --recipe FILE.wav` makes it again."""
-    from app.preset_folders import usable_files
-    from app.recipe import RecipeError, preset_of, read_recipe
+    from app.export.recipe import RecipeError, preset_of, read_recipe
+    from app.presets.folders import usable_files
 
     recipe = read_recipe(file)
     facts = recipe.model_dump(mode="json")

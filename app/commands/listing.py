@@ -26,7 +26,7 @@ PRESET_FIELDS = (
 
 def presets(json: Json = False) -> None:
     """List the presets, the user's own among them. A broken file is told on standard error and hides no other."""
-    from app.preset_folders import usable_files
+    from app.presets.folders import usable_files
     from engine.preset import PresetError
 
     found = []

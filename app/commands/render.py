@@ -9,18 +9,18 @@ import typer
 
 from app.commands import arguments
 from app.commands.console import Failure, progress, say
-from app.sound_names import Pickup, Source
+from app.shared.vocabulary import Pickup, Source
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
-    from app.export import SoundRequest, WavReport
-    from app.wav import WavSettings
+    from app.export.files import SoundRequest, WavReport
+    from app.export.wav import WavSettings
     from engine.preset import Preset
 
 Value = TypeVar("Value")
 SILENT_DB = -120.0
 
-Bits = Literal["16", "24", "32f"]  # app.wav.Bits, known without soundfile
+Bits = Literal["16", "24", "32f"]  # app.export.wav.Bits, known without soundfile
 
 Rate = Annotated[
     int | None,
@@ -84,7 +84,7 @@ def render(
     seconds = _given("--seconds", seconds)
     pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
-    from app.export import SoundRequest, WavSettings
+    from app.export.files import SoundRequest, WavSettings
 
     loaded = arguments.open_preset(preset)
     check_shortest(loaded, seconds)
@@ -106,8 +106,8 @@ def check_sound(
     decay_db: float | None,
 ) -> None:
     """Checks the ranges of options that every command that writes sound has."""
-    from app.export import LONGEST_S, RATE_RANGE_HZ
-    from app.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB
+    from app.export.files import LONGEST_S, RATE_RANGE_HZ
+    from app.export.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB
 
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     arguments.check_range("--listen", listen, 0, 1)
@@ -135,10 +135,10 @@ def _given(name: str, value: Value | None) -> Value:
 
 
 def _render_again(file: Path, out: Path | None) -> None:
-    from app.export import default_file_name
-    from app.preset_folders import usable_files
-    from app.recipe import changed_preset_notice, preset_of, read_recipe
-    from app.version import program_version
+    from app.export.files import default_file_name
+    from app.export.recipe import changed_preset_notice, preset_of, read_recipe
+    from app.presets.folders import usable_files
+    from app.shared.version import program_version
     from engine.preset import load_preset
 
     recipe = read_recipe(file)
@@ -156,7 +156,7 @@ def _render_again(file: Path, out: Path | None) -> None:
 
 
 def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
-    from app.export import export_sound
+    from app.export.files import export_sound
 
     with progress("render") as report:
         written = export_sound(request, out, settings, progress=report)

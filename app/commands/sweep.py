@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from app.commands.arguments import Cache, Json
-from app.commands.console import Failure, duration, number, print_json, print_table, say
+from app.commands.console import Failure, number, print_json, print_table, say
+from app.shared.durations import duration
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

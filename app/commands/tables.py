@@ -10,7 +10,7 @@ import typer
 
 from app.commands.arguments import check_range, open_preset
 from app.commands.console import progress, say
-from app.whole_file import whole_file
+from app.shared.whole_file import whole_file
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:

@@ -1,13 +1,11 @@
-"""Plucks as they are played: notes, each a group of voices of one pluck, one voice a source.
+"""From gestures to sound: keys and MIDI, what is plucked, and the notes that ring.
 
-sources   presets in memory, and the programs of their voices
-stroke    what is plucked and how it is mixed: values
-ahead     models that are rendered before they are heard
-notes     who rings: strikes, switches, moves, ends
+keyboard, midi, midi_port   gestures of instruments, as plucks or choices
+chosen                      from what is chosen to what is plucked, heard and drawn
+stroke                      what is plucked and how it is mixed: values
+sources                     presets in memory, and the programs of their voices
+notes, ahead                who rings: strikes, switches, moves, ends; models that are rendered before they are heard
+pair                        two sounds side by side, for the listening test
+
+Nothing is imported here: settings name a MIDI port before the engine is loaded.
 """
-
-from app.playing.notes import Note, Notes
-from app.playing.sources import Sources
-from app.playing.stroke import Mix, Stroke
-
-__all__ = ["Mix", "Note", "Notes", "Sources", "Stroke"]

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from app.precedence import Rank, step_back
+from app.shared.thread_priority import Rank, step_back
 from engine.pluck import FULL_SCALE_M
 from engine.sources import ModelSource, Runaway, SourceState
 from engine.voices import Voice

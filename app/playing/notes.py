@@ -21,7 +21,7 @@ from app.audio.sound import Sound
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
-from app.precedence import Rank, step_back
+from app.shared.thread_priority import Rank, step_back
 from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
 from engine.preset import PresetError

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.sound_names import DIFFERENCE
+from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.voices.ear import Ear
 

@@ -15,7 +15,7 @@ from app.rendering.line import Line
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.take import SOURCES, Motion, Take
-from app.sound_names import OTHER
+from app.shared.vocabulary import OTHER
 from engine.metrics import ErrorSums
 from engine.preset import PresetError
 

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from app.memory import return_free_pages
-from app.precedence import Rank, step_back
 from app.rendering.job import Job
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
+from app.shared.heap import return_free_pages
+from app.shared.thread_priority import Rank, step_back
 from engine.preset import PresetError
 
 TIDY_AFTER_S = 1.0  # without anything to render

@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.audio import AudioDevice, AudioProblem, AudioUnavailable, ProblemKind, Sound
+from app.audio.devices import AudioDevice
 from app.audio.output import ClockOutput
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
+from app.audio.sound import Sound
 from engine.voices import Mixer
 
 OWN_THREADS = (
@@ -26,7 +28,7 @@ COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a sec
 
 @pytest.fixture(autouse=True)
 def collected_here() -> Iterator[None]:
-    """Garbage is deleted in this thread alone, as in the app (`app.memory.collect_between_events`)."""
+    """Garbage is deleted in this thread alone, as in the app (`app.shared.heap.collect_between_events`)."""
     gc.disable()
     yield
     gc.collect(2 if gc.get_count()[2] >= COLLECT_ALL_EVERY else 1)
@@ -66,16 +68,16 @@ def preset_folder(small_preset: Path, tmp_path: Path, monkeypatch: pytest.Monkey
     folder.mkdir()
     for name in ("first", "second"):
         shutil.copy(small_preset, folder / f"{name}.safetensors")
-    monkeypatch.setattr("app.library.SHIPPED", folder)
+    monkeypatch.setattr("app.presets.library.SHIPPED", folder)
     return folder
 
 
 @pytest.fixture
 def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[object]:
-    from app.controller import Controller
-    from app.main_window import MainWindow
-    from app.session import Choices
-    from app.settings import Settings
+    from app.session.choices import Choices
+    from app.window.controller import Controller
+    from app.window.main_window import MainWindow
+    from app.window.settings import Settings
 
     window = MainWindow()
     qtbot.addWidget(window)

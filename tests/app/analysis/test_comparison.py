@@ -12,7 +12,7 @@ import torch
 from app.analysis import comparison
 from app.analysis.comparison import ComparedRow, Trial, compare, same_string
 from app.analysis.job import Cancelled
-from app.library import PresetEntry, list_presets
+from app.presets.library import PresetEntry, list_presets
 from engine.pluck import Pluck
 from engine.preset import load_preset, save_preset
 from engine.sine_transform import listening_weights

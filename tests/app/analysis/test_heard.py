@@ -9,7 +9,7 @@ from app.analysis.heard import HeardMotion, HeardSignal
 from app.rendering import Take
 from app.rendering.take import Motion
 from app.rendering.velocity import Differentiator
-from app.sound_names import DIFFERENCE
+from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
 from engine.string import StringParameters

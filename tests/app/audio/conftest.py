@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.audio import AudioDevice
+from app.audio.devices import AudioDevice
 
 HEADPHONES = AudioDevice("Headphones", "Test API", 48_000)
 SPEAKERS = AudioDevice("Speakers", "Test API", 44_100)

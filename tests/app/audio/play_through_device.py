@@ -18,7 +18,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from app.audio import AudioProblem, Sound
+from app.audio.problems import AudioProblem
+from app.audio.sound import Sound
 from engine.pluck import Pluck
 from engine.preset import SHIPPED, load_preset
 from engine.sources import project

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 import app
-from app.audio import AudioUnavailable, ProblemKind, default_device, find, output_devices
-from app.audio.devices import AudioDevice, close_device, open_device
+from app.audio.devices import AudioDevice, close_device, default_device, find, open_device, output_devices
 from app.audio.output import DeviceOutput
+from app.audio.problems import AudioUnavailable, ProblemKind
 from engine.kernels.layout import M_CALLS
 from engine.kernels.mixer import call
 from engine.voices import Mixer

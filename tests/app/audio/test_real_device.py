@@ -20,7 +20,8 @@ import numpy as np
 import pytest
 
 import app
-from app.audio import AudioUnavailable, output_devices
+from app.audio.devices import output_devices
+from app.audio.problems import AudioUnavailable
 from engine.kernels.layout import QUANTUM
 
 RATE_HZ = 44_100  # what PortAudio calls the default rate of an ALSA plugin

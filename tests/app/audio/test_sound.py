@@ -10,9 +10,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from app.audio import BUFFER_S, AudioDevice, AudioProblem, AudioUnavailable, ProblemKind, Sound
 from app.audio import sound as sound_module
-from app.audio.problems import no_device, refused, vanished
+from app.audio.devices import AudioDevice
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
+from app.audio.sound import BUFFER_S, Sound
 from engine.voices import Mixer, Voice, plain_program
 
 TIMEOUT_S = 10.0  # a busy computer's; nothing here takes so long

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.abx.record import HeardPluck, HeardSource, HeardThrough, make_record, save_record
-from app.abx.text import as_text
-from app.abx.trials import Run
+from app.analysis.abx.record import HeardPluck, HeardSource, HeardThrough, make_record, save_record
+from app.analysis.abx.text import as_text
+from app.analysis.abx.trials import Run
 
 
 def test_show_prints_the_record_and_refuses_a_broken_one(run, folder: Path) -> None:

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import soundfile
 
-from app import batch, sound
-from app.batch import BatchPlan, ExportCancelled, run_batch
-from app.export import SoundRequest, export_sound
+from app.export import batch, sound
+from app.export.batch import BatchPlan, ExportCancelled, run_batch
+from app.export.files import SoundRequest, export_sound
 from engine.pluck import Pluck
 from engine.preset import load_preset
 from engine.sources import Runaway

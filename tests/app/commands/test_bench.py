@@ -6,7 +6,7 @@ import pytest
 
 
 def test_bench_solver_tells_cost_and_error(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.bench.solver.AUDIO_S", 0.005)
+    monkeypatch.setattr("app.commands.benchmarks.solver.AUDIO_S", 0.005)
     found = json.loads(run("bench", "solver", "--json", "--batch", 2, "--steps", 20).out)
     assert [(case["initial"], case["rate_hz"]) for case in found["protocol"]] == [
         ("gaussian", 16_000),
@@ -21,8 +21,8 @@ def test_bench_solver_tells_cost_and_error(run, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_bench_render_measures_every_model(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.bench.render.AUDIO_S", 0.02)
-    monkeypatch.setattr("app.bench.render.PLUCKS", 2)
+    monkeypatch.setattr("app.commands.benchmarks.render.AUDIO_S", 0.02)
+    monkeypatch.setattr("app.commands.benchmarks.render.PLUCKS", 2)
     found = json.loads(run("bench", "render", "--json").out)
     assert {(case["model"], case["rate_hz"]) for case in found["models"]} >= {
         ("koopman_var", 4000),
@@ -34,8 +34,8 @@ def test_bench_render_measures_every_model(run, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.bench.train.BATCH", 2)
-    monkeypatch.setattr("app.bench.train.FRAMES", 5)
+    monkeypatch.setattr("app.commands.benchmarks.train.BATCH", 2)
+    monkeypatch.setattr("app.commands.benchmarks.train.FRAMES", 5)
     (case, *_) = json.loads(run("bench", "train", "--json").out)["models"]
     assert (case["model"], case["batch"], case["frames"]) == ("koopman", 2, 5)
     assert case["step_s"] > 0

@@ -45,7 +45,7 @@ def results(tmp_path: Path) -> Path:
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A trained preset, which knows its data set."""
-    from app.cli import main
+    from app.commands.cli import main
 
     folder = tmp_path_factory.mktemp("tiny")
     (folder / "tiny.toml").write_text(TINY, encoding="utf-8")

@@ -9,7 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from app.playing import Notes, Sources, Stroke
+from app.playing.notes import Notes
+from app.playing.sources import Sources
+from app.playing.stroke import Stroke
 from engine.pluck import Pluck
 from engine.preset import SHIPPED
 from engine.voices import Ear, Mixer

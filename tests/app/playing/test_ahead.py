@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import torch
 
-from app.playing import Sources
 from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
+from app.playing.sources import Sources
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
 from engine.pluck import Pluck

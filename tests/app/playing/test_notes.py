@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 import torch
 
-from app.playing import Mix, Note, Notes, Sources, Stroke
 from app.playing import notes as module
 from app.playing.ahead import LEAST_S
+from app.playing.notes import Note, Notes
+from app.playing.sources import Sources
+from app.playing.stroke import Mix, Stroke
 from engine.kernels import layout as at
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.playing import Sources
 from app.playing import sources as module
+from app.playing.sources import Sources
 from engine.pluck import Pluck
 from engine.preset import Preset, PresetError, load_preset
 from engine.sources import project

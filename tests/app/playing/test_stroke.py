@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.playing import Mix, Stroke
+from app.playing.stroke import Mix, Stroke
 from engine.pluck import Pluck
 from engine.voices import Ear
 

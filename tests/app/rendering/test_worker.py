@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.playing import Sources
+from app.playing.sources import Sources
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import Line

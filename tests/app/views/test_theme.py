@@ -11,15 +11,15 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
 
-from app.shown import ShownSource
+from app.session.shown import ShownSource
 from app.views import theme
-from app.views.error_plane_view import ErrorPlaneView
-from app.views.error_time_view import ErrorTimeView
-from app.views.plots import recolour
-from app.views.space_time_view import SpaceTimeView
-from app.views.spectrogram_view import SpectrogramView
-from app.views.string_view import StringView
-from app.views.waveform_view import WaveformView
+from app.views.plots.error_plane_view import ErrorPlaneView
+from app.views.plots.error_time_view import ErrorTimeView
+from app.views.plots.plots import recolour
+from app.views.plots.space_time_view import SpaceTimeView
+from app.views.plots.spectrogram_view import SpectrogramView
+from app.views.plots.waveform_view import WaveformView
+from app.views.string.view import StringView
 
 
 @pytest.fixture

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.views.knob import KnobRange
-from app.views.spectrum_view import COLUMNS, Analyser, SpectrumView
-from app.views.string_ink import ShownPluck, StringFrame
-from app.views.string_view import StringView
-from app.views.waveform_view import WaveformView, extremes
+from app.analysis.string_frame import StringFrame
+from app.views.controls.knob import KnobRange
+from app.views.plots.spectrum_view import COLUMNS, Analyser, SpectrumView
+from app.views.plots.waveform_view import WaveformView, extremes
+from app.views.string.ink import ShownPluck
+from app.views.string.view import StringView
 
 
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 48_000])

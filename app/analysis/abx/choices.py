@@ -1,0 +1,17 @@
+"""What the listening test was last set to."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.analysis.abx.trials import MOST_TRIALS
+
+
+class AbxChoices(BaseModel):
+    """The listening test's last state. An empty folder: `app.analysis.abx.record.default_folder`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    trials: int = Field(16, ge=1, le=MOST_TRIALS)
+    restart: bool = False
+    folder: str = ""

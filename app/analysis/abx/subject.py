@@ -1,0 +1,42 @@
+"""What is put to the test: the sounds that can be A or B, and the pluck that they share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.analysis.abx.record import HeardPluck
+from app.analysis.abx.sound import Candidate
+from app.presets.digest import preset_digest
+from app.presets.library import PresetEntry
+from app.session.choices import Choices
+
+
+@dataclass(frozen=True)
+class Subject:
+    """See the module. `volume_db` is the player's: it stays as it is during the test.
+
+    Attributes:
+        candidates: two or more; the first two are A and B until another choice is made.
+    """
+
+    candidates: tuple[Candidate, ...]
+    pluck: HeardPluck
+    volume_db: float
+
+
+def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
+    """Model and truth of the preset on stage. Raises PresetError where its file cannot be read."""
+    digest = preset_digest(entry.path)
+    pluck = HeardPluck(
+        position=choices.position,
+        amplitude_mm=choices.amplitude_mm,
+        shape=choices.shape,
+        width=choices.width,
+        listen=choices.listen,
+        listen_right=choices.listen_right if choices.stereo else None,
+        pickup=choices.pickup,
+        solo=choices.solo,
+        seconds=choices.seconds,
+    )
+    candidates = tuple(Candidate(source, source.capitalize(), entry.name, digest) for source in ("model", "truth"))
+    return Subject(candidates, pluck, choices.volume_db)

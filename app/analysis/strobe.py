@@ -1,0 +1,122 @@
+"""Which moment of the motion a picture shows: slow motion by stroboscope, and the blur of real time.
+
+The sound is never slowed, and there is one playhead. A stroboscope keeps both: each flash shows the string near
+the playhead, at a phase of its period that moves on slowly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from app.analysis.heard import HeardMotion
+from app.analysis.string_frame import Band, StringFrame
+from app.rendering.take import Take
+
+BLUR_S = 1 / 60  # an eye's or a picture's exposure
+ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
+ENVELOPE_BLOCK_S = 0.1
+MM = np.float32(1000)
+
+
+class Strobe:
+    """The phase at which the string is seen, in periods of its fundamental."""
+
+    def __init__(self) -> None:
+        self._periods = 0.0
+        self._real_time = False
+
+    def restart(self) -> None:
+        self._periods = 0.0
+
+    def advance(self, elapsed_s: float, speed: float, fundamental_hz: float) -> None:
+        """Moves the phase on by `speed` (1 is real time) over `elapsed_s` of the watcher's time."""
+        self._real_time = speed >= 1
+        self._periods = (self._periods + elapsed_s * speed * fundamental_hz) % 1.0
+
+    def time_s(self, position_s: float, fundamental_hz: float) -> float:
+        """The moment to show: within one period before the playhead; in real time the playhead itself."""
+        if self._real_time:
+            return position_s
+        whole = math.floor(position_s * fundamental_hz)
+        return (whole + self._periods) / fundamental_hz
+
+
+class Envelope:
+    """The range of motion within the last second of a take, kept block by block: each frame is looked at once."""
+
+    def __init__(self) -> None:
+        self._ranges: dict[str, _Range] = {}
+        self._bands: dict[str, Band] = {}
+
+    def before(self, position_s: float, motions: Iterable[HeardMotion]) -> dict[str, Band]:
+        """Lowest and highest displacement (points,) in mm by source, in whole blocks up to the playhead.
+
+        The same object as the last time, where nothing has changed since.
+        """
+        bands = {}
+        for motion in motions:
+            known = self._ranges.get(motion.source)
+            if known is None or known.motion != motion:
+                known = self._ranges[motion.source] = _Range(motion)
+            if band := known.before(position_s):
+                bands[motion.source] = band
+        if bands.keys() != self._bands.keys() or any(bands[name] is not self._bands[name] for name in bands):
+            self._bands = bands
+        return self._bands
+
+
+class _Range:
+    """One source's."""
+
+    def __init__(self, motion: HeardMotion) -> None:
+        self.motion = motion
+        self._block = math.ceil(ENVELOPE_BLOCK_S * motion.rate_hz)
+        blocks, points = motion.frames // self._block + 1, motion.grid_points
+        self._lowest_mm = np.zeros((blocks, points), np.float32)
+        self._highest_mm = np.zeros((blocks, points), np.float32)
+        self._known = np.zeros(blocks, bool)
+        self._blocks_shown = (0, 0)
+        self._band: Band | None = None
+
+    def before(self, position_s: float) -> Band | None:
+        last = min(int(position_s * self.motion.rate_hz), self.motion.ready) // self._block
+        first = max(0, last - round(ENVELOPE_S / ENVELOPE_BLOCK_S))
+        if last == first:
+            return None
+        if (first, last) != self._blocks_shown:
+            for block in np.flatnonzero(~self._known[first:last]) + first:
+                self._look_at(int(block))
+            self._band = self._lowest_mm[first:last].min(axis=0), self._highest_mm[first:last].max(axis=0)
+            self._blocks_shown = first, last
+        return self._band
+
+    def _look_at(self, block: int) -> None:
+        frames = self.motion.read(block * self._block, (block + 1) * self._block)
+        self._lowest_mm[block] = frames.min(axis=0) * MM
+        self._highest_mm[block] = frames.max(axis=0) * MM
+        self._known[block] = True
+
+
+def frame_at(
+    take: Take,
+    motions: Iterable[HeardMotion],
+    position_s: float,
+    shown_s: float,
+    speed: float,
+    envelope: Envelope | None = None,
+) -> StringFrame:
+    """The picture of a take: the motions' shapes at `shown_s`, blurred over the exposure before the playhead."""
+    there = [motion for motion in motions if motion.there]
+    shapes, lowest, highest = {}, {}, {}
+    for motion in there:
+        last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
+        frames = motion.read(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
+        shapes[motion.source] = motion.shape(shown_s) * MM
+        lowest[motion.source] = frames.min(axis=0) * MM
+        highest[motion.source] = frames.max(axis=0) * MM
+    caption = f"{position_s:.3f} s" + ("" if speed >= 1 else f"   slow motion × {speed:.3f}")
+    envelopes = envelope.before(position_s, there) if envelope else {}
+    return StringFrame(shapes, lowest, highest, caption, position_s > take.info.horizon_s, envelopes)

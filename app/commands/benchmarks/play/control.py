@@ -1,0 +1,63 @@
+"""A steady tone that goes the same way as the app's sound, from a process that does nothing else.
+
+Where the tone has holes too, the computer or the sound server was late, not the app. It plays into a null sink of its
+own, through PortAudio, with the buffer that the app has, by the same compiled mixer and with the same rank.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from app.audio.choices import Buffer
+from app.commands.benchmarks.play.children import child
+from app.commands.benchmarks.play.recording import Recording, recording
+from app.commands.benchmarks.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SoundServer
+
+SINK = "control"
+TONE_HZ = 440
+LEVEL = 0.1
+PATIENCE_S = 20.0
+
+
+@contextlib.contextmanager
+def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[Recording]:
+    """Plays and records it until the block ends."""
+    load = ["pactl", "load-module", "module-null-sink", f"sink_name={SINK}", f"rate={RATE_HZ}", f"format={FORMAT}"]
+    subprocess.run([*load, f"channels={CHANNELS}"], env=server.environment, check=True, capture_output=True)
+    environment = {**server.environment, "PULSE_SINK": SINK}
+    with (folder / "control.log").open("wb") as log, recording(server, folder / "control", SINK) as recorded:
+        command = [sys.executable, "-m", "app.commands.benchmarks.play.control", str(buffer)]
+        with child(command, environment, stdout=log, stderr=log):
+            recorded.wait_for_sound(0.0, PATIENCE_S)  # its start is not to be beside the app's
+            yield recorded
+
+
+def main(buffer: str) -> None:
+    """Plays for ever."""
+    from app.audio.sound import Sound
+    from app.playing.pair import Pair
+    from app.window.audio_control import LATENCY_S
+
+    time_s = np.arange(RATE_HZ) / RATE_HZ
+    tone = (LEVEL * np.sin(2 * np.pi * TONE_HZ * time_s)).astype(np.float32)[:, None]
+    with Sound() as sound:
+        latency_s = LATENCY_S.get(buffer, 0.0)  # type: ignore[call-overload]
+        sound.open(buffer_s=latency_s, rate_hz=RATE_HZ, buffer_frames=0 if latency_s else int(buffer))
+        while sound.status().device is None:
+            time.sleep(0.05)
+        pair = Pair(sound.mixer, {"tone": tone})
+        pair.select("tone")
+        pair.play()
+        while True:
+            time.sleep(1)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,379 @@
+"""The whole measurement: a private sound card and screen, the program, the hands, and what was recorded.
+
+Nothing of the program is known here but what its user knows: its command, its window's title, its keys, its settings.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import psutil
+
+from app.audio.choices import Buffer, SoundChoice
+from app.commands.benchmarks.machine import Machine
+from app.commands.benchmarks.play import analysis, hands
+from app.commands.benchmarks.play.calibration import Holding, Transit, click_through, transit
+from app.commands.benchmarks.play.children import child, need_programs
+from app.commands.benchmarks.play.control import steady_tone
+from app.commands.benchmarks.play.picture import picture_lags
+from app.commands.benchmarks.play.recording import CardClock, Recording, recording
+from app.commands.benchmarks.play.screen import Screen, private_screen
+from app.commands.benchmarks.play.sound_server import RATE_HZ, SoundServer, sound_server
+from app.session.choices import Choices
+from app.window.settings import Settings, save_settings
+
+TITLE = "Learned Strings"
+SINGLES = 60
+RINGS_S, QUIET_S = 0.4, 0.3  # of a single pluck, before and after it is stopped
+START_PATIENCE_S = 120.0
+TRY_EVERY_S = 0.25  # a key, while the program starts
+SILENCE_S = 1.0
+DECAY_PATIENCE_S = 30.0
+IDLE_S = 5.0
+HOLDING_LOOKS = 40
+STOP = "space"
+PICTURES = 20
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of several times, in ms."""
+
+    median: float
+    p99: float
+    worst: float
+
+    @classmethod
+    def of(cls, values_s: list[float]) -> Spread | None:
+        if not values_s:
+            return None
+        ms = 1000 * np.array(values_s)
+        return cls(float(np.median(ms)), float(np.quantile(ms, 0.99)), float(ms.max()))
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What was heard with or without another busy process.
+
+    Attributes:
+        singles: single plucks out of silence; `unheard` of them began nothing within half a second.
+        latency_ms: from the key until the sound is in the recording.
+        beyond_device_ms: less what the device's own buffer takes, which is `device_ms`.
+        plucks: at the rate of playing. What follows is of these, times in s since the first of their keys.
+        holes: nothing at all for a millisecond or more while strings ring.
+        fades: falls of the level by 40 dB that come back, other than holes.
+        clicks: steps that are no pluck's beginning.
+        cpu_cores: of the program, while it was played.
+        control_holes: of a steady tone that another process plays meanwhile in the same way.
+    """
+
+    busy: bool
+    load_before: tuple[float, float, float]
+    singles: int
+    unheard: int
+    latency_ms: Spread | None
+    beyond_device_ms: Spread | None
+    device_ms: float | None
+    plucks: int
+    seconds: float
+    holes: int
+    holes_ms: float
+    longest_hole_ms: float
+    fades: int
+    clicks: int
+    hole_times_s: tuple[float, ...]
+    fade_times_s: tuple[float, ...]
+    click_times_s: tuple[float, ...]
+    loudest: float
+    cpu_cores: float
+    control_holes: int
+    control_holes_ms: float
+    control_longest_ms: float
+
+
+@dataclass(frozen=True)
+class PlayBenchmark:
+    """`buffer` as chosen, in ms where it is a number of frames; `views` beside the string; `picture_lag_ms`: from the
+    first sound of a pluck in the recording to the first changed picture of the string; `uncertainty_ms` of the
+    recording's clock, and of the device's own buffer."""
+
+    machine: Machine
+    seed: int
+    rate_hz: float
+    buffer: Buffer
+    buffer_ms: float | None
+    size: tuple[int, int]
+    views: tuple[str, str]
+    start_to_window_s: float
+    start_to_sound_s: float
+    idle_cpu_cores: float | None
+    picture_lag_ms: Spread | None
+    phases: tuple[Phase, ...]
+    clock_uncertainty_ms: float
+    device_uncertainty_ms: float
+
+
+@dataclass(frozen=True)
+class _Played:
+    """What the hands did in a phase, on `time.monotonic`."""
+
+    busy: bool
+    load: tuple[float, float, float]
+    singles_s: list[float]
+    held_s: float | None
+    keys_s: list[float]
+    cpu_cores: float
+
+
+def measure(
+    seconds: float, rate_hz: float, buffer: Buffer, busy: tuple[bool, ...], seed: int, report: Callable[..., None]
+) -> PlayBenchmark:
+    """Plays for `seconds` at `rate_hz` plucks a second, once for each entry of `busy`.
+
+    Raises:
+        Missing: A program or library is not there.
+        RuntimeError: The app did not open, or nothing was heard of it.
+    """
+    need_programs()
+    one_s = SINGLES * (RINGS_S + QUIET_S + 0.05) + seconds + 10
+    whole_s = 60 + one_s * len(busy)
+    began_s = time.monotonic()
+
+    def tell(text: str) -> None:
+        report(min((time.monotonic() - began_s) / whole_s, 0.99), text)
+
+    random = Random(seed)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(_ended_politely())
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="play")))
+        tell("sound card and screen")
+        server = stack.enter_context(sound_server(folder))
+        screen = stack.enter_context(private_screen())
+        recorded = stack.enter_context(recording(server, folder / "recording"))
+        time.sleep(0.5)
+        tell("clicks")
+        clicks = click_through(server)
+        tell("start")
+        choices = Choices()
+        settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
+        control = stack.enter_context(steady_tone(server, folder, buffer))
+        started_s = time.monotonic()
+        process = stack.enter_context(_app(folder, settings, server, screen))
+        window, window_s = _open_window(screen, process)
+        _try_keys(screen, recorded, process, started_s)
+        recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
+        played = [_phase(screen, server, recorded, process, random, seconds, rate_hz, b, tell) for b in busy]
+        tell("idle")
+        idle = _idle(recorded, process)
+        tell("picture")
+        seen = picture_lags(screen, recorded, PICTURES, hands.KEYS, STOP)
+        size = screen.size(window)
+        time.sleep(0.5)
+        tell("analysis")
+        clock, way = recorded.clock(), transit(clicks, recorded)
+        sound = recorded.sound()
+        phases = tuple(_judged(p, sound, clock, way, _control_holes_ms(p, control)) for p in played)
+        first = np.flatnonzero(np.abs(sound[(start := clock.frame(started_s)) :, 0]) > analysis.FAINTEST_PLUCK)
+        lags_s = [
+            changed_s - clock.time_s(heard)
+            for key_s, changed_s in seen
+            if (heard := analysis.onset(sound[:, 0], clock.frame(key_s), RATE_HZ)) is not None
+        ]
+        return PlayBenchmark(
+            Machine.here(),
+            seed,
+            rate_hz,
+            buffer,
+            1000 * buffer / RATE_HZ if isinstance(buffer, int) else None,
+            size,
+            (choices.left_view, choices.right_view),
+            window_s - started_s,
+            clock.time_s(start + int(first[0])) - started_s,
+            idle,
+            Spread.of(lags_s),
+            phases,
+            1000 * clock.spread_s,
+            1000 * way.spread_s,
+        )
+
+
+@contextlib.contextmanager
+def _ended_politely() -> Iterator[None]:
+    """A request to end the benchmark ends all that it has started."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def _app(folder: Path, settings: Settings, server: SoundServer, screen: Screen) -> Iterator[subprocess.Popen[bytes]]:
+    """The program as its command starts it."""
+    file = folder / "settings.json"
+    save_settings(file, settings)
+    environment = {
+        **server.environment,
+        "DISPLAY": screen.name,
+        "QT_QPA_PLATFORM": "xcb",
+        "LEARNED_STRINGS_SETTINGS": str(file),
+    }
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-m", "app.commands.cli"]
+    with (folder / "app.log").open("wb") as log, child(command, environment, stdout=log, stderr=log) as process:
+        yield process
+
+
+def _open_window(screen: Screen, process: subprocess.Popen[bytes]) -> tuple[int, float]:
+    """The program's window, and when it was to be seen."""
+    deadline_s = time.monotonic() + START_PATIENCE_S
+    while (window := screen.find(TITLE)) is None:
+        if process.poll() is not None or time.monotonic() > deadline_s:
+            raise RuntimeError("the app opened no window; start it by hand to see why")
+        time.sleep(0.01)
+    shown_s = time.monotonic()
+    screen.take(window)
+    return window, shown_s
+
+
+def _try_keys(screen: Screen, recorded: Recording, process: subprocess.Popen[bytes], started_s: float) -> None:
+    deadline_s = time.monotonic() + START_PATIENCE_S
+    while True:
+        hands.tap(screen, hands.KEYS[0])
+        if recorded.wait_for_sound(started_s, TRY_EVERY_S):
+            return
+        if process.poll() is not None or time.monotonic() > deadline_s:
+            raise RuntimeError("no key of the app was heard; is its sound device the system's default?")
+
+
+def _phase(
+    screen: Screen,
+    server: SoundServer,
+    recorded: Recording,
+    process: subprocess.Popen[bytes],
+    random: Random,
+    seconds: float,
+    rate_hz: float,
+    busy: bool,
+    tell: Callable[[str], None],
+) -> _Played:
+    beside = " beside a busy process" if busy else ""
+    load = os.getloadavg()
+    recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
+    with contextlib.ExitStack() as stack:
+        if busy:
+            stack.enter_context(child([sys.executable, "-c", "while True: pass"], os.environ))
+        tell(f"single plucks{beside}")
+        singles_s = []
+        for _ in range(SINGLES):
+            time.sleep(QUIET_S + random.uniform(0, 0.1))  # in no step with blocks
+            singles_s.append(hands.tap(screen, random.choice(hands.KEYS)))
+            time.sleep(RINGS_S)
+            hands.tap(screen, STOP)
+        time.sleep(QUIET_S)
+        tell(f"{rate_hz:g} plucks a second{beside}")
+        holding = Holding()
+        for _ in range(HOLDING_LOOKS):
+            holding.look(server)
+        before_s, before_cpu_s = time.monotonic(), _cpu_s(process)
+        keys_s = hands.play(screen, random, hands.steady(random, rate_hz, seconds))
+        cores = (_cpu_s(process) - before_cpu_s) / (time.monotonic() - before_s)
+        time.sleep(analysis.SOUNDS_S)
+    return _Played(busy, load, singles_s, holding.held_s, keys_s, cores)
+
+
+def _cpu_s(process: subprocess.Popen[bytes]) -> float:
+    """Of a process and those it has started."""
+    parent = psutil.Process(process.pid)
+    total = 0.0
+    for one in (parent, *parent.children(recursive=True)):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            times: Any = one.cpu_times()
+            total += times.user + times.system
+    return total
+
+
+def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> float | None:
+    """Cores that the program takes while nothing sounds; None where it does not fall silent."""
+    if not recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S):
+        return None
+    before_s, before_cpu_s = time.monotonic(), _cpu_s(process)
+    time.sleep(IDLE_S)
+    return (_cpu_s(process) - before_cpu_s) / (time.monotonic() - before_s)
+
+
+def _control_holes_ms(played: _Played, control: Recording) -> list[float]:
+    """Holes of the steady tone while the app was played."""
+    clock, sound = control.clock(), control.sound()
+    part = sound[clock.frame(played.keys_s[0]) : clock.frame(played.keys_s[-1] + analysis.SOUNDS_S), 0]
+    return [silence.frames * 1000 / RATE_HZ for silence in analysis.silences(part, RATE_HZ)]
+
+
+def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, control_ms: list[float]) -> Phase:
+    keys = [clock.frame(key_s) for key_s in played.singles_s]
+    onsets = [analysis.onset(sound[:, 0], key, RATE_HZ) for key in keys]
+    latencies_s = [
+        clock.time_s(place) - key_s
+        for place, key_s in zip(onsets, played.singles_s, strict=True)
+        if place is not None
+    ]
+    device_s = None if played.held_s is None else way.at(played.held_s)
+    latency, beyond = Spread.of(latencies_s), None
+    if device_s is not None:
+        beyond = Spread.of([latency_s - device_s for latency_s in latencies_s])
+    begin = clock.frame(played.keys_s[0]) - RATE_HZ // 10
+    part = sound[begin : clock.frame(played.keys_s[-1]) + RATE_HZ]
+    keys = [clock.frame(key_s) - begin for key_s in played.keys_s]
+    expected = analysis.expected_sound(part, keys, RATE_HZ)
+    holes = analysis.holes(part, expected, RATE_HZ)
+    fades = analysis.fades(part[:, 0], expected, RATE_HZ)
+    gaps = [fade for fade in fades if not any(map(fade.meets, holes))]
+    rest = analysis.unpredicted(part[:, 0], RATE_HZ)
+    events = analysis.events(rest, RATE_HZ)
+    usual = round(np.median(latencies_s) * RATE_HZ) if latencies_s else 0
+    plucked = analysis.matched(keys, events, rest.by_past, usual, RATE_HZ)
+    clicks = analysis.clicks(events, plucked, [*holes, *gaps], expected, RATE_HZ)
+
+    def since_s(frame: int) -> float:
+        return round((frame - keys[0]) / RATE_HZ, 4)
+
+    return Phase(
+        played.busy,
+        played.load,
+        len(onsets),
+        onsets.count(None),
+        latency,
+        beyond,
+        None if device_s is None else 1000 * device_s,
+        len(keys),
+        played.keys_s[-1] - played.keys_s[0],
+        len(holes),
+        sum(hole.frames for hole in holes) * 1000 / RATE_HZ,
+        max((hole.frames for hole in holes), default=0) * 1000 / RATE_HZ,
+        len(gaps),
+        len(clicks),
+        tuple(since_s(hole.start) for hole in holes),
+        tuple(since_s(fade.start) for fade in gaps),
+        tuple(since_s(click) for click in clicks),
+        float(np.abs(part).max()),
+        played.cpu_cores,
+        len(control_ms),
+        sum(control_ms),
+        max(control_ms, default=0.0),
+    )

@@ -1,0 +1,61 @@
+"""What a restless user might change next: any choice, at random but from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+from app.session.choices import DIFFERENCE_GAIN_RANGE_DB, SPEED_RANGE, Choices
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
+
+SECONDS_RANGE = (0.5, 4.0)
+VOLUME_RANGE_DB = (-40.0, 6.0)
+HIGHEST_SOLO = 10
+
+
+@dataclass(frozen=True)
+class Repertoire:
+    """What there is to choose from: names of presets, keys of views."""
+
+    presets: tuple[str, ...]
+    left_views: tuple[str, ...]
+    right_views: tuple[str, ...]
+
+
+def random_change(random: Random, choices: Choices, repertoire: Repertoire) -> Mapping[str, Any]:
+    """One field of `Choices`, or those of a slot, with another value."""
+    return random.choice(_CHANGES)(random, choices, repertoire)
+
+
+def _held(random: Random, repertoire: Repertoire) -> str:
+    return random.choice(("model", "truth", "difference", f"preset:{random.choice(repertoire.presets)}"))
+
+
+_Change = Callable[[Random, Choices, Repertoire], Mapping[str, Any]]
+_CHANGES: tuple[_Change, ...] = (
+    lambda r, c, of: {"preset": r.choice(of.presets)},
+    lambda r, c, of: {"position": r.uniform(*POSITION_RANGE)},
+    lambda r, c, of: {"amplitude_mm": r.uniform(0, LARGEST_AMPLITUDE_MM)},
+    lambda r, c, of: {"shape": r.choice(SHAPES)},
+    lambda r, c, of: {"width": r.uniform(*WIDTH_RANGE)},
+    lambda r, c, of: {"listen": r.random()},
+    lambda r, c, of: {"listen_right": r.random()},
+    lambda r, c, of: {"seconds": r.uniform(*SECONDS_RANGE)},
+    lambda r, c, of: {"stereo": not c.stereo},
+    lambda r, c, of: {"pickup": "displacement" if c.pickup == "velocity" else "velocity"},
+    lambda r, c, of: {"solo": 0 if c.solo else r.randint(1, HIGHEST_SOLO)},
+    lambda r, c, of: {"a": _held(r, of)},
+    lambda r, c, of: {"b": _held(r, of)},
+    lambda r, c, of: {"heard": "b" if c.heard == "a" else "a"},
+    lambda r, c, of: {"level_match": not c.level_match},
+    lambda r, c, of: {"difference_gain_db": r.uniform(*DIFFERENCE_GAIN_RANGE_DB)},
+    lambda r, c, of: {"loop": not c.loop},
+    lambda r, c, of: {"volume_db": r.uniform(*VOLUME_RANGE_DB)},
+    lambda r, c, of: {"speed": r.uniform(*SPEED_RANGE)},
+    lambda r, c, of: {"left_view": r.choice(of.left_views)},
+    lambda r, c, of: {"right_view": r.choice(of.right_views)},
+    lambda r, c, of: {"motion": not c.motion},
+    lambda r, c, of: {"envelope": not c.envelope},
+)

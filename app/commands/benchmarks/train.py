@@ -1,0 +1,64 @@
+"""A train step at the size of the paper's own: a batch of 50 trajectories, all of 400 frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+
+from app.commands.benchmarks.machine import Machine, median_s
+from engine.models import build_model
+from engine.models.base import Physics
+from engine.string import StringParameters
+from training.configuration import Recipe
+from training.data.batches import Batch
+from training.fitting.losses import training_loss
+
+BATCH = 50
+FRAMES = 400
+REPEATS = 5
+# DMD is fitted, not trained; the Fourier models take minutes a step (the paper: 2000 epochs on a cluster)
+MODELS = ("koopman", "koopman_var", "koopman_integrated", "lru", "s5")
+
+
+@dataclass(frozen=True)
+class TrainTiming:
+    """Seconds of one step: forward, the model's own loss, backward and AdamW."""
+
+    model: str
+    batch: int
+    frames: int
+    step_s: float
+
+
+@dataclass(frozen=True)
+class TrainBenchmark:
+    machine: Machine
+    models: tuple[TrainTiming, ...]
+
+
+def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
+    """Each model at the paper's size, on random data: its values do not matter to its cost."""
+    found = []
+    for number, name in enumerate(MODELS):
+        report(number / len(MODELS), name)
+        found.append(TrainTiming(name, BATCH, FRAMES, _step_s(name)))
+    return TrainBenchmark(Machine.here(), tuple(found))
+
+
+def _step_s(name: str) -> float:
+    model = build_model(name)
+    physics = Physics(StringParameters(), 10, 4_000)
+    model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
+    optimiser = torch.optim.AdamW(model.parameters())
+    target = torch.randn(BATCH, FRAMES, model.grid_points, generator=torch.Generator().manual_seed(0))
+    batch = Batch(target[:, 0], None, torch.arange(1, FRAMES + 1), target)
+    recipe = Recipe(epochs=1)
+
+    def step() -> None:
+        optimiser.zero_grad(set_to_none=True)
+        training_loss(model, batch, recipe)[0].backward()
+        optimiser.step()
+
+    return median_s(step, REPEATS)

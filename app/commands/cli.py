@@ -1,0 +1,106 @@
+"""The command line: `learned-strings` opens the app, its sub-commands work without a window.
+
+Exit status 0 on success, 2 on bad usage, 1 on a failure told in one line on standard error (with the
+environment variable LEARNED_STRINGS_DEBUG set, the traceback comes before it), 130 when interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from app.commands import abx, batch, bench, evaluation, info, listing, motion, render, sweep, tables, training
+from app.commands.console import say
+
+DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
+NAME = "learned-strings"
+
+cli = typer.Typer(
+    name=NAME,
+    invoke_without_command=True,
+    add_completion=False,
+    rich_markup_mode=None,  # plain text: quick to start, and a message stays on its line
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@cli.callback()
+def start(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Audition learned strings, compare them with the physics, and export WAV.
+
+    Without a command, the app opens.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    if version:
+        from app.shared.version import program_version
+
+        print(program_version())
+        return
+    from app.window.main import run
+
+    raise typer.Exit(run())
+
+
+for command in (
+    listing.presets,
+    listing.models,
+    motion.simulate,
+    motion.predict,
+    render.render,
+    batch.batch,
+    info.info,
+    motion.compare,
+    training.dataset,
+    training.train,
+    sweep.sweep,
+    evaluation.evaluate,
+    tables.table,
+):
+    cli.command()(command)
+cli.add_typer(tables.figure, name="figure")
+cli.add_typer(sweep.results, name="results")
+cli.add_typer(bench.bench, name="bench")
+cli.add_typer(abx.abx, name="abx")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command line (default: the process's own) and returns the exit status."""
+    try:
+        typer.main.get_command(cli).main(list(sys.argv[1:] if arguments is None else arguments), prog_name=NAME)
+    except SystemExit as exit:
+        return exit.code if isinstance(exit.code, int) else 0 if exit.code is None else 1
+    except Exception as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            traceback.print_exc()
+        say(describe(error))
+        return 1
+    return 0
+
+
+def describe(error: Exception) -> str:
+    """A failure in one line: what, where and the remedy."""
+    if isinstance(error, ImportError) and error.name:
+        return f"this needs {error.name}, which cannot be imported ({error}); install it, or use another command"
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{error.strerror or error}; check the path, its permissions and the free space"
+    if isinstance(error, MemoryError):
+        return "not enough memory; ask for less at once"
+    text = str(error)
+    if text and not isinstance(error, KeyError | IndexError | AttributeError | TypeError | AssertionError):
+        return text
+    return f"internal error: {type(error).__name__} {text}; set {DEBUG_VARIABLE}=1 to see where, and report it"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

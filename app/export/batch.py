@@ -1,0 +1,242 @@
+"""A batch: positions × amplitudes × presets × sources, a WAV file each, and an index of them as CSV.
+
+A batch that was stopped goes on where it was: a file that is there with the same recipe is kept. The index is written
+anew after every pluck, so it is never behind the files.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import soundfile
+import torch
+
+from app.export.batch_index import INDEX, BatchIndex, BatchRow
+from app.export.files import ExportError, WavReport, default_file_name, export_sounds, settings_of
+from app.export.recipe import Recipe, RecipeError, read_recipe
+from app.export.sound import Cancelled, ExportCancelled, SoundRequest, Voices
+from app.export.wav import WavSettings
+from app.shared.vocabulary import Pickup, Source
+from engine.metrics import relative_error
+from engine.pluck import Pluck
+from engine.preset import Preset, PresetError, load_preset
+from engine.sources import Runaway
+
+BatchProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known
+
+
+@dataclass(frozen=True)
+class BatchPlan:
+    """What a batch makes. Everything that is one value is the same for all files, as in `SoundRequest`.
+
+    Attributes:
+        pluck: its shape and width count; position and amplitude come from the lists.
+        overwrite: render also what is there already.
+
+    Raises:
+        ValueError: a list is empty or has a value twice, or a pluck is out of its range.
+    """
+
+    presets: tuple[Path, ...]
+    positions: tuple[float, ...]
+    amplitudes_mm: tuple[float, ...]
+    sources: tuple[Source, ...]
+    folder: Path
+    seconds: float
+    listen: float
+    pluck: Pluck = field(default_factory=Pluck)
+    listen_right: float | None = None
+    pickup: Pickup = "displacement"
+    difference_gain_db: float = 0.0
+    decay_db: float | None = None
+    settings: WavSettings = field(default_factory=WavSettings)
+    overwrite: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("presets", "positions", "amplitudes_mm", "sources"):
+            values, word = getattr(self, name), name.removesuffix("_mm")
+            if not values:
+                raise ValueError(f"{word}: give at least one")
+            if len(set(values)) < len(values):
+                raise ValueError(f"{word}: one is given twice")
+        for _ in self.plucks():
+            pass
+
+    @property
+    def files(self) -> int:
+        return len(self.presets) * len(self.positions) * len(self.amplitudes_mm) * len(self.sources)
+
+    def plucks(self) -> Iterator[Pluck]:
+        for position in self.positions:
+            for amplitude_mm in self.amplitudes_mm:
+                yield replace(self.pluck, position=position, amplitude_mm=amplitude_mm)
+
+    def request(self, preset: Preset, pluck: Pluck, source: Source) -> SoundRequest:
+        return SoundRequest(
+            preset,
+            pluck,
+            self.listen,
+            self.seconds,
+            source,
+            self.listen_right,
+            self.pickup,
+            self.difference_gain_db,
+            self.decay_db,
+        )
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One pluck of one preset: what is to be rendered of it."""
+
+    preset: Path
+    pluck: Pluck
+    sources: tuple[Source, ...]
+
+
+def run_batch(
+    plan: BatchPlan,
+    progress: BatchProgress = lambda share, text, left_s: None,
+    cancelled: Cancelled = lambda: False,
+) -> list[BatchRow]:
+    """Makes the files and the index, in the plan's folder, which is made where it is not there.
+
+    A preset or a pluck that fails does not hinder the others: its row says why.
+
+    Raises:
+        ExportCancelled: `cancelled` said so; whole files and their rows stay.
+        ExportError: the folder or the index cannot be written.
+    """
+    try:
+        plan.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"{plan.folder}: cannot be made ({error.strerror}); choose another folder") from error
+    index = BatchIndex(plan.folder / INDEX)
+    jobs, rows = _sorted_out(plan, index)
+    index.add(rows)
+    started = time.monotonic()
+    preset: Preset | None = None
+    for done, job in enumerate(jobs):
+        if preset is None or preset.path != job.preset:
+            preset = load_preset(job.preset)
+        text = f"{preset.name}, position {job.pluck.position:g}, {job.pluck.amplitude_mm:g} mm"
+
+        def part(share: float, done: int = done, text: str = text) -> None:
+            whole = (done + share) / len(jobs)
+            spent_s = time.monotonic() - started
+            progress(whole, text, spent_s * (1 - whole) / whole if whole > 0 else None)
+
+        part(0.0)
+        made = _rendered(plan, preset, job, part, cancelled)
+        rows += made
+        index.add(made)
+    return rows
+
+
+def _sorted_out(plan: BatchPlan, index: BatchIndex) -> tuple[list[_Job], list[BatchRow]]:
+    """What is to be rendered, and rows of what is not: kept, or of a preset that cannot be used."""
+    jobs, rows = [], []
+    for path in plan.presets:
+        try:
+            preset = load_preset(path)
+            plan.request(preset, plan.pluck, plan.sources[0])
+        except (PresetError, ValueError) as error:
+            rows += [_row(plan, path.stem, 0, pluck, s, str(error)) for pluck in plan.plucks() for s in plan.sources]
+            continue
+        for pluck in plan.plucks():
+            sources = []
+            for source in plan.sources:
+                row = None if plan.overwrite else _kept(plan, preset, pluck, source, index)
+                rows += [row] if row else []
+                sources += [] if row else [source]
+            if sources:
+                jobs.append(_Job(path, pluck, tuple(sources)))
+    return jobs, rows
+
+
+def _kept(plan: BatchPlan, preset: Preset, pluck: Pluck, source: Source, index: BatchIndex) -> BatchRow | None:
+    """The row of a file that is there; None where it is to be rendered."""
+    row = _row(plan, preset.name, preset.info.rate_hz, pluck, source)
+    path = plan.folder / row.file
+    if not path.exists():
+        return None
+    request = plan.request(preset, pluck, source)
+    wanted = Recipe.of(request, settings_of(request, plan.settings))
+    try:
+        same = _essence(read_recipe(path)) == _essence(wanted)
+    except RecipeError:
+        same = False
+    if not same:
+        return replace(
+            row, message=f"{path}: there is another sound of this name; overwrite it, or choose another folder"
+        )
+    if (former := index.rows.get(row.file)) is not None and former.status != "failed":
+        return replace(former, status="kept")
+    with soundfile.SoundFile(path) as file:
+        return replace(row, status="kept", seconds=file.frames / file.samplerate)
+
+
+def _essence(recipe: Recipe) -> dict[str, object]:
+    return recipe.model_dump(exclude={"program", "version"})
+
+
+def _rendered(
+    plan: BatchPlan, preset: Preset, job: _Job, progress: Callable[[float], None], cancelled: Cancelled
+) -> list[BatchRow]:
+    blank = {s: _row(plan, preset.name, preset.info.rate_hz, job.pluck, s) for s in job.sources}
+    paths = {source: plan.folder / row.file for source, row in blank.items()}
+    request = plan.request(preset, job.pluck, job.sources[0])
+    try:
+        reports, voices = export_sounds(
+            request, paths, plan.settings, measured=True, progress=progress, cancelled=cancelled
+        )
+    except Runaway as error:
+        failed = [replace(row, message=str(error)) for source, row in blank.items() if source != "truth"]
+        if "truth" not in blank:
+            return failed
+        truth = replace(job, sources=("truth",))
+        return [*failed, *_rendered(plan, preset, truth, progress, cancelled)]
+    except ExportError as error:
+        return [replace(row, message=str(error)) for row in blank.values()]
+    errors = _errors(preset, voices)
+    return [
+        _measured(blank[source], report, (None, None) if source == "truth" else errors)
+        for source, report in zip(blank, reports, strict=True)
+    ]
+
+
+def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, float | None]) -> BatchRow:
+    return replace(
+        row,
+        status="written",
+        seconds=report.seconds,
+        peak_db=round(report.peak_db, 2),
+        clipped=report.clipped,
+        rel_mae_trained=errors[0],
+        rel_mae=errors[1],
+    )
+
+
+def _errors(preset: Preset, voices: Voices) -> tuple[float | None, float | None]:
+    """Within the training and in all; None where there is nothing to compare."""
+    if len(voices.sounds) < 2:
+        return None, None
+    model, truth = (torch.from_numpy(voices.sounds[name])[None, 1:] for name in ("model", "truth"))
+    ends = (preset.info.horizon_steps, truth.shape[1])
+    found = [relative_error(model[:, :end], truth[:, :end]).rel_mae if truth.shape[1] else None for end in ends]
+    trained, whole = (None if error is None else float(f"{error:.4g}") for error in found)
+    return trained, whole
+
+
+def _row(
+    plan: BatchPlan, preset: str, preset_rate_hz: int, pluck: Pluck, source: Source, message: str = ""
+) -> BatchRow:
+    rate_hz = plan.settings.rate_hz or preset_rate_hz
+    name = default_file_name(preset, pluck, rate_hz, source)
+    return BatchRow(name, "failed", preset, pluck.position, pluck.amplitude_mm, source, rate_hz, message=message)
+
+
+__all__ = ["INDEX", "BatchPlan", "BatchRow", "ExportCancelled", "run_batch"]

@@ -1,0 +1,231 @@
+"""Export: the sound of a pluck as WAV files that carry their recipe, each whole or absent.
+
+The window and the command line write the same files through this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.export.recipe import Recipe
+from app.export.sound import (
+    LONGEST_S,
+    SOURCES,
+    Cancelled,
+    ExportCancelled,
+    Progress,
+    SoundRequest,
+    Source,
+    Voices,
+    render_sound,
+    render_voices,
+)
+from app.export.wav import BITS, RATE_RANGE_HZ, Bits, EncodedWav, WavSettings, encode_wav
+from app.shared.version import PROGRAM, program_version
+from app.shared.whole_file import WriteError, explain, whole_file
+from engine.pluck import Pluck
+from engine.preset import PresetError
+
+END_OF_TRAINING = "end of training"  # the marker's name
+DECAY_FADE_S = 0.05  # where a sound ends by its decay
+
+
+class ExportError(Exception):
+    """An export that failed. The message names the path, what happened and the remedy. No file is left."""
+
+
+@dataclass(frozen=True)
+class WavReport:
+    """What was written.
+
+    Attributes:
+        peak_db: the largest sample in dBFS before any clipping; -inf for silence.
+        clipped: samples beyond full scale that were cut; always 0 in floating point.
+        past_training_s: how much of the end the model was not trained on; 0 for the truth.
+        decayed: False where the sound was to last until it had decayed, and the longest duration came first.
+    """
+
+    path: Path
+    frames: int
+    rate_hz: int
+    size_bytes: int
+    peak_db: float
+    clipped: int
+    gain_db: float
+    past_training_s: float = 0.0
+    decayed: bool = True
+
+    @property
+    def seconds(self) -> float:
+        return self.frames / self.rate_hz
+
+
+def export_sound(
+    request: SoundRequest,
+    path: Path,
+    settings: WavSettings | None = None,
+    *,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
+) -> WavReport:
+    """Renders and writes a WAV file, whole or not at all.
+
+    Raises:
+        ExportError: the file cannot be written, or the preset is gone.
+        ExportCancelled: `cancelled` said so.
+        Runaway: the model's output stopped being a string's.
+    """
+    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress, cancelled=cancelled)[0]
+    return report
+
+
+def export_sounds(
+    request: SoundRequest,
+    paths: Mapping[Source, Path],
+    settings: WavSettings | None = None,
+    *,
+    measured: bool = False,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
+) -> tuple[list[WavReport], Voices]:
+    """Renders a pluck once and writes a file for each source, with one gain.
+
+    Args:
+        request: its own `source` is not looked at.
+        measured: render model and truth whatever the sources, to compare them.
+
+    Returns:
+        The reports in the order of `paths`, and what was rendered.
+
+    Raises:
+        As `export_sound`.
+    """
+    settings = settings_of(request, settings or WavSettings())
+    requests = {source: replace(request, source=source) for source in paths}
+    info = request.preset.info
+    with ExitStack() as files:
+        try:
+            recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
+        except PresetError as error:
+            raise ExportError(str(error)) from error
+        # opened first, so that a folder that refuses is told before the work
+        writers = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
+        rate_hz = settings.rate_hz or info.rate_hz
+        voices = render_voices(
+            request,
+            paths,
+            rate_hz,
+            all_voices=measured or settings.normalise,
+            progress=progress,
+            cancelled=cancelled,
+        )
+        sounds = {source: voices.samples(source, request.difference_gain_db) for source in paths}
+        beside = [*voices.sounds.values(), *sounds.values()] if settings.normalise else []
+        reports = []
+        for source, write in writers.items():
+            with _explained(paths[source]):
+                labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
+                wav = encode_wav(
+                    sounds[source], rate_hz, settings, _tags(info.title, recipes[source]), beside, labels
+                )
+            past_s = max(0.0, wav.frames / wav.rate_hz - info.horizon_s) if labels else 0.0
+            reports.append(replace(write(wav), past_training_s=past_s, decayed=voices.ended))
+    return reports, voices
+
+
+def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
+    """The settings that a request is written with: an end by decay fades longer."""
+    if request.decay_db is None:
+        return settings
+    return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
+
+
+def write_wav(
+    path: Path,
+    samples: NDArray[np.floating],
+    rate_hz: int,
+    settings: WavSettings | None = None,
+    *,
+    title: str = "",
+) -> WavReport:
+    """Writes samples (frames,) or (frames, channels), ±1 being full scale, whole or not at all.
+
+    Raises:
+        ExportError: the file cannot be written, or a sample is not finite.
+    """
+    with _written_whole(path) as write:
+        return write(encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title)))
+
+
+def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
+    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`."""
+    place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
+    return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
+
+
+def _digits(value: float, least: int) -> str:
+    """At least so many decimals, and as many more as tell the value from its neighbours in a file name."""
+    return next((text for places in range(least, 6) if float(text := f"{value:.{places}f}") == value), f"{value:.6f}")
+
+
+def _tags(title: str, recipe: Recipe | None = None) -> dict[str, str]:
+    comment = recipe.model_dump_json() if recipe else ""
+    tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": comment}
+    return {name: text for name, text in tags.items() if text}
+
+
+@contextmanager
+def _written_whole(path: Path) -> Iterator[Callable[[EncodedWav], WavReport]]:
+    """A function that writes the file at `path`, which appears when the block ends well."""
+    with _explained(path), whole_file(path) as file:
+
+        def write(wav: EncodedWav) -> WavReport:
+            with _explained(path):
+                file.write(wav.data)
+            level = wav.level
+            return WavReport(
+                path, wav.frames, wav.rate_hz, len(wav.data), level.peak_db, level.clipped, level.gain_db
+            )
+
+        yield write
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except WriteError as error:
+        raise ExportError(str(error)) from error
+    except OSError as error:
+        raise ExportError(explain(path, error)) from error
+    except ValueError as error:
+        raise ExportError(f"{path}: {error}") from error
+    except MemoryError as error:
+        raise ExportError(f"{path}: the sound does not fit in memory; choose a shorter duration") from error
+
+
+__all__ = [
+    "BITS",
+    "LONGEST_S",
+    "RATE_RANGE_HZ",
+    "SOURCES",
+    "Bits",
+    "ExportCancelled",
+    "ExportError",
+    "SoundRequest",
+    "Source",
+    "WavReport",
+    "WavSettings",
+    "default_file_name",
+    "export_sound",
+    "export_sounds",
+    "render_sound",
+    "settings_of",
+    "write_wav",
+]

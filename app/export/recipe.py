@@ -1,0 +1,154 @@
+"""The recipe of a WAV file: all choices that made its sound, as JSON in its comment, so that it can be made again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Literal
+
+import soundfile
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from app.export.sound import LONGEST_S, SoundRequest
+from app.export.wav import RATE_RANGE_HZ, Bits, WavSettings
+from app.presets.digest import preset_digest
+from app.shared.version import PROGRAM, program_version
+from app.shared.vocabulary import Pickup, Source
+from engine.pluck import Pluck
+from engine.preset import Preset, PresetError
+from engine.sources import FULL_SCALE_M
+
+
+class RecipeError(Exception):
+    """A file without a usable recipe. The message names the file, what is wrong and the remedy."""
+
+
+class Recipe(BaseModel):
+    """See the module. Lengths and rates as in `SoundRequest` and `WavSettings`; what is absent has its default.
+
+    Attributes:
+        horizon_s: the model's training ends here; what lies past it is extrapolation.
+        full_scale_m: the displacement that is 0 dBFS.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: Literal[1] = 1
+    program: str
+    version: str
+    preset: str
+    preset_sha256: str
+    pluck: Pluck
+    listen: float = Field(ge=0, le=1)
+    listen_right: float | None = Field(None, ge=0, le=1)
+    pickup: Pickup = "displacement"
+    seconds: float = Field(gt=0, le=LONGEST_S)
+    decay_db: float | None = None
+    source: Source
+    difference_gain_db: float = 0.0
+    preset_rate_hz: int
+    horizon_s: float
+    full_scale_m: float
+    rate_hz: int = Field(ge=RATE_RANGE_HZ[0], le=RATE_RANGE_HZ[1])
+    bits: Bits
+    normalise: bool
+    fade_out_s: float = Field(0.010, ge=0)
+
+    @classmethod
+    def of(cls, request: SoundRequest, settings: WavSettings) -> Recipe:
+        """Raises PresetError: the preset's file cannot be read any more."""
+        info = request.preset.info
+        return cls(
+            program=PROGRAM,
+            version=program_version(),
+            preset=request.preset.name,
+            preset_sha256=preset_digest(request.preset.path),
+            pluck=request.pluck,
+            listen=request.listen,
+            listen_right=request.listen_right,
+            pickup=request.pickup,
+            seconds=request.seconds,
+            decay_db=request.decay_db,
+            source=request.source,
+            difference_gain_db=request.difference_gain_db if request.source == "difference" else 0.0,
+            preset_rate_hz=info.rate_hz,
+            horizon_s=info.horizon_s,
+            full_scale_m=FULL_SCALE_M,
+            rate_hz=settings.rate_hz or info.rate_hz,
+            bits=settings.bits,
+            normalise=settings.normalise,
+            fade_out_s=settings.fade_out_s,
+        )
+
+    def request(self, preset: Preset) -> SoundRequest:
+        """What is to be rendered. Raises ValueError where the values do not go together."""
+        return SoundRequest(
+            preset,
+            self.pluck,
+            self.listen,
+            self.seconds,
+            self.source,
+            self.listen_right,
+            self.pickup,
+            self.difference_gain_db,
+            self.decay_db,
+        )
+
+    @property
+    def settings(self) -> WavSettings:
+        return WavSettings(self.bits, self.rate_hz, self.normalise, self.fade_out_s)
+
+
+def read_recipe(path: Path) -> Recipe:
+    """The recipe that a WAV file carries.
+
+    Raises:
+        RecipeError: the file is missing or no WAV, has no recipe, or one that is broken or of a newer version.
+    """
+    try:
+        with soundfile.SoundFile(path) as file:
+            text = file.comment
+    except (OSError, soundfile.LibsndfileError) as error:
+        words = error.strerror if isinstance(error, OSError) else error.error_string.strip(" .")
+        raise RecipeError(
+            f"{path}: no sound file that can be read ({words}); give a WAV that was exported"
+        ) from error
+    if not text.lstrip().startswith("{"):
+        raise RecipeError(
+            f"{path}: has no recipe; it was not exported by {PROGRAM}, or another program has removed its tags"
+        )
+    try:
+        return Recipe.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(map(str, first["loc"])) or "the text"
+        raise RecipeError(
+            f"{path}: its recipe cannot be used ({field}: {first['msg']}); "
+            "it is damaged, of another program, or of a newer version"
+        ) from error
+
+
+def preset_of(recipe: Recipe, presets: Iterable[Path]) -> tuple[Path, bool]:
+    """The preset file that a recipe means, and whether it is the very same one: by content, else by name.
+
+    Raises:
+        RecipeError: there is neither.
+    """
+    paths = list(presets)
+    for path in paths:
+        try:
+            if preset_digest(path) == recipe.preset_sha256:
+                return path, True
+        except PresetError:
+            continue  # of a preset that cannot be read another place tells
+    for path in paths:
+        if path.stem == recipe.preset:
+            return path, False
+    raise RecipeError(
+        f"the preset {recipe.preset} of this recipe is not here; get its file and add it, then try again"
+    )
+
+
+def changed_preset_notice(recipe: Recipe) -> str:
+    """What is to be known where a preset was found by its name alone."""
+    return f"the preset {recipe.preset} is not the one that made this file (another version of it): the sound differs"

@@ -1,0 +1,205 @@
+"""The sound of a pluck at the string's listening points: model, truth, their difference, or both side by side.
+
+What is heard in a file is made here, by the voices that a sound device plays, sample by sample: ±1 is full scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.shared.vocabulary import PICKUPS, Pickup, Source
+from engine.pluck import Pluck
+from engine.preset import Preset
+from engine.sources import ModelSource, Runaway
+from engine.voices import Ear, model_program, render_voice, truth_program
+
+Voice = Literal["model", "truth"]
+VOICES: tuple[Voice, ...] = get_args(Voice)
+SOURCES: tuple[Source, ...] = get_args(Source)
+LONGEST_S = 600.0
+DECAY_RANGE_DB = (10.0, 120.0)
+DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)
+DECAYED_FOR_SURE_DB = 30.0  # below the wanted decay, by all of the string: no point on it is louder
+LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level is no matter of phase
+
+Samples = NDArray[np.float64]
+Progress = Callable[[float], None]  # is told the share that is done, 0 … 1
+Cancelled = Callable[[], bool]
+
+
+class ExportCancelled(Exception):
+    """The user stopped the export. No file is left."""
+
+
+@dataclass(frozen=True)
+class SoundRequest:
+    """What is to be heard.
+
+    Attributes:
+        listen: the listening point, 0 … 1 in lengths of the string.
+        seconds: the duration; with `decay_db` the longest.
+        source: "difference" is model minus truth, "both" the model in the left channel and the truth in the right.
+        listen_right: the listening point of a right channel; None is mono.
+        pickup: "velocity" is the derivative of displacement; 30 m/s are full scale.
+        difference_gain_db: how much louder the difference is made.
+        decay_db: the sound ends where model and truth have fallen this far below their loudest, so that all files of
+            a pluck have one length. None: it lasts `seconds`.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it and the range.
+    """
+
+    preset: Preset
+    pluck: Pluck
+    listen: float
+    seconds: float
+    source: Source = "model"
+    listen_right: float | None = None
+    pickup: Pickup = "displacement"
+    difference_gain_db: float = 0.0
+    decay_db: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, point in (("listening point", self.listen), ("right listening point", self.listen_right)):
+            if point is not None and not 0 <= point <= 1:
+                raise ValueError(f"{name} must lie in 0 … 1, not {point:g}")
+        if not 1 / self.preset.info.rate_hz <= self.seconds <= LONGEST_S:
+            raise ValueError(f"seconds must be above 0 and at most {LONGEST_S:g}, not {self.seconds:g}")
+        for name, value, known in (("source", self.source, SOURCES), ("pickup", self.pickup, PICKUPS)):
+            if value not in known:
+                raise ValueError(f"{name} {value!r} is not one of {', '.join(known)}")
+        if self.source == "both" and self.listen_right is not None:
+            raise ValueError("model and truth cannot share one file in stereo; choose two files, or mono")
+        _check("decay_db", self.decay_db, DECAY_RANGE_DB)
+        _check("difference_gain_db", self.difference_gain_db, DIFFERENCE_GAIN_RANGE_DB)
+
+    @property
+    def points(self) -> tuple[float, ...]:
+        """The listening points, one a channel."""
+        return (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
+
+
+@dataclass(frozen=True)
+class Voices:
+    """Model and truth of one request, (frames, points) each, as far as they are needed.
+
+    Attributes:
+        ended: False where the decay was not over at the longest duration.
+    """
+
+    sounds: Mapping[Voice, Samples]
+    ended: bool = True
+
+    def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
+        """What a source is made of: (frames,), or (frames, 2) in stereo and for both."""
+        sounds = self.sounds
+        if source == "both":
+            return np.concatenate([sounds["model"], sounds["truth"]], axis=1)
+        if source == "difference":
+            mixed = 10 ** (difference_gain_db / 20) * (sounds["model"] - sounds["truth"])
+        else:
+            mixed = sounds[source]
+        return mixed[:, 0] if mixed.shape[1] == 1 else mixed
+
+
+def render_sound(
+    request: SoundRequest,
+    rate_hz: int = 0,
+    *,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
+) -> Samples:
+    """The samples of a request, (frames,) or (frames, 2).
+
+    Args:
+        rate_hz: 0 for the preset's own.
+
+    Raises:
+        ExportCancelled: `cancelled` said so.
+        Runaway: the model's output stopped being a string's.
+    """
+    voices = render_voices(request, (request.source,), rate_hz, progress=progress, cancelled=cancelled)
+    return voices.samples(request.source, request.difference_gain_db)
+
+
+def render_voices(
+    request: SoundRequest,
+    sources: Iterable[Source],
+    rate_hz: int = 0,
+    *,
+    all_voices: bool = False,
+    progress: Progress = lambda share: None,
+    cancelled: Cancelled = lambda: False,
+) -> Voices:
+    """Model and truth once, for any number of sources of one pluck (`request.source` is not looked at).
+
+    Args:
+        rate_hz: of the samples; 0 for the preset's own.
+        all_voices: both of them whatever the sources; a model that runs away is then left out if no source needs it.
+    """
+    sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
+    needed = {voice for source in sources for voice in (VOICES if source in ("difference", "both") else (source,))}
+    wanted = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
+    sounds: dict[Voice, Samples] = {}
+    for place, voice in enumerate(wanted):
+
+        def part(share: float, place: int = place) -> None:
+            progress((place + share) / len(wanted))
+
+        with suppress(*(() if voice in needed else (Runaway,))):
+            sounds[voice] = _render(request, voice, rate_hz, part, cancelled)
+    if request.decay_db is None:
+        return Voices(sounds)
+    ends = [decayed_frames(sound, rate_hz, request.decay_db) for sound in sounds.values()]
+    frames = max(ends)
+    ended = frames < round(request.seconds * rate_hz)
+    return Voices({voice: sound[:frames] for voice, sound in sounds.items()}, ended)
+
+
+def decayed_frames(sound: Samples, rate_hz: int, decay_db: float) -> int:
+    """How many of the frames (frames, points) there are until the level stays `decay_db` below its loudest.
+
+    The level is the mean square over windows of 50 ms and all points. All frames where it never falls so low; silence
+    is one window.
+    """
+    window = max(1, round(LEVEL_WINDOW_S * rate_hz))
+    whole = np.zeros((-(-len(sound) // window) * window, sound.shape[1]))
+    whole[: len(sound)] = sound
+    power = np.square(whole).reshape(-1, window * sound.shape[1]).sum(1)
+    loud = np.flatnonzero(power > power.max() * 10 ** (-decay_db / 10))
+    last = int(loud[-1]) + 1 if len(loud) else 1
+    return min(len(sound), last * window)
+
+
+def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progress, cancelled: Cancelled) -> Samples:
+    """(frames, points), by the very voice that a device would play."""
+    preset, info = request.preset, request.preset.info
+    program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
+    ear = Ear(request.points, request.pickup)
+
+    def advanced(share: float) -> None:
+        if cancelled():
+            raise ExportCancelled
+        progress(share)
+
+    return render_voice(
+        program,
+        ModelSource(preset) if program.rendered else None,
+        info,
+        request.pluck,
+        ear,
+        request.seconds,
+        advanced,
+        None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB,
+    ).astype(np.float64)
+
+
+def _check(name: str, value: float | None, limits: tuple[float, float]) -> None:
+    if value is not None and not limits[0] <= value <= limits[1]:
+        raise ValueError(f"{name} must lie in {limits[0]:g} … {limits[1]:g}, not {value:g}")

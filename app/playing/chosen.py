@@ -1,0 +1,40 @@
+"""From what is chosen to what is plucked, how it is heard, and what is drawn of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.playing.stroke import Mix, Stroke
+from app.presets.library import Library
+from app.rendering import RenderRequest
+from app.session.choices import Choices
+from app.session.ears import heard_ear
+from app.session.slots import other_preset
+from app.shared.vocabulary import DIFFERENCE
+
+
+def mix_of(choices: Choices) -> Mix:
+    """What is heard of a note."""
+    return Mix(choices.source_heard, choices.level_match, choices.difference_gain_db)
+
+
+def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
+    """What is plucked, with voices for both slots."""
+    others = _others(choices, library)
+    sources: list[str] = []
+    for held in (choices.source_heard, choices.a, choices.b):
+        sources += ("model", "truth") if held == DIFFERENCE else (held,)
+    known = dict.fromkeys(source for source in sources if source in ("model", "truth") or source in others)
+    return Stroke(preset, choices.pluck, heard_ear(choices), choices.seconds, tuple(known) or ("model",), others)
+
+
+def render_request(choices: Choices, preset: Path, library: Library) -> RenderRequest:
+    """What the worker is asked for, other presets in the slots among it."""
+    return RenderRequest(
+        preset, choices.pluck, choices.seconds, tuple(dict.fromkeys(_others(choices, library).values()))
+    )
+
+
+def _others(choices: Choices, library: Library) -> dict[str, Path]:
+    entries = {source: library.find(other_preset(source)) for source in (choices.a, choices.b)}
+    return {source: entry.path for source, entry in entries.items() if entry is not None}

@@ -1,0 +1,109 @@
+"""The MIDI input: its names and its messages, through mido, which is loaded only when it is wanted."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from app.playing.midi import Message, read_message
+
+
+class MidiUnavailable(Exception):
+    """Why there is no MIDI, in plain words with the remedy."""
+
+
+class OpenPort(Protocol):
+    def close(self) -> None: ...
+
+
+class Backend(Protocol):
+    """What is used of mido."""
+
+    def get_input_names(self) -> list[str]: ...
+
+    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> OpenPort: ...
+
+
+def load_backend() -> Backend:
+    """Mido with python-rtmidi.
+
+    Raises:
+        MidiUnavailable: one of them is not installed.
+    """
+    try:
+        import mido
+
+        backend: Backend = mido.Backend("mido.backends.rtmidi", load=True)
+    except ImportError as error:
+        raise MidiUnavailable(
+            "MIDI needs two packages that are not installed: mido and python-rtmidi. "
+            f"Get them with:  {sys.executable} -m pip install mido python-rtmidi"
+        ) from error
+    return backend
+
+
+class MidiInput:
+    """At most one open input. `on_message` is called in mido's thread."""
+
+    def __init__(self, on_message: Callable[[Message], None], load: Callable[[], Backend] = load_backend) -> None:
+        self._on_message = on_message
+        self._load = load
+        self._backend: Backend | None = None
+        self._port: OpenPort | None = None
+        self.name = ""  # of the open input
+
+    def names(self) -> list[str]:
+        """The inputs that are connected now.
+
+        Raises:
+            MidiUnavailable: no backend, or the system's MIDI does not answer.
+        """
+        try:
+            return list(dict.fromkeys(self._loaded().get_input_names()))
+        except (OSError, RuntimeError) as error:
+            raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
+
+    def open(self, name: str) -> None:
+        """Listens to the input of that name, and no longer to another.
+
+        Raises:
+            MidiUnavailable: no backend, no such input, or another program has it.
+        """
+        self.close()
+        found = next((present for present in self.names() if same_device(present, name)), None)
+        if found is None:
+            raise MidiUnavailable(f"The MIDI input {name} is not connected. Connect it, or choose another.")
+        try:
+            self._port = self._loaded().open_input(found, callback=self._receive)
+        except (OSError, RuntimeError) as error:
+            raise MidiUnavailable(
+                f"The MIDI input {found} cannot be opened ({error}). Another program may be using it."
+            ) from error
+        self.name = found
+
+    def close(self) -> None:
+        """May be called again."""
+        port, self._port, self.name = self._port, None, ""
+        if port is not None:
+            port.close()
+
+    def _loaded(self) -> Backend:
+        if self._backend is None:
+            self._backend = self._load()
+        return self._backend
+
+    def _receive(self, message: Any) -> None:
+        ours = read_message(message)
+        if ours is not None:
+            self._on_message(ours)
+
+
+def same_device(one: str, other: str) -> bool:
+    """Whether two names differ by the numbers alone that ALSA gives anew at each connection ("Keys:Keys 20:0")."""
+    return _without_numbers(one) == _without_numbers(other)
+
+
+def _without_numbers(name: str) -> str:
+    return re.sub(r"\s+\d+:\d+$", "", name)

@@ -1,0 +1,1 @@
+"""Which presets there are, and their facts in words."""

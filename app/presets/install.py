@@ -1,0 +1,68 @@
+"""A preset file from anywhere becomes one of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+
+from app.presets.digest import preset_digest
+from app.shared.whole_file import WriteError, explain, whole_file
+from engine.preset import PresetError, load_preset
+from engine.sources import ModelSource
+
+SUFFIX = ".safetensors"
+
+
+class InstallError(Exception):
+    """A file that did not become a preset. The message names it, what is wrong and the remedy."""
+
+
+@dataclass(frozen=True)
+class Installed:
+    """Where a preset is now; `was_there`: it already was, byte by byte."""
+
+    name: str
+    path: Path
+    was_there: bool
+
+
+def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Installed:
+    """Copies a preset that was checked into `folder`, which is made where it is not there.
+
+    Args:
+        present: the files of all presets there are; a name that is taken gets a number.
+
+    Raises:
+        InstallError: the file is no usable preset, or the copy cannot be written; nothing is left.
+    """
+    try:
+        ModelSource(load_preset(file))  # all checks, and that a pluck can start it
+        digest = preset_digest(file)
+    except (PresetError, ValueError) as error:
+        raise InstallError(str(error)) from error
+    present = list(present)
+    for path in present:
+        if _same(path, digest):
+            return Installed(path.stem, path, was_there=True)
+    taken = {path.stem for path in present}
+    names = (file.stem if number == 1 else f"{file.stem}_{number}" for number in count(1))
+    target = next(path for name in names if name not in taken and not (path := folder / f"{name}{SUFFIX}").exists())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        data = file.read_bytes()
+        with whole_file(target) as copy:
+            copy.write(data)
+    except OSError as error:
+        raise InstallError(explain(target, error)) from error
+    except WriteError as error:
+        raise InstallError(str(error)) from error
+    return Installed(target.stem, target, was_there=False)
+
+
+def _same(path: Path, digest: str) -> bool:
+    try:
+        return preset_digest(path) == digest
+    except PresetError:
+        return False

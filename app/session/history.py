@@ -1,0 +1,98 @@
+"""Undo and redo: earlier values of what shapes the sound, around the session, which stays the one truth.
+
+A step is one gesture: all that changes between `hold` and `let_go` (a drag), or changes of the same fields that
+follow each other within half a second (keys, wheel notches, a controller). It takes back what it changed and nothing
+else: notes that are played (`Session.play`) are no steps, and the place of the last one stays.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from app.session.choices import Choices, Session
+
+# Not what is only looked at or listened to: views, speed, volume, loop, model or truth.
+PLUCK = ("preset", "position", "amplitude_mm", "shape", "width", "seconds")
+EARS = ("listen", "listen_right", "stereo", "pickup")
+RECORDED = frozenset({*PLUCK, *EARS})
+GATHER_S = 0.5
+LARGEST_STEPS = 200
+
+Values = dict[str, Any]  # of recorded fields
+
+
+class History:
+    """Listens to a session from now on. `now_s` is a clock, for tests."""
+
+    def __init__(self, session: Session, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._session = session
+        self._now_s = now_s
+        self._undo: deque[Values] = deque(maxlen=LARGEST_STEPS)
+        self._redo: list[Values] = []
+        self._present = _recorded(session.choices)  # all of them
+        self._held = False
+        self._open_fields: frozenset[str] | None = None  # of the step that still gathers; None: the next is a new one
+        self._changed_s = 0.0
+        session.played.connect(self._choices_played)
+        session.changed.connect(self._choices_changed)
+
+    @property
+    def can_undo(self) -> bool:
+        return bool(self._undo)
+
+    @property
+    def can_redo(self) -> bool:
+        return bool(self._redo)
+
+    def hold(self) -> None:
+        """A gesture begins: all that it changes is one step."""
+        self._held = True
+        self._open_fields = None
+
+    def let_go(self) -> None:
+        """It has ended."""
+        self._held = False
+        self._open_fields = None
+
+    def undo(self) -> None:
+        """Back by one step; nothing where there is none."""
+        self._restore(self._undo, self._redo)
+
+    def redo(self) -> None:
+        self._restore(self._redo, self._undo)
+
+    def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:
+        self.let_go()
+        while source:
+            wanted = source.pop()
+            here = {name: self._present[name] for name in wanted}
+            if wanted != here:  # a drag that came back to its start is no step
+                target.append(here)
+                self._present |= wanted
+                self._session.update(**wanted)
+                return
+
+    def _choices_played(self, _: frozenset[str]) -> None:
+        self._present = _recorded(self._session.choices)
+
+    def _choices_changed(self, names: frozenset[str]) -> None:
+        values = _recorded(self._session.choices)
+        fields = names & RECORDED
+        if not fields or values == self._present:  # the latter while a step is restored, or a note played
+            return
+        now_s = self._now_s()
+        soon = fields == self._open_fields and now_s - self._changed_s <= GATHER_S
+        if self._open_fields is None or not (self._held or soon):
+            self._undo.append({})
+        step = self._undo[-1]
+        for name in fields - step.keys():
+            step[name] = self._present[name]
+        self._redo.clear()
+        self._open_fields, self._changed_s, self._present = fields, now_s, values
+
+
+def _recorded(choices: Choices) -> Values:
+    return {name: getattr(choices, name) for name in RECORDED}

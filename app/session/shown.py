@@ -1,0 +1,79 @@
+"""What the views of a sound show: the sources in the slots A and B, as they are picked up, and in which words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from app.presets.library import Library
+from app.session.choices import Choices
+from app.session.slots import source_title
+from app.shared.vocabulary import DIFFERENCE
+from engine.pluck import FULL_SCALE_M_S
+from engine.sources import FULL_SCALE_M
+
+LEGEND_FIELDS = {"heard", "a", "b", "difference_gain_db", "solo", "stereo"}  # of `Choices`: what legends depend on
+_PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+
+
+@dataclass(frozen=True)
+class ShownSource:
+    """What a slot holds.
+
+    Attributes:
+        source: as in `Choices.a`.
+        slots: the letters of those that hold it; empty for what no slot holds.
+        title: in the field's words; of another preset its own title.
+        gain_db: the stated gain with which it is heard and drawn; matching of levels is not drawn.
+        heard: whether it is what sounds now.
+    """
+
+    source: str
+    slots: str
+    title: str
+    heard: bool = False
+    gain_db: float = 0.0
+
+    @property
+    def remark(self) -> str:
+        """What a legend says behind the title."""
+        gain = f" {self.gain_db:+.0f} dB" if self.gain_db else ""
+        return f"{gain}{' · heard' if self.heard else ''}"
+
+    @property
+    def gain(self) -> float:
+        return float(10 ** (self.gain_db / 20))
+
+
+DEFAULT_SOURCES = (ShownSource("model", "A", "model", heard=True), ShownSource("truth", "B", "truth"))
+
+
+def shown_sources(choices: Choices, library: Library) -> tuple[ShownSource, ...]:
+    """Slot A's and slot B's; one where both hold the same."""
+    return tuple(_sources(choices, library))
+
+
+def _sources(choices: Choices, library: Library) -> Iterator[ShownSource]:
+    for source in dict.fromkeys((choices.a, choices.b)):
+        slots = " ".join(letter for letter, held in (("A", choices.a), ("B", choices.b)) if held == source)
+        gain_db = choices.difference_gain_db if source == DIFFERENCE else 0.0
+        yield ShownSource(source, slots, source_title(source, library), source == choices.source_heard, gain_db)
+
+
+def part_words(choices: Choices) -> str:
+    """What of the sound is drawn: the mode where one is heard alone, and which ear; nothing where it is all."""
+    parts = (f"mode {choices.solo}" if choices.solo else "", "left" if choices.stereo else "")
+    return ", ".join(part for part in parts if part)
+
+
+def full_scale_words(choices: Choices) -> str:
+    """What 0 dB is."""
+    return f"{FULL_SCALE_M_S:g} m/s" if choices.pickup == "velocity" else f"{1000 * FULL_SCALE_M:g} mm"
+
+
+def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
+    """Factor and name of a unit in which `peak`, in m or m/s, has few digits; displacement is never told in m."""
+    unit = "m/s" if pickup == "velocity" else "m"
+    prefixes = _PREFIXES if pickup == "velocity" else _PREFIXES[1:]
+    factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])
+    return factor, prefix + unit

@@ -1,0 +1,92 @@
+"""Why nothing is heard, in words: every choice that makes a pluck silent explains itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from app.presets.library import Library
+from app.rendering import Take
+from app.session.choices import VOLUME_RANGE_DB, Choices
+from app.session.ears import heard_ear
+from app.session.slots import other_preset
+from engine.preset import outside_training
+from engine.sine_transform import to_modes
+
+FAINT_DB = -70.0  # below full scale nobody hears a thing
+AT_ONCE_S = 0.01  # a model that runs away before this was never a string
+
+
+def why_silent(choices: Choices, library: Library) -> str:
+    """The reason that is plain before anything is rendered, or nothing."""
+    if choices.amplitude_mm == 0:
+        return "silent: the amplitude is 0"
+    if choices.volume_db <= VOLUME_RANGE_DB[0]:
+        return "silent: the volume is at its lowest"
+    if name := other_preset(choices.source_heard):
+        entry = library.find(name)
+        if entry is None:
+            return f"silent: the preset {name} is not there"
+        if entry.unplayable:
+            return f"silent: {entry.unplayable}"
+    return _why_points_silent(choices) or _why_solo_silent(choices, library)
+
+
+def why_ran_away(take: Take) -> str:
+    """From when on a take's model is silent because its output was no string's, and what helps; or nothing."""
+    if take.model_ends_s is None:
+        return ""
+    title, outside = take.info.title, "; ".join(outside_training(take.info, take.pluck))
+    if take.model_ends_s < AT_ONCE_S:
+        what = f"The model of {title} cannot play this pluck and is silent: its output grows without bound at once."
+    else:
+        what = (
+            f"The output of {title}'s model ran away {take.model_ends_s:.2f} s after the pluck, and the model is "
+            "silent from there."
+        )
+    if outside:
+        return f"{what} It was not trained for such plucks ({outside}). Choose one inside it; the truth plays."
+    return f"{what} Choose another pluck or another preset; the truth plays."
+
+
+def why_difference_silent(choices: Choices, take: Take) -> str:
+    """The reason that model and truth of a take have no audible difference, or nothing."""
+    ear = heard_ear(choices)
+    weights = ear.weights(take.info.grid_points).float().numpy()
+    signal = (take.motion_m("model") - take.motion_m("truth")) @ weights
+    if ear.pickup == "velocity":
+        signal = np.diff(signal, axis=0) * take.info.rate_hz
+    peak = float(np.abs(signal).max(initial=0.0)) / ear.full_scale
+    if peak == 0:
+        return "silent: model and truth do not differ here"
+    peak_db = 20 * math.log10(peak) + choices.difference_gain_db
+    if peak_db < FAINT_DB:
+        return f"too soft to hear: the difference peaks at {peak_db:.0f} dB; raise its gain"
+    return ""
+
+
+def _why_points_silent(choices: Choices) -> str:
+    ear = heard_ear(choices)
+    ends = [point in (0.0, 1.0) for point in ear.points]
+    nodes = [ear.is_on_node(point) for point in ear.points]
+    if not any(nodes):
+        return ""
+    place = "a fixed end" if all(ends[i] for i, node in enumerate(nodes) if node) else f"a node of mode {ear.solo}"
+    if not choices.stereo:
+        return f"silent: the listening point is at {place}"
+    if all(nodes):
+        return f"silent: both listening points are at {place}"
+    return f"{'left' if nodes[0] else 'right'} silent: its listening point is at {place}"
+
+
+def _why_solo_silent(choices: Choices, library: Library) -> str:
+    entry = library.find(other_preset(choices.source_heard) or choices.preset)
+    if choices.solo == 0 or entry is None:
+        return ""
+    if choices.solo > entry.info.modes:
+        return f"silent: mode {choices.solo} is heard alone, and this string has {entry.info.modes}"
+    amplitudes = to_modes(choices.pluck.displacement(entry.info.grid_points), choices.solo).abs()
+    if float(amplitudes[-1]) < 1e-4 * choices.amplitude_mm / 1000:
+        return f"silent: this pluck does not excite mode {choices.solo}, which is heard alone"
+    return ""

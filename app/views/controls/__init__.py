@@ -1,0 +1,1 @@
+"""Knobs, buttons, bars and labels."""

@@ -1,0 +1,59 @@
+"""The window's menu: how it looks, and the dialogs that have no place of their own in the header."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
+
+from app.views.controls.parts import tool_button
+from app.views.look import Look
+
+FACES = {"system": "As the system", "dark": "Dark", "light": "Light"}
+SIZES_PERCENT = (100, 115, 125, 150)
+
+
+class AppMenu(QMenu):
+    """Asks with signals, shows with `show_look`. `asked` are actions, and the window's signal that each one means."""
+
+    look_asked = Signal(str, object)  # a field of `Look` and its new value
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._choices: dict[tuple[str, object], QAction] = {}
+        self._add_choices("Theme", "face", {name: face for face, name in FACES.items()})
+        self._add_choices("Size (from the next start)", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
+        self.addSeparator()
+        self.asked = {
+            self.addAction(text): signal
+            for text, signal in (
+                ("Audio settings …\tCtrl+,", "audio_asked"),
+                ("MIDI …\tCtrl+M", "midi_asked"),
+                ("Notices …\tF8", "notices_asked"),
+                ("Help\tF1", "help_asked"),
+                ("About Learned Strings", "about_asked"),
+                ("Quit\tCtrl+Q", "quit_asked"),
+            )
+        }
+
+    def show_look(self, look: Look) -> None:
+        for (field, value), action in self._choices.items():
+            action.setChecked(getattr(look, field) == value)
+
+    def _add_choices(self, title: str, field: str, values: dict[str, object]) -> None:
+        menu = self.addMenu(title)
+        group = QActionGroup(menu)
+        for text, value in values.items():
+            action = menu.addAction(text)
+            action.setCheckable(True)
+            action.triggered.connect(lambda _=False, value=value: self.look_asked.emit(field, value))
+            group.addAction(action)
+            self._choices[field, value] = action
+
+
+def menu_button(menu: QMenu) -> QToolButton:
+    """What opens it."""
+    button = tool_button("☰", "Menu", "Theme, size, notices, help")
+    button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+    button.setMenu(menu)
+    return button

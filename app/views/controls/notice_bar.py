@@ -1,0 +1,133 @@
+"""One line for what went wrong and what to do; earlier notices can be recalled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
+
+from app.views import theme
+from app.views.controls.notice import Notice
+from app.views.controls.notice_list import NoticeList
+from app.views.controls.parts import tool_button
+
+MOST_KEPT = 50
+
+
+class NoticeBar(QFrame):
+    """Hidden until there is something to say. A notice that comes again counts up instead of standing twice."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("panel")
+        self.setAccessibleName("Notice")
+        self._notices: list[Notice] = []
+        self._list: NoticeList | None = None
+        self.bell = Bell()  # placed by the window
+        self.bell.clicked.connect(self.show_all)
+        self._label = QLabel()
+        self._label.setWordWrap(True)
+        self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._details = tool_button("Details", "Notice details", "What the system said, to copy (F8)")
+        self._details.clicked.connect(self.show_all)
+        dismiss = tool_button("Dismiss", "Dismiss the notice", "Take this notice down; the bell keeps it")
+        dismiss.clicked.connect(self.hide)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 4, 6, 4)
+        row.addWidget(self._label, 1)
+        row.addWidget(self._details)
+        row.addWidget(dismiss)
+        self.hide()
+
+    @property
+    def text(self) -> str:
+        """The notice that stands, or nothing."""
+        return self._notices[-1].message if self._notices and not self.isHidden() else ""
+
+    @property
+    def notices(self) -> list[Notice]:
+        """Of this run, latest last."""
+        return list(self._notices)
+
+    @property
+    def kept(self) -> list[tuple[str, str]]:
+        """All notices of this run, latest last: (message, details)."""
+        return [(notice.message, notice.details) for notice in self._notices]
+
+    def tell(self, message: str, details: str = "") -> None:
+        """A fault, and what to do about it."""
+        self._take(Notice(message, details))
+
+    def inform(self, message: str, details: str = "") -> None:
+        """Something worth knowing that is no fault."""
+        self._take(Notice(message, details, error=False))
+
+    def withdraw(self, message: str) -> None:
+        """Takes a notice down that is no longer true; it can still be recalled."""
+        if self.text == message:
+            self.hide()
+
+    def show_all(self) -> None:
+        """The notices of this run in a list, with what the system said, to copy."""
+        if self._list is None:
+            self._list = NoticeList(self.window())
+        self._list.set_notices(self.notices)
+        self._list.show()
+        self._list.raise_()
+        self.bell.set_unseen(0)
+
+    def _take(self, notice: Notice) -> None:
+        earlier = next((old for old in self._notices if old.message == notice.message), None)
+        if earlier is not None:
+            self._notices.remove(earlier)
+        times = 1 if earlier is None else earlier.times + 1
+        now = f"{datetime.now():%H:%M:%S}"
+        self._notices = [*self._notices, replace(notice, times=times, last_told=now)][-MOST_KEPT:]
+        self._label.setObjectName("warning" if notice.error else "")
+        self._label.style().polish(self._label)
+        self._label.setText(self._notices[-1].line)
+        self._details.setVisible(notice.details not in notice.message)
+        self.show()
+        self.bell.set_unseen(self.bell.unseen + (earlier is None))
+        if self._list is not None:
+            self._list.set_notices(self.notices)
+
+
+class Bell(QToolButton):
+    """Opens the list; a dot and a number say how many notices have not been looked at there."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.unseen = 0
+        self.set_unseen(0)
+
+    def sizeHint(self) -> QSize:
+        return QSize(44, super().sizeHint().height())
+
+    def set_unseen(self, unseen: int) -> None:
+        self.unseen = unseen
+        state = f"{unseen} not looked at" if unseen else "none new"
+        self.setAccessibleName(f"Notices, {state}")
+        self.setToolTip(f"Notices of this run: {state} (F8)")
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle = QPointF(self.width() / 2 - (6 if self.unseen else 0), self.height() / 2)
+        painter.translate(middle)
+        bell = QPainterPath(QPointF(-6, 4))
+        bell.cubicTo(QPointF(-4, 1), QPointF(-5, -6), QPointF(0, -6))
+        bell.cubicTo(QPointF(5, -6), QPointF(4, 1), QPointF(6, 4))
+        bell.closeSubpath()
+        painter.setPen(QPen(QColor(theme.TEXT if self.unseen else theme.FAINT), 1.4))
+        painter.drawPath(bell)
+        painter.drawArc(QRectF(-2, 4, 4, 4), 180 * 16, 180 * 16)
+        if self.unseen:
+            painter.setFont(theme.small_font(10, bold=True))
+            painter.setPen(QColor(theme.WARNING))
+            painter.drawText(QRectF(8, -8, 18, 16), Qt.AlignmentFlag.AlignVCenter, str(min(self.unseen, 99)))

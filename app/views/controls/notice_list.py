@@ -1,0 +1,75 @@
+"""The notices of this run, latest first, each with what the system said, to copy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+if TYPE_CHECKING:
+    from app.views.controls.notice import Notice
+
+
+class NoticeList(QDialog):
+    """Does not block the window; follows it while open."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Notices")
+        self.resize(640, 420)
+        self._notices: list[Notice] = []
+        self._list = QListWidget()
+        self._list.setAccessibleName("Notices of this run")
+        self._list.setWordWrap(True)
+        self._list.currentRowChanged.connect(self._show_details)
+        self._details = QPlainTextEdit(readOnly=True)
+        self._details.setAccessibleName("Details")
+        self._details.setTabChangesFocus(True)
+        copy = QPushButton("Copy all")
+        copy.setToolTip("Copy every notice with its details, for a report")
+        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.report()))
+        close = QPushButton("Close", default=True)
+        close.clicked.connect(self.accept)
+        buttons = QHBoxLayout()
+        buttons.addWidget(copy)
+        buttons.addStretch(1)
+        buttons.addWidget(close)
+        column = QVBoxLayout(self)
+        column.addWidget(self._list, 3)
+        column.addWidget(QLabel("Details"))
+        column.addWidget(self._details, 2)
+        column.addLayout(buttons)
+
+    def set_notices(self, notices: Sequence[Notice]) -> None:
+        """Latest last, as they were told."""
+        self._notices = list(reversed(notices))
+        self._list.clear()
+        for notice in self._notices:
+            self._list.addItem(f"{notice.last_told}   {'error' if notice.error else 'note'}   {notice.line}")
+        if self._notices:
+            self._list.setCurrentRow(0)
+        else:
+            self._details.setPlainText("Nothing has gone wrong in this run.")
+
+    def report(self) -> str:
+        """Everything as text."""
+        return "\n\n".join(
+            f"{notice.last_told} {notice.line}" + (f"\n{notice.details}" if notice.details else "")
+            for notice in self._notices
+        )
+
+    def _show_details(self, row: int) -> None:
+        if 0 <= row < len(self._notices):
+            notice = self._notices[row]
+            self._details.setPlainText(f"{notice.message}\n\n{notice.details}".strip())

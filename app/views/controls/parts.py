@@ -1,0 +1,87 @@
+"""Small widgets that several views are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+
+from app.views.controls.elided_label import ElidedLabel
+
+ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+
+
+def tool_button(text: str, name: str = "", tip: str = "") -> QToolButton:
+    """A flat button; `name` is what a screen reader says where the text is a sign."""
+    button = QToolButton()
+    button.setText(text)
+    button.setAccessibleName(name or text)
+    button.setToolTip(tip)
+    return button
+
+
+def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object = None) -> QComboBox:
+    """A list of (text, data) with the entry of data `chosen` on top."""
+    box = QComboBox()
+    box.setAccessibleName(name)
+    for text, data in entries:
+        box.addItem(text, data)
+    box.setCurrentIndex(max(0, box.findData(chosen)))
+    return box
+
+
+def faint(text: str = "") -> QLabel:
+    made = QLabel(text)
+    made.setObjectName("faint")
+    return made
+
+
+def words_label() -> ElidedLabel:
+    """A faint line of words that takes the room there is: what it says never moves what is beside it."""
+    label = ElidedLabel()
+    label.setObjectName("faint")
+    label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+    return label
+
+
+def keeps_own_keys(event: QEvent) -> bool:
+    """True, and the event accepted, where it asks whether Enter or Esc is the focused widget's own."""
+    asks = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
+    if asks and event.key() in (*ENTER_KEYS, Qt.Key.Key_Escape):  # type: ignore[attr-defined]
+        event.accept()
+        return True
+    return False
+
+
+def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, plot: QWidget) -> None:
+    """A row of small controls with what is read off at its end, above a plot that has all other room."""
+    row = QHBoxLayout()
+    row.setContentsMargins(4, 2, 4, 0)
+    row.setSpacing(8)
+    for control in controls:
+        row.addWidget(control)
+    row.addWidget(readout, 1)
+    column = QVBoxLayout(view)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(0)
+    column.addLayout(row)
+    column.addWidget(plot, 1)
+
+
+def vertical_rule() -> QFrame:
+    line = QFrame()
+    line.setObjectName("rule")
+    line.setFixedWidth(1)
+    return line
+
+
+def label(kind: str = "", text: str = "", selectable: bool = False) -> QLabel:
+    """Text that wraps; `kind` is a name in the style sheet ("faint", "warning")."""
+    made = QLabel(text)
+    made.setObjectName(kind)
+    made.setWordWrap(True)
+    if selectable:
+        made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    return made

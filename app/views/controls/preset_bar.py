@@ -1,0 +1,100 @@
+"""Which preset: previous, next, its name, which opens the browser, and what the preset says of itself.
+
+Previous and next go through the browser's list. While that is filtered, a button beside them says so and clears it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
+
+from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.parts import tool_button
+
+if TYPE_CHECKING:
+    from app.presets.library import PresetEntry
+
+PADDING = 26  # of the style sheet, with the borders
+
+
+class _Name(QPushButton):
+    """Cut in the middle where there is little room: presets of one string differ at their ends."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.setObjectName("preset")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setText(text)
+
+    def setText(self, text: str) -> None:
+        self._whole = text
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        cut, room = Qt.TextElideMode.ElideMiddle, self.width() - PADDING
+        super().setText(self.fontMetrics().elidedText(self._whole, cut, room, Qt.TextFlag.TextShowMnemonic))
+
+
+class PresetBar(QWidget):
+    """See the module."""
+
+    browse_asked = Signal()
+    step_asked = Signal(int)
+    all_asked = Signal()  # clear the browser's filter
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        previous = tool_button("◀", "Previous preset", "Previous preset in the browser's list (Page up)")
+        following = tool_button("▶", "Next preset", "Next preset in the browser's list (Page down)")
+        for button in (previous, following):
+            button.setObjectName("narrow")
+        previous.clicked.connect(lambda: self.step_asked.emit(-1))
+        following.clicked.connect(lambda: self.step_asked.emit(1))
+        self.name = _Name("Reading presets …")
+        self.name.setMinimumWidth(100)
+        self.name.setMaximumWidth(420)
+        self.name.clicked.connect(self.browse_asked)
+        self.filtered = tool_button("", "Clear the filter")
+        self.filtered.setObjectName("filter")
+        self.filtered.clicked.connect(self.all_asked)
+        self.filtered.hide()
+        self.card = ElidedLabel()  # placed by the window
+        self.card.setObjectName("faint")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        row.addWidget(previous)
+        row.addWidget(self.name, 1000)  # all of the room, up to its greatest width
+        row.addWidget(following)
+        row.addWidget(self.filtered)
+        row.addStretch(1)
+
+    def set_listed(self, listed: int, total: int) -> None:
+        """How many presets pass the browser's filter."""
+        self.filtered.setVisible(listed < total)
+        self.filtered.setText(f"{listed} of {total}  ✕")
+        self.filtered.setAccessibleName(f"Filtered: {listed} of {total} presets; clear the filter")
+        self.filtered.setToolTip(
+            f"The browser lists {listed} of {total} presets, and previous and next go through these.\n"
+            "Click to clear the filter"
+        )
+
+    def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
+        from app.views.dialogs.preset_card import (  # the engine with them: not for the first sight
+            preset_card,
+            preset_summary,
+        )
+
+        title = entry.title if entry else "No preset found"
+        self.name.setText(f"{'★  ' if favourite else ''}{title}   ▾".replace("&", "&&"))
+        self.name.setAccessibleName(f"Preset: {title}")
+        self.name.setToolTip("Browse the presets (Ctrl+P)")
+        self.card.say(*(preset_summary(entry) if entry else [""]))
+        self.card.setToolTip(preset_card(entry) if entry else "")

@@ -1,0 +1,32 @@
+"""What the mouse is over, in words: a faint line that takes the room it is given and never asks for more."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.views.controls.elided_label import ElidedLabel
+
+
+class Readout(ElidedLabel):
+    """Shows the `resting` text while there is nothing to tell."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("faint")
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._resting: tuple[str, ...] = ("",)
+        self._told: tuple[str, ...] = ("",)
+
+    def rest(self, text: str, *shorter: str) -> None:
+        self._resting = (text, *shorter)
+        self.tell(*self._told)
+
+    def tell(self, text: str, *shorter: str) -> None:
+        """Nothing: back to the resting text. `shorter` as in `ElidedLabel`."""
+        self._told = (text, *shorter)
+        wordings = self._told if text else self._resting
+        if wordings[0] != self.text():
+            self.say(*wordings)
+            self.setToolTip(wordings[0])  # where there is too little room for it

@@ -1,0 +1,51 @@
+"""A row of small buttons of which one is down: a choice that is seen whole and made with one click."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
+
+from app.views.controls.parts import tool_button
+
+SMALL = "padding: 2px 8px; border-radius: 4px;"
+
+
+class Segments(QWidget):
+    """Choices are known by their keys; the first is down at the start."""
+
+    chosen = Signal(str)  # another key, by the user
+
+    def __init__(self, name: str, choices: Iterable[tuple[str, str, str]], parent: QWidget | None = None) -> None:
+        """`choices`: (key, text, tip) each."""
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self._group = QButtonGroup(self)
+        self._keys: list[str] = []
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(2)
+        for key, text, tip in choices:
+            button = tool_button(text, f"{name}: {text}", tip)
+            button.setObjectName(key)
+            button.setCheckable(True)
+            button.setChecked(not self._keys)
+            button.setStyleSheet(SMALL)
+            self._group.addButton(button, len(self._keys))
+            self._keys.append(key)
+            row.addWidget(button)
+        self._group.idToggled.connect(self._toggled)
+
+    @property
+    def key(self) -> str:
+        """The choice that is down."""
+        return self._keys[self._group.checkedId()]
+
+    def show_key(self, key: str) -> None:
+        with QSignalBlocker(self._group):
+            self._group.button(self._keys.index(key)).setChecked(True)
+
+    def _toggled(self, row: int, down: bool) -> None:
+        if down:
+            self.chosen.emit(self._keys[row])

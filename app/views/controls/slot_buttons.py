@@ -1,0 +1,165 @@
+"""The A/B comparison: two slots, which one is heard, and what each holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
+from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
+
+from app.session.choices import Choices
+from app.views import theme
+from app.views.controls.parts import tool_button
+
+if TYPE_CHECKING:
+    from app.presets.library import PresetEntry
+
+SLOTS = ("a", "b")
+DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)
+WIDTH, NARROW_WIDTH = 148, 108  # fixed, so that a longer title moves nothing
+PADDING = 18  # of the style sheet, with the borders
+
+_SOURCES = (
+    ("model", "Model of the chosen preset"),
+    ("truth", "Truth: the physics"),
+    ("difference", "Difference: model − truth"),
+)
+
+
+class SlotButtons(QWidget):
+    """A button for each slot, and beside it a menu of what it may hold. Asks with a signal, is shown the choices."""
+
+    change_asked = Signal(str, object)  # a field of `Choices` and its new value
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._choices = Choices()
+        self._width = WIDTH
+        self._entries: Sequence[PresetEntry] = ()
+        self._gains_db: dict[str, float | None] = {}
+        self._buttons: dict[str, QPushButton] = {}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(3)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
+        group = QButtonGroup(self)
+        for row, slot in enumerate(SLOTS):
+            button = QPushButton()
+            button.setCheckable(True)
+            button.setFixedWidth(self._width)
+            button.clicked.connect(lambda _=False, slot=slot: self.change_asked.emit("heard", slot))
+            group.addButton(button)
+            self._buttons[slot] = button
+            grid.addWidget(button, row, 0)
+            grid.addWidget(self._menu_button(slot), row, 1)
+        self.show_choices(self._choices)
+
+    def set_entries(self, entries: Sequence[PresetEntry]) -> None:
+        """The presets that a slot may hold."""
+        self._entries = entries
+        self._show()
+
+    def set_narrow(self, narrow: bool) -> None:
+        """For a window with little room."""
+        self._width = NARROW_WIDTH if narrow else WIDTH
+        for button in self._buttons.values():
+            button.setFixedWidth(self._width)
+        self._show()
+
+    def show_choices(self, choices: Choices) -> None:
+        self._choices = choices
+        self._show()
+
+    def show_gains(self, gains_db: dict[str, float | None]) -> None:
+        """By slot, the gain with which it is heard; None: not known yet."""
+        if gains_db != self._gains_db:
+            self._gains_db = gains_db
+            self._show()
+
+    def _show(self) -> None:
+        for slot, button in self._buttons.items():
+            source = getattr(self._choices, slot)
+            title, short = self._title(source)
+            gain = self._gain_text(slot)
+            button.setText(self._fitted(slot.upper(), short, gain))
+            button.setAccessibleName(f"Hear {slot.upper()}: {title}")
+            told = f"\nPlayed with {gain or '+0.0'} dB" + (
+                ", a stated gain" if source == "difference" else " to match the level of the truth"
+            )
+            button.setToolTip(f"Hear {slot.upper()}: {title} (X switches at the playhead)" + (told if gain else ""))
+            kind = theme.source_kind(source)
+            if button.objectName() != kind:
+                button.setObjectName(kind)
+                button.style().unpolish(button)
+                button.style().polish(button)
+            with QSignalBlocker(button):
+                button.setChecked(self._choices.heard == slot)
+
+    def _title(self, source: str) -> tuple[str, str]:
+        """In full, and as short as a button needs it."""
+        for entry in self._entries:
+            if source == f"preset:{entry.name}":
+                return entry.title, entry.title
+        name = source.removeprefix("preset:")
+        return name, "DIFF." if source == "difference" else name.upper()
+
+    def _fitted(self, letter: str, text: str, gain: str) -> str:
+        """What a button has room for: where it is little, the gain without its unit, then the text cut."""
+        metrics = QFontMetrics(theme.small_font(12, bold=True))
+        room = self._width - PADDING
+        for beside in (gain, gain.removesuffix(" dB")):
+            words = "  ".join(part for part in (letter, text, beside) if part)
+            if metrics.horizontalAdvance(words) <= room:
+                return words
+        room -= metrics.horizontalAdvance(f"{letter}    {beside}")
+        cut = metrics.elidedText(text, Qt.TextElideMode.ElideMiddle, room)
+        return "  ".join(part for part in (letter, cut, beside) if part)
+
+    def _gain_text(self, slot: str) -> str:
+        gain_db = self._gains_db.get(slot)
+        if gain_db is None or abs(gain_db) < 0.05:
+            return ""
+        return f"{gain_db:+.0f} dB" if getattr(self._choices, slot) == "difference" else f"{gain_db:+.1f} dB"
+
+    def _menu_button(self, slot: str) -> QToolButton:
+        letter = slot.upper()
+        button = tool_button("▾", f"What {letter} holds", f"What {letter} holds, and how loud it is")
+        button.setObjectName("narrow")
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(button)
+        menu.setToolTipsVisible(True)
+        menu.aboutToShow.connect(lambda: self._fill(menu, slot))
+        button.setMenu(menu)
+        return button
+
+    def _fill(self, menu: QMenu, slot: str) -> None:
+        menu.clear()
+        held = QActionGroup(menu)
+        for source, title in _SOURCES:
+            self._add(menu, held, title, slot, source, getattr(self._choices, slot) == source)
+        others = menu.addMenu("Another preset's model")
+        others.setToolTipsVisible(True)
+        for entry in self._entries:
+            source = f"preset:{entry.name}"
+            action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
+            action.setEnabled(not entry.unplayable)
+            told = entry.unplayable or f"Its model for the same pluck, from {entry.info.rate_hz} Hz"
+            action.setToolTip(f"{told}\n{entry.path.name}")
+        menu.addSeparator()
+        match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)
+        match.toggled.connect(lambda on: self.change_asked.emit("level_match", on))
+        menu.addAction(match)
+        gains = menu.addMenu("Gain of the difference")
+        stated = QActionGroup(gains)
+        for gain in DIFFERENCE_GAINS_DB:
+            chosen = abs(self._choices.difference_gain_db - gain) < 0.5
+            self._add(gains, stated, f"+{gain} dB", "difference_gain_db", float(gain), chosen)
+
+    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, chosen: bool) -> QAction:
+        action = QAction(title, menu, checkable=True, checked=chosen)
+        action.triggered.connect(lambda: self.change_asked.emit(field, value))
+        group.addAction(action)
+        menu.addAction(action)
+        return action

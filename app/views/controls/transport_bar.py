@@ -1,0 +1,209 @@
+"""The controls beneath: play, loop, the slots A and B, pluck, listening points, slow motion, volume and export."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
+from app.views.controls.knob import Knob, KnobRange
+from app.views.controls.meter import Meter
+from app.views.controls.parts import combo_box, tool_button, vertical_rule
+from app.views.controls.slot_buttons import SlotButtons
+from engine.pluck import (
+    DEFAULT_LISTEN,
+    FULL_SCALE_M,
+    FULL_SCALE_M_S,
+    LARGEST_AMPLITUDE_MM,
+    POSITION_RANGE,
+    SHAPES,
+    WIDTH_RANGE,
+)
+
+SHAPE_WIDTH = 106  # of the longest name, with
+TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
+_SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
+
+KNOBS = {  # field of `Choices` -> (label, range, tip)
+    "position": (
+        "position",
+        KnobRange(*POSITION_RANGE, 0.35, 0.01),
+        "Where the string is pulled: 0 and 1 are its ends",
+    ),
+    "amplitude_mm": (
+        "amplitude",
+        KnobRange(0, LARGEST_AMPLITUDE_MM, 4.0, 0.25, "{:.2f} mm"),
+        "How far it is pulled",
+    ),
+    "width": (
+        "width",
+        KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", logarithmic=True),
+        "How wide the pluck is",
+    ),
+    "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Where the string is heard"),
+    "listen_right": (
+        "right",
+        KnobRange(0, 1, 1 - DEFAULT_LISTEN, 0.01),
+        "In stereo, where the right ear hears the string; the left is at “listen”",
+    ),
+    "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "How long a pluck is rendered"),
+    "speed": (
+        "motion",
+        KnobRange(*SPEED_RANGE, 0.004, 1.25, "× {:.3f}", logarithmic=True),
+        "Slow motion of the picture, as by a stroboscope at the playhead: the sound is not slowed",
+    ),
+    "volume_db": (
+        "volume",
+        KnobRange(*VOLUME_RANGE_DB, 0.0, 1.0, "{:+.0f} dB"),
+        "Playback volume; files are not changed",
+    ),
+}
+
+
+class TransportBar(QFrame):
+    """Asks with signals, shows with `show_choices`."""
+
+    play_asked = Signal()
+    export_asked = Signal()
+    change_asked = Signal(str, object)  # a field of `Choices` and its new value
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("panel")
+        self.knobs = {field: Knob(label, limits, tip) for field, (label, limits, tip) in KNOBS.items()}
+        for field, knob in self.knobs.items():
+            knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
+        self.meter = Meter()
+        self._compact = False
+        self._playing: bool | None = None  # as shown; None where a click has checked the button by itself
+        self._row = row = QHBoxLayout(self)
+        row.setContentsMargins(12, 8, 12, 8)
+        row.setSpacing(5)
+        row.addLayout(self._build_transport())
+        row.addWidget(vertical_rule())
+        self.slots = SlotButtons()
+        self.slots.change_asked.connect(self.change_asked)
+        row.addWidget(self.slots)
+        row.addWidget(vertical_rule())
+        row.addLayout(self._build_shape())
+        for field in ("position", "amplitude_mm", "width"):
+            row.addWidget(self.knobs[field])
+        row.addWidget(vertical_rule())
+        for field in ("listen", "listen_right"):
+            row.addWidget(self.knobs[field])
+        row.addLayout(self._build_pickup())
+        row.addWidget(vertical_rule())
+        for field in ("seconds", "speed"):
+            row.addWidget(self.knobs[field])
+        row.addStretch(1)
+        row.addWidget(vertical_rule())
+        row.addWidget(self.knobs["volume_db"])
+        row.addLayout(self._build_output())
+
+    def set_compact(self, compact: bool) -> None:
+        """Narrower by a fifth, for a window with little room."""
+        if compact == self._compact:
+            return
+        self._compact = compact
+        self._row.setContentsMargins(*((4, 8, 4, 8) if compact else (12, 8, 12, 8)))
+        self._row.setSpacing(2 if compact else 5)
+        for knob in self.knobs.values():
+            knob.set_narrow(compact)
+        self.slots.set_narrow(compact)
+        self._export.setText("Export …" if compact else "Export WAV …")
+        for button in (self._play, self._loop, self._stereo, self._velocity, self._export):
+            button.setProperty("compact", compact)
+            button.style().unpolish(button)
+            button.style().polish(button)
+
+    def show_choices(self, choices: Choices) -> None:
+        for field, knob in self.knobs.items():
+            knob.set_value(getattr(choices, field))
+        self.knobs["width"].setEnabled(choices.shape != "triangular")
+        with QSignalBlocker(self._shape):
+            self._shape.setCurrentIndex(SHAPES.index(choices.shape))
+        self._loop.setChecked(choices.loop)
+        self.knobs["listen_right"].setEnabled(choices.stereo)  # hidden, it would move all that is beside it
+        with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
+            self._stereo.setChecked(choices.stereo)
+            self._velocity.setChecked(choices.pickup == "velocity")
+        self.slots.show_choices(choices)
+
+    def show_playing(self, playing: bool) -> None:
+        if playing == self._playing:
+            return
+        self._playing = playing
+        self._play.setChecked(playing)
+        self._play.setText("■  Stop" if playing else "▶  Play")
+
+    def _forget_playing(self) -> None:
+        self._playing = None
+
+    def _build_transport(self) -> QVBoxLayout:
+        self._play = QPushButton("▶  Play")
+        self._play.setObjectName("play")
+        self._play.setCheckable(True)
+        self._play.setToolTip("Play from the pluck, or stop (Space)")
+        self._play.clicked.connect(self._forget_playing)
+        self._play.clicked.connect(self.play_asked)
+        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
+        self._loop.setCheckable(True)
+        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
+        column = QVBoxLayout()
+        column.addWidget(self._play)
+        column.addWidget(self._loop)
+        return column
+
+    def _build_pickup(self) -> QVBoxLayout:
+        self._stereo = tool_button("Stereo", "Stereo", "Two listening points: “listen” for the left ear, “right”")
+        self._stereo.setCheckable(True)
+        self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
+        self._velocity = tool_button(
+            "Velocity",
+            "Velocity pick-up",
+            f"Hear the string's velocity, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s).\n"
+            f"Otherwise its displacement (full scale {1000 * FULL_SCALE_M:g} mm)",
+        )
+        self._velocity.setCheckable(True)
+        self._velocity.toggled.connect(
+            lambda on: self.change_asked.emit("pickup", "velocity" if on else "displacement")
+        )
+        column = QVBoxLayout()
+        for button in (self._stereo, self._velocity):
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+            column.addWidget(button)
+        return column
+
+    def _build_shape(self) -> QVBoxLayout:
+        self._shape = combo_box("Pluck shape", [(_SHAPE_NAMES[shape], shape) for shape in SHAPES])
+        self._shape.setToolTip("The shape of the pluck")
+        self._shape.setStyleSheet(TIGHT)
+        self._shape.setFixedWidth(SHAPE_WIDTH)
+        self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
+        label = QLabel("PLUCK")
+        label.setObjectName("knob")
+        column = QVBoxLayout()
+        column.addWidget(label, alignment=Qt.AlignmentFlag.AlignHCenter)
+        column.addStretch(1)
+        column.addWidget(self._shape)
+        column.addStretch(2)
+        return column
+
+    def _build_output(self) -> QVBoxLayout:
+        self._export = QPushButton("Export WAV …")
+        self._export.setAccessibleName("Export WAV")
+        self._export.setToolTip("Save this pluck as a WAV file (Ctrl+E)")
+        self._export.clicked.connect(self.export_asked)
+        column = QVBoxLayout()
+        column.addWidget(self.meter)
+        column.addWidget(self._export)
+        return column

@@ -1,0 +1,294 @@
+"""The listening test in a dialog: set up, trial by trial, the result, earlier records.
+
+While it is open the sound belongs to it, and nothing else may show what it plays: level, limiter and source
+would give X away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
+
+from app.analysis.abx.choices import AbxChoices
+from app.analysis.abx.record import AbxRecord, HeardSource, HeardThrough, default_folder, make_record, save_record
+from app.analysis.abx.sound import Stimuli, make_stimuli
+from app.analysis.abx.subject import Subject
+from app.analysis.abx.trials import Identity, Run, Sound, new_seed
+from app.audio.sound import Sound as SoundOutput
+from app.audio.sound import SoundStatus
+from app.playing.pair import Pair
+from app.shared.whole_file import WriteError
+from app.views.dialogs.abx_records import RecordsPage
+from app.views.dialogs.abx_result import ResultPage
+from app.views.dialogs.abx_setup import SetupPage
+from app.views.dialogs.abx_trial import TrialPage
+
+Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
+
+WATCH_MS = 200
+RENDERING = "The sound is still being rendered."
+NO_DEVICE = "There is no sound device: connect one, or choose another in the window. The test needs ears."
+SAME = "A and B are the same, sample by sample: there is nothing to tell apart."
+TRIVIAL = (
+    "A and B differ so much here that anyone hears it at once: the test would say little. "
+    "Choose a pluck that the model knows, or a better preset."
+)
+DEVICE_CHANGED = "The sound device changed during the test."
+CLOSED = "The window was closed during the test."
+
+
+class AbxDialog(QDialog):
+    """See the module.
+
+    Args:
+        render: starts the rendering of model and truth of the pluck at a rate, and gives what will hold the samples.
+        seed: draws a seed for each test.
+    """
+
+    def __init__(
+        self,
+        output: SoundOutput,
+        subject: Subject,
+        choices: AbxChoices,
+        render: Render,
+        parent: QWidget | None = None,
+        seed: Callable[[], int] = new_seed,
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Listening test (ABX)")
+        self.resize(680, 470)
+        self._output, self._subject, self._seed, self._render = output, subject, seed, render
+        self._rendering: Future[Mapping[str, NDArray[np.float32]]] | None = None
+        self._rate_hz = 0  # at which it is, or was, rendered
+        self._pair: Pair | None = None
+        self._stimuli: Stimuli | None = None
+        self._silence = RENDERING  # why there are no stimuli
+        self._run: Run | None = None
+        self._sounding: Sound | None = None
+        self._trial_began_s = 0.0
+        self._heard_through: HeardThrough | None = None
+        self._record: AbxRecord | None = None
+        folder = Path(choices.folder) if choices.folder else default_folder()
+        self._setup = SetupPage(subject.candidates, choices.trials, choices.restart, folder)
+        self._trial, self._result, self._records = TrialPage(), ResultPage(), RecordsPage()
+        self._pages = QStackedWidget()
+        for page in (self._setup, self._trial, self._result, self._records):
+            self._pages.addWidget(page)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(22, 20, 22, 18)
+        column.addWidget(self._pages)
+        self._connect()
+        self._watch = QTimer(self, interval=WATCH_MS)
+        self._watch.timeout.connect(self._look_at_device)
+        self._watch.start()
+        self._ask_for_sound()
+        self._prepare()
+        self._setup.start.setFocus()
+
+    @property
+    def testing(self) -> bool:
+        return self._run is not None
+
+    def choices(self) -> AbxChoices:
+        """The dialog's state, to be remembered."""
+        folder = "" if self._setup.folder == default_folder() else str(self._setup.folder)
+        return AbxChoices(trials=self._setup.trials, restart=self._setup.restart, folder=folder)
+
+    def abandon(self) -> None:
+        """Closes without a question; a test under way is recorded as incomplete."""
+        if self.testing:
+            self._end(CLOSED)
+        self._leave()
+
+    def _connect(self) -> None:
+        setup, trial, result, records = self._setup, self._trial, self._result, self._records
+        setup.start_asked.connect(self._start)
+        setup.pair_changed.connect(self._prepare)
+        trial.replay_asked.connect(lambda: self._audition(self._sounding or "X", again=True))
+        trial.answered.connect(self._answer)
+        trial.stop_asked.connect(self.reject)
+        result.again_asked.connect(self._show_setup)
+        result.save_asked.connect(self._save_elsewhere)
+        records.back_asked.connect(lambda: self._pages.setCurrentWidget(result if self._record else setup))
+        for audition_asked in (setup.audition_asked, trial.audition_asked):
+            audition_asked.connect(self._audition)
+        for records_asked in (setup.records_asked, result.records_asked):
+            records_asked.connect(self._show_records)
+        for close_asked in (setup.close_asked, result.close_asked):
+            close_asked.connect(self.reject)
+
+    # Sound
+
+    def _ask_for_sound(self) -> None:
+        """At the rate of the device as it is now."""
+        self._rate_hz = self._output.rate_hz
+        self._rendering = self._render(self._rate_hz)
+
+    def _prepare(self) -> None:
+        """Makes A and B, where the pluck is rendered."""
+        self._hush()
+        self._stimuli = self._pair = None
+        self._silence = RENDERING
+        rendering = self._rendering
+        if rendering is not None and rendering.done() and self._rate_hz == self._output.rate_hz:
+            sources = [candidate.source for candidate in self._setup.pair]
+            try:
+                made = make_stimuli(rendering.result(), self._rate_hz, sources, self._subject.volume_db)
+            except Exception as error:  # a model that ran away, or silence
+                self._silence = str(error)
+            else:
+                self._stimuli, self._silence = made, ""
+                self._pair = Pair(self._output.mixer, {str(name): each for name, each in made.samples.items()})
+        self._show_state()
+
+    def _audition(self, sound: Sound, again: bool = False) -> None:
+        if self._pair is None:
+            return
+        identity: Identity = "A" if sound == "A" else "B"
+        if self._run is not None:
+            identity = self._run.heard_as(sound)
+            self._run = self._run.auditioned(sound)
+        self._pair.select(identity)
+        self._pair.play(anew=again or self._setup.restart or self._sounding is None)
+        self._sounding = sound
+        if self._run is not None:
+            self._trial.show_sounding(sound, self._run.x_heard)
+
+    def _hush(self) -> None:
+        if self._pair is not None:
+            self._pair.stop()
+        self._sounding = None
+
+    # The test
+
+    def _start(self) -> None:
+        status = self._output.status()
+        if self._obstacle(status) or status.device is None:
+            return
+        self._heard_through = HeardThrough(
+            device=status.device.name,
+            host_api=status.device.host_api,
+            rate_hz=status.rate_hz,
+            volume_db=self._subject.volume_db,
+            restart_at_switch=self._setup.restart,
+        )
+        self._run = Run(self._seed(), self._setup.trials)
+        self._trial.show_pair(*self._setup.pair)
+        self._pages.setCurrentWidget(self._trial)
+        self._trial.setFocus()
+        self._begin_trial()
+
+    def _begin_trial(self) -> None:
+        assert self._run is not None
+        self._hush()
+        self._trial_began_s = time.monotonic()
+        self._trial.show_trial(self._run.number, self._run.planned)
+
+    def _answer(self, answer: Identity) -> None:
+        if self._run is None or not self._run.x_heard:
+            return
+        self._run = self._run.answered(answer, round(time.monotonic() - self._trial_began_s, 2))
+        if self._run.complete:
+            self._end()
+        else:
+            self._begin_trial()
+
+    def _end(self, remark: str = "") -> None:
+        """Records the run, whole or not; a test without an answer leaves no record."""
+        run, self._run = self._run, None
+        self._hush()
+        assert run is not None
+        assert self._heard_through is not None
+        assert self._stimuli is not None
+        if not run.trials:
+            self._show_setup()
+            return
+        a, b = (
+            HeardSource(
+                label=candidate.label,
+                preset=candidate.preset,
+                preset_sha256=candidate.preset_sha256,
+                gain_db=round(gain_db, 3),
+            )
+            for candidate, gain_db in zip(self._setup.pair, self._stimuli.gains_db, strict=True)
+        )
+        self._record = make_record(run, a, b, self._subject.pluck, self._heard_through, remark)
+        self._pages.setCurrentWidget(self._result)
+        self._result.show_record(self._record)
+        self._save(self._setup.folder)
+
+    def _save(self, folder: Path) -> None:
+        assert self._record is not None
+        try:
+            path = save_record(folder, self._record)
+        except WriteError as error:
+            self._result.show_saved(str(error), failed=True)
+        else:
+            self._result.show_saved(f"Saved {path}", failed=False)
+
+    def _save_elsewhere(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of the record")
+        if chosen:
+            self._save(Path(chosen))
+
+    # What is shown, and leaving
+
+    def _show_setup(self) -> None:
+        self._record = None
+        self._pages.setCurrentWidget(self._setup)
+        self._prepare()
+
+    def _show_records(self) -> None:
+        self._hush()
+        self._records.show_folder(self._setup.folder)
+        self._pages.setCurrentWidget(self._records)
+
+    def _obstacle(self, status: SoundStatus) -> str:
+        """Why the test cannot start now, or nothing."""
+        if status.device is None:
+            return NO_DEVICE
+        if self._stimuli is None:
+            return self._silence
+        return SAME if self._stimuli.same else ""
+
+    def _show_state(self) -> None:
+        advice = TRIVIAL if self._stimuli is not None and self._stimuli.trivial else ""
+        self._setup.show_state(self._obstacle(self._output.status()), advice)
+
+    def _look_at_device(self) -> None:
+        status = self._output.status()
+        if self._run is None or self._heard_through is None:
+            if self._rate_hz != self._output.rate_hz:
+                self._ask_for_sound()
+                self._prepare()
+            elif self._silence == RENDERING or (self._pair and self._pair.mixer is not self._output.mixer):
+                self._prepare()
+            else:
+                self._show_state()
+            return
+        now = status.device and (status.device.name, status.device.host_api, status.rate_hz)
+        if now != (self._heard_through.device, self._heard_through.host_api, self._heard_through.rate_hz):
+            self._end(DEVICE_CHANGED)
+
+    def reject(self) -> None:
+        """Escape, the window's cross, "Stop" and "Close": a test under way is ended, the dialog otherwise closed."""
+        if self._run is None:
+            self._leave()
+            return
+        answered, planned = len(self._run.trials), self._run.planned
+        kept = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
+        question = f"{answered} of {planned} trials are answered. {kept}"
+        if QMessageBox.question(self, "Stop the test?", question) == QMessageBox.StandardButton.Yes and self.testing:
+            self._end()
+
+    def _leave(self) -> None:
+        self._hush()
+        self._watch.stop()
+        super().reject()

@@ -1,0 +1,72 @@
+"""The last page of the listening test: the score, what it means, and where the record is."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal, SignalInstance
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from app.analysis.abx.record import AbxRecord
+from app.analysis.abx.text import MEANING, p_text, verdict
+from app.views.controls.parts import label
+
+
+class ResultPage(QWidget):
+    """Shows one record, and whether it has been saved."""
+
+    again_asked = Signal()
+    records_asked = Signal()
+    save_asked = Signal()  # elsewhere, after a failure
+    close_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._score = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._score.setStyleSheet("font-size: 26px; font-weight: 600;")
+        self._p = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._p.setStyleSheet("font-size: 17px;")
+        self._verdict = label()
+        self._verdict.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._marks = label("faint")
+        self._marks.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._marks.setToolTip("The trials in their order: filled where the answer was right")
+        self._meaning = label("faint", MEANING)
+        self._saved = label("faint", selectable=True)
+        self._save = self._build_button("Save elsewhere …", self.save_asked)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self._build_button("Earlier records …", self.records_asked))
+        buttons.addStretch(1)
+        buttons.addWidget(self._save)
+        buttons.addWidget(self._build_button("New test", self.again_asked))
+        self._close = self._build_button("Close", self.close_asked)
+        buttons.addWidget(self._close)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(12)
+        column.addStretch(1)
+        for widget in (self._score, self._marks, self._p, self._verdict):
+            column.addWidget(widget)
+        column.addStretch(1)
+        column.addWidget(self._meaning)
+        column.addWidget(self._saved)
+        column.addLayout(buttons)
+
+    def show_record(self, record: AbxRecord) -> None:
+        answered = len(record.trials)
+        self._score.setText(f"{record.correct} of {answered} right")
+        self._marks.setText(" ".join("●" if trial.correct else "○" for trial in record.trials))
+        unfinished = f"{answered} of {record.planned_trials} trials answered"
+        self._p.setText(unfinished if record.p_value is None else p_text(record.p_value))
+        self._verdict.setText(" ".join(filter(None, (record.remark, verdict(record)))))
+        self._meaning.setVisible(record.complete)
+        self._close.setFocus()
+
+    def show_saved(self, text: str, failed: bool) -> None:
+        self._saved.setObjectName("warning" if failed else "faint")
+        self._saved.style().polish(self._saved)
+        self._saved.setText(text)
+        self._save.setVisible(failed)
+
+    def _build_button(self, text: str, asked: SignalInstance) -> QPushButton:
+        button = QPushButton(text, autoDefault=False)
+        button.clicked.connect(asked)
+        return button

@@ -1,0 +1,136 @@
+"""A trial of the listening test, played by keys. Nothing here may depend on who hides behind X."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
+
+from app.analysis.abx.sound import Candidate
+from app.views.controls.parts import label
+
+HEAR = "Hear X, then say which one it is."
+SAY = "Which one is X?"
+_LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
+
+
+class TrialPage(QWidget):
+    """Its keys work while it is shown: the page itself has the keyboard, not its buttons, for Space begins again."""
+
+    audition_asked = Signal(str)  # "A", "B" or "X"
+    replay_asked = Signal()
+    answered = Signal(str)  # "A" or "B"
+    stop_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Trial")
+        self.setAccessibleDescription(
+            "A, B and X: hear them. 1 or left: X is A. 2 or right: X is B. Space: begin again. Escape: stop the test."
+        )
+        self._number = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._number.setStyleSheet("font-size: 20px; font-weight: 600;")
+        self._bar = QProgressBar(textVisible=False)
+        self._bar.setFixedHeight(6)
+        self._bar.setAccessibleName("Trials answered")
+        self._hint = label("faint")
+        self._hint.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._sounds = {name: self._build_sound(name) for name in "AXB"}
+        self._answers = {
+            "A": self._build_answer("A", "←  X is A", "Answer: X is A (1 or ←)"),
+            "B": self._build_answer("B", "X is B  →", "Answer: X is B (2 or →)"),
+        }
+        self._lay_out()
+        keys = Qt.Key
+        self._acts: dict[int, Callable[[], None]] = {
+            keys.Key_A: lambda: self.audition_asked.emit("A"),
+            keys.Key_B: lambda: self.audition_asked.emit("B"),
+            keys.Key_X: lambda: self.audition_asked.emit("X"),
+            keys.Key_1: lambda: self._answer("A"),
+            keys.Key_Left: lambda: self._answer("A"),
+            keys.Key_2: lambda: self._answer("B"),
+            keys.Key_Right: lambda: self._answer("B"),
+            keys.Key_Space: self.replay_asked.emit,
+        }
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        act = self._acts.get(event.key())
+        if act is None:
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            act()
+
+    def show_pair(self, a: Candidate, b: Candidate) -> None:
+        for name, candidate in (("A", a), ("B", b)):
+            button = self._sounds[name]
+            button.setText(f"{name}\n{candidate.label}")
+            button.setAccessibleName(f"Hear {name}: {candidate.label}")
+            button.setObjectName(candidate.source)  # its colour in the style sheet
+            button.style().polish(button)
+
+    def show_trial(self, number: int, trials: int) -> None:
+        """A new trial, in which nothing has been heard."""
+        self._number.setText(f"Trial {number} of {trials}")
+        self._bar.setRange(0, trials)
+        self._bar.setValue(number - 1)
+        self.show_sounding(None, x_heard=False)
+
+    def show_sounding(self, sound: str | None, x_heard: bool) -> None:
+        """Which key sounds, by its own name, and whether X may be judged."""
+        for name, button in self._sounds.items():
+            button.setChecked(name == sound)
+        for button in self._answers.values():
+            button.setEnabled(x_heard)
+        self._hint.setText(SAY if x_heard else HEAR)
+
+    def _answer(self, name: str) -> None:
+        self._answers[name].click()  # a button that is disabled does not answer
+
+    def _build_sound(self, name: str) -> QPushButton:
+        button = QPushButton(f"{name}\n?")
+        button.setCheckable(True)
+        button.setStyleSheet(_LARGE)
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        button.setAccessibleName(f"Hear {name}")
+        button.setToolTip(f"Hear {name} ({name})")
+        button.clicked.connect(lambda: self.audition_asked.emit(name))
+        return button
+
+    def _build_answer(self, name: str, text: str, tip: str) -> QPushButton:
+        button = QPushButton(text)
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        button.setMinimumHeight(42)
+        button.setToolTip(tip)
+        button.clicked.connect(lambda: self.answered.emit(name))
+        return button
+
+    def _lay_out(self) -> None:
+        sounds, answers = QHBoxLayout(), QHBoxLayout()
+        for row, buttons in ((sounds, self._sounds), (answers, self._answers)):
+            row.setSpacing(12)
+            for button in buttons.values():
+                row.addWidget(button, 1)
+        stop = QPushButton("Stop the test")
+        stop.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        stop.setToolTip("An unfinished test is recorded as incomplete and gives no p-value (Esc)")
+        stop.clicked.connect(self.stop_asked)
+        keys = label("faint", "A  B  X  hear   ·   Space  begin again   ·   1 or ←  X is A   ·   2 or →  X is B")
+        keys.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        foot = QHBoxLayout()
+        foot.addStretch(1)
+        foot.addWidget(stop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(16)
+        column.addWidget(self._number)
+        column.addWidget(self._bar)
+        column.addStretch(1)
+        column.addLayout(sounds)
+        column.addWidget(self._hint)
+        column.addLayout(answers)
+        column.addStretch(1)
+        column.addWidget(keys)
+        column.addLayout(foot)

@@ -1,0 +1,199 @@
+"""The audio settings: where the sound goes, at which rate, how much is kept ahead; a test tone; what goes wrong.
+
+Every choice counts at once. The dialog does not block the window: crackles can be cured while a string sounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.audio.choices import Buffer, DeviceChoice, SoundChoice
+from app.views.controls.parts import combo_box
+
+RATES = {0: "The device's own", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
+BUFFERS: dict[Buffer, str] = {
+    "low": "Low latency",
+    "medium": "Medium",
+    "high": "High: safest against crackles",
+    128: "128 frames",
+    256: "256 frames",
+    512: "512 frames",
+    1024: "1024 frames",
+    2048: "2048 frames",
+}
+ADVICE = (
+    "Hear crackles? Choose a larger buffer, or close programs that keep the computer busy. "
+    "A smaller buffer answers sooner to a pluck."
+)
+
+
+@dataclass(frozen=True)
+class AudioState:
+    """What the dialog says of the present output."""
+
+    playing_on: str  # a device with its host API, or nothing
+    facts: str  # its rate, its buffer, and the latency that was measured
+    problem: str
+    gaps: tuple[str, ...]  # silences that nobody asked for: when and why
+    load: float  # share of the device's time that the mixer takes
+
+
+class AudioDialog(QDialog):
+    """Asks with signals, shows with `show_…`."""
+
+    choice_made = Signal(object, object)  # DeviceChoice or None, SoundChoice
+    rescan_asked = Signal()
+    tone_asked = Signal(str)  # left, right or both
+    gaps_reset = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Audio settings")
+        self.setMinimumWidth(520)
+        self._state_label = QLabel()
+        self._state_label.setWordWrap(True)
+        self._problem_label = QLabel()
+        self._problem_label.setObjectName("warning")
+        self._problem_label.setWordWrap(True)
+        self._problem_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._device = combo_box("Output", [("System default", None)])
+        self._device.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self._device.setToolTip("Where the sound goes; it is remembered by its name")
+        self._rate = combo_box("Sample rate", [(name, rate) for rate, name in RATES.items()])
+        self._rate.setToolTip("What the device runs at; the model's rate is converted to it")
+        self._buffer = combo_box("Buffer", [(name, buffer) for buffer, name in BUFFERS.items()])
+        self._buffer.setToolTip("How much sound is kept ready: more is safer, less is more prompt")
+        for box in (self._device, self._rate, self._buffer):
+            box.activated.connect(self._choose)
+        self._gaps = QLabel("0")
+        self._gaps.setMinimumWidth(40)
+        self._load = QLabel("0 %")
+        self._load.setToolTip("Share of the sound device's time that the voices take")
+        self._lay_out()
+
+    @property
+    def device(self) -> DeviceChoice | None:
+        """As chosen in the list."""
+        key = self._device.currentData()
+        return DeviceChoice(name=key[0], host_api=key[1]) if key else None
+
+    @property
+    def sound(self) -> SoundChoice:
+        return SoundChoice(rate_hz=self._rate.currentData(), buffer=self._buffer.currentData())
+
+    def show_devices(self, devices: Sequence[DeviceChoice], chosen: DeviceChoice | None) -> None:
+        """The outputs that are there; the chosen one is listed also when it is not."""
+        keys = [(device.name, device.host_api) for device in devices]
+        wanted = (chosen.name, chosen.host_api) if chosen else None
+        with QSignalBlocker(self._device):
+            self._device.clear()
+            self._device.addItem("System default", None)
+            for key in keys:
+                self._device.addItem(f"{key[0]}   ({key[1]})", key)
+            if wanted and wanted not in keys:
+                self._device.addItem(f"{wanted[0]}   ({wanted[1]}), not connected", wanted)
+            rows = [self._device.itemData(row) for row in range(self._device.count())]
+            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == wanted), 0))
+
+    def show_sound(self, sound: SoundChoice) -> None:
+        self._rate.setCurrentIndex(self._rate.findData(sound.rate_hz))
+        self._buffer.setCurrentIndex(self._buffer.findData(sound.buffer))
+
+    def show_state(self, state: AudioState) -> None:
+        heard = bool(state.playing_on)
+        _set(
+            self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if heard else "There is no sound."
+        )
+        _set(self._problem_label, state.problem)
+        latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
+        _set(self._gaps, f"{len(state.gaps)}{latest}")
+        tip = "Silences while a voice should have sounded, wherever they arose\n" + "\n".join(state.gaps[-12:])
+        if self._gaps.toolTip() != tip:
+            self._gaps.setToolTip(tip)
+        _set(self._load, f"{100 * state.load:.0f} %")
+        if self._problem.isHidden() == bool(state.problem):
+            self._problem.setVisible(bool(state.problem))
+            self.adjustSize()
+        for button in self._tones:
+            button.setEnabled(heard)
+
+    def _choose(self) -> None:
+        self.choice_made.emit(self.device, self.sound)
+
+    def _lay_out(self) -> None:
+        self._problem = QFrame()
+        self._problem.setObjectName("panel")
+        QHBoxLayout(self._problem).addWidget(self._problem_label)
+        rescan = _button(
+            "Look again", "Look for outputs that were connected meanwhile, and open the chosen one", self.rescan_asked
+        )
+        self._tones = [
+            _button(side.capitalize(), f"A soft tone for a second: {side}") for side in ("left", "both", "right")
+        ]
+        for button, side in zip(self._tones, ("left", "both", "right"), strict=True):
+            button.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
+        reset = _button("Reset", "Count gaps from zero", self.gaps_reset)
+        advice = QLabel(ADVICE)
+        advice.setObjectName("faint")
+        advice.setWordWrap(True)
+        form = QFormLayout()
+        form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        form.setVerticalSpacing(10)
+        form.addRow("Output", _row(self._device, rescan))
+        form.addRow("Sample rate", self._rate)
+        form.addRow("Buffer", self._buffer)
+        form.addRow("Test tone", _row(*self._tones, None))
+        form.addRow("Gaps", _row(self._gaps, reset, None))
+        form.addRow("Load", self._load)
+        close = _button("Close", "Close; every choice already counts")
+        close.setDefault(True)
+        close.clicked.connect(self.accept)
+        column = QVBoxLayout(self)
+        column.setSpacing(14)
+        column.addWidget(self._state_label)
+        column.addWidget(self._problem)
+        column.addLayout(form)
+        column.addWidget(advice)
+        column.addStretch(1)
+        column.addLayout(_row(None, close))
+
+
+def _button(text: str, tip: str, signal: object = None) -> QPushButton:
+    button = QPushButton(text)
+    button.setAutoDefault(False)
+    button.setToolTip(tip)
+    button.setAccessibleName(tip if len(text) < 6 else text)
+    if signal is not None:
+        button.clicked.connect(signal)
+    return button
+
+
+def _row(*widgets: QWidget | None) -> QHBoxLayout:
+    """Side by side; None is empty space that grows."""
+    row = QHBoxLayout()
+    row.setSpacing(8)
+    for widget in widgets:
+        if widget is None:
+            row.addStretch(1)
+        else:
+            row.addWidget(widget, 1 if isinstance(widget, QComboBox) else 0)
+    return row
+
+
+def _set(label: QLabel, text: str) -> None:
+    if label.text() != text:
+        label.setText(text)

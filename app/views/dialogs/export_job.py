@@ -1,0 +1,67 @@
+"""A piece of export in a thread of its own, with progress, time left and cancelling, told in the window's thread."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Signal
+
+from app.export.files import ExportCancelled, ExportError
+from app.export.recipe import RecipeError
+from app.shared.thread_priority import Rank, step_back
+from engine.preset import PresetError
+from engine.sources import Runaway
+
+Tell = Callable[[float, str, float | None], None]  # share, what is done, seconds left where known
+Work = Callable[[Tell, Callable[[], bool]], object]  # is given `Tell` and whether it is cancelled
+TELL_EVERY_S = 0.05
+
+
+class ExportJob(QObject):
+    """See the module. One of the last three signals ends it."""
+
+    progressed = Signal(float, str, object)
+    finished = Signal(object)  # what the work returned
+    failed = Signal(str)
+    cancelled = Signal()
+
+    def __init__(self, work: Work) -> None:
+        super().__init__()
+        self._work = work
+        self._stop = threading.Event()
+        self._told_s = 0.0
+        self._thread = threading.Thread(target=self._run, name="export")
+
+    def start(self) -> None:
+        self._started_s = time.monotonic()
+        self._thread.start()
+
+    def cancel(self) -> None:
+        self._stop.set()
+
+    def wait(self) -> None:
+        self._thread.join()
+
+    def _tell(self, share: float, text: str = "", left_s: float | None = None) -> None:
+        now_s = time.monotonic()
+        if now_s - self._told_s < TELL_EVERY_S:
+            return  # the window draws no faster
+        self._told_s = now_s
+        if left_s is None and share > 0:
+            left_s = (now_s - self._started_s) * (1 - share) / share
+        self.progressed.emit(share, text, left_s)
+
+    def _run(self) -> None:
+        step_back(Rank.BACKGROUND)
+        try:
+            result = self._work(self._tell, self._stop.is_set)
+        except ExportCancelled:
+            self.cancelled.emit()
+        except (ExportError, PresetError, RecipeError, Runaway, ValueError) as error:
+            self.failed.emit(str(error))
+        except Exception as error:  # unforeseen, but the dialog must never wait for ever
+            self.failed.emit(f"The export failed: {error!r}. Please report this.")
+        else:
+            self.finished.emit(result)

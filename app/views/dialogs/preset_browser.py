@@ -1,0 +1,315 @@
+"""The preset browser: a search, a list and a card over the window. It stays open while presets are tried.
+
+type              filters the list (words in any order; a comma between two)
+arrows            move in the list and load
+Space             plucks; in a search that has begun it is a blank
+Ctrl+D            makes a favourite, or no longer
+Enter, Escape     close
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QScrollArea,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
+
+from app.presets.filter import PresetFilter
+from app.presets.library import PresetEntry
+from app.presets.words import error_word, model_word, rate_word, string_word
+from app.views.controls.parts import combo_box, tool_button
+from app.views.dialogs.preset_card import preset_card
+
+_KEYS = Qt.Key
+_MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
+_STAR, _TITLE, _MODEL, _RATE, _ERROR = range(5)
+_HINT = "Type to search   ·   ↑ ↓ load   ·   Space plucks   ·   Ctrl+D favourite   ·   Enter closes"
+
+
+class PresetBrowser(QFrame):
+    """Shows what it is given; hidden at first."""
+
+    filter_changed = Signal(object)  # PresetFilter
+    preset_chosen = Signal(str)
+    favourite_asked = Signal(str)  # to be one, or no longer
+    pluck_asked = Signal()
+    folder_asked = Signal()
+    opened = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("browser")
+        self.setAccessibleName("Preset browser")
+        self._entries: list[PresetEntry] = []
+        self._before: QWidget | None = None  # had the keyboard
+        self.search = QLineEdit(placeholderText="Search presets")
+        self.search.setAccessibleName("Search presets")
+        self.search.setToolTip("Words in any order, a comma between two")
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self._tell_filter)
+        self._strings = combo_box(
+            "String", [("All strings", ""), ("Linear", "linear"), ("With pitch glide", "nonlinear")]
+        )
+        self._models = combo_box("Model", [("All models", "")])
+        self._rates = combo_box("Rate", [("All rates", 0)])
+        for box in (self._strings, self._models, self._rates):
+            box.setToolTip(f"Show only presets of this {box.accessibleName().lower()}")
+            box.currentIndexChanged.connect(self._tell_filter)
+        self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
+        self._starred.setCheckable(True)
+        self._starred.toggled.connect(self._tell_filter)
+        self.list = self._build_list()
+        self._card = QLabel(textFormat=Qt.TextFormat.RichText, wordWrap=True)
+        self._card.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._card.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._state = QLabel()
+        self._state.setObjectName("faint")
+        self._lay_out()
+        for widget in (self.search, self.list):
+            widget.installEventFilter(self)
+        if parent is not None:
+            parent.installEventFilter(self)
+        self.hide()
+
+    def _build_list(self) -> QTreeWidget:
+        made = QTreeWidget()
+        made.setAccessibleName("Presets")
+        made.setToolTip("Arrows load, Space plucks, Enter closes")
+        made.setHeaderLabels(["", "Preset", "Model", "Rate", "Error"])
+        made.setRootIsDecorated(False)
+        made.setUniformRowHeights(True)
+        made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # presets of one string differ at the end
+        made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        header = made.header()
+        header.setStretchLastSection(False)
+        header.setSectionsClickable(False)
+        header.setMinimumSectionSize(26)
+        for column in (_STAR, _MODEL, _RATE, _ERROR):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(_TITLE, QHeaderView.ResizeMode.Stretch)
+        made.currentItemChanged.connect(self._row_changed)
+        made.itemClicked.connect(self._clicked)
+        made.itemDoubleClicked.connect(lambda _item, column: self.dismiss() if column != _STAR else None)
+        return made
+
+    def _lay_out(self) -> None:
+        close = tool_button("✕", "Close the browser", "Close (Escape)")
+        close.clicked.connect(self.dismiss)
+        folder = tool_button(
+            "Open folder", tip="Show the folder of your own presets; a preset dropped here is put there"
+        )
+        folder.clicked.connect(self.folder_asked)
+        head = QHBoxLayout()
+        head.addWidget(self.search, 1)
+        for widget in (self._strings, self._models, self._rates, self._starred, close):
+            head.addWidget(widget)
+        card = QScrollArea(widgetResizable=True)
+        card.setObjectName("card")
+        card.setFrameShape(QFrame.Shape.NoFrame)
+        card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        card.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._card.setContentsMargins(14, 4, 10, 10)
+        card.setWidget(self._card)
+        hint = QLabel(_HINT)
+        hint.setObjectName("faint")
+        foot = QHBoxLayout()
+        foot.addWidget(self._state, 1)
+        foot.addWidget(folder)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(14, 14, 14, 12)
+        grid.setSpacing(10)
+        grid.addLayout(head, 0, 0, 1, 2)
+        grid.addWidget(self.list, 1, 0)
+        grid.addWidget(card, 1, 1)
+        grid.addLayout(foot, 2, 0, 1, 2)
+        grid.addWidget(hint, 3, 0, 1, 2)
+        grid.setColumnStretch(0, 4)
+        grid.setColumnStretch(1, 3)
+        grid.setRowStretch(1, 1)
+
+    # What is shown
+
+    def set_kinds(self, models: Sequence[str], rates_hz: Sequence[int]) -> None:
+        """What the presets can be filtered by."""
+        for box, entries in (
+            (self._models, [("All models", ""), *((model_word(model), model) for model in models)]),
+            (self._rates, [("All rates", 0), *((rate_word(rate), rate) for rate in rates_hz)]),
+        ):
+            with QSignalBlocker(box):
+                chosen = box.currentData()
+                box.clear()
+                for text, data in entries:
+                    box.addItem(text, data)
+                box.setCurrentIndex(max(0, box.findData(chosen)))
+
+    def show_entries(
+        self, entries: list[PresetEntry], favourites: Collection[str], chosen: str, total: int, folder: str
+    ) -> None:
+        """The presets that passed the filter, of `total`; `folder` is where the user's own lie."""
+        self._entries = entries
+        with QSignalBlocker(self.list):
+            self.list.clear()
+            for entry in entries:
+                info = entry.info
+                star = "★" if entry.name in favourites else "☆"
+                row = [star, entry.title, model_word(info.model), rate_word(info.rate_hz), error_word(info)]
+                item = QTreeWidgetItem(row)
+                item.setToolTip(_TITLE, f"{entry.title}\n{string_word(info.tension_modulated)}\n{entry.path.name}")
+                item.setToolTip(_STAR, "Favourite (Ctrl+D)")
+                for column in (_RATE, _ERROR):
+                    item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                self.list.addTopLevelItem(item)
+        found = f"{len(entries)} of {total} presets" if len(entries) < total else f"{total} presets"
+        self._state.setText(f"{found}   ·   your own: {folder}" if total else f"No presets   ·   your own: {folder}")
+        self.set_chosen(chosen)
+
+    def set_chosen(self, name: str) -> None:
+        row = next((row for row, entry in enumerate(self._entries) if entry.name == name), -1)
+        with QSignalBlocker(self.list):
+            self.list.setCurrentIndex(self.list.model().index(row, _TITLE))  # none where it was filtered out
+        self._card.setText(preset_card(self._entries[row]) if row >= 0 else _empty(bool(self._entries)))
+
+    # What is asked
+
+    def show_over(self) -> None:
+        """Opens with the keyboard in the search."""
+        self._before = QApplication.focusWidget()
+        self.opened.emit()
+        self._place()
+        self.show()
+        self.raise_()
+        self.search.setFocus()
+        self.search.selectAll()
+        if (item := self.list.currentItem()) is not None:
+            self.list.scrollToItem(item)
+
+    def dismiss(self) -> None:
+        self.hide()
+        if self._before is not None and self._before.isVisible():
+            self._before.setFocus()
+        if not self._entries:  # next and previous would lead nowhere
+            self.clear_filter()
+
+    def clear_filter(self) -> None:
+        """All presets are listed again; told once."""
+        boxes = (self._strings, self._models, self._rates)
+        for widget in (self.search, *boxes, self._starred):
+            widget.blockSignals(True)
+        self.search.clear()
+        for box in boxes:
+            box.setCurrentIndex(0)
+        self._starred.setChecked(False)
+        for widget in (self.search, *boxes, self._starred):
+            widget.blockSignals(False)
+        self._tell_filter()
+
+    def _tell_filter(self) -> None:
+        self.filter_changed.emit(
+            PresetFilter(
+                self.search.text(),
+                self._strings.currentData(),
+                self._models.currentData(),
+                self._rates.currentData(),
+                self._starred.isChecked(),
+            )
+        )
+
+    def _row_changed(self, item: QTreeWidgetItem | None) -> None:
+        if item is not None:
+            self.preset_chosen.emit(self._entries[self.list.indexOfTopLevelItem(item)].name)
+
+    def _clicked(self, item: QTreeWidgetItem, column: int) -> None:
+        if column == _STAR:
+            self.favourite_asked.emit(self._entries[self.list.indexOfTopLevelItem(item)].name)
+
+    def _current_name(self) -> str:
+        row = self.list.currentIndex().row()
+        return self._entries[row].name if row >= 0 else ""
+
+    # Keys and place
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self.parent():
+            if event.type() == QEvent.Type.Resize and self.isVisible():
+                self._place()
+            return False
+        if not isinstance(event, QKeyEvent):
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride:
+            if self._is_ours(watched, event) or (event.text() and event.text().isprintable()):
+                event.accept()  # the window's own keys rest meanwhile
+                return True
+        elif event.type() == QEvent.Type.KeyPress:
+            if self._is_ours(watched, event):
+                self._press(event)
+                return True
+            typed = event.key() == _KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
+            if watched is self.list and typed:
+                self.search.setFocus()
+                return QApplication.sendEvent(self.search, event)
+        return False
+
+    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
+        control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        if event.key() == _KEYS.Key_D:
+            return control
+        if event.key() == _KEYS.Key_Space and watched is self.search and self._search_begun():
+            return False
+        keys = (_KEYS.Key_Return, _KEYS.Key_Enter, _KEYS.Key_Escape, _KEYS.Key_Space, *_MOVES)
+        return event.key() in keys and not control
+
+    def _search_begun(self) -> bool:
+        """Something is in it that the next letter will not replace."""
+        return self.search.selectedText() != self.search.text()
+
+    def _press(self, event: QKeyEvent) -> None:
+        key = _KEYS(event.key())
+        if key in _MOVES:
+            self._move(key)
+        elif key == _KEYS.Key_Space:
+            self.pluck_asked.emit()
+        elif key == _KEYS.Key_D:
+            if name := self._current_name():
+                self.favourite_asked.emit(name)
+        else:
+            if key != _KEYS.Key_Escape and not self._current_name() and self._entries:
+                self.preset_chosen.emit(self._entries[0].name)
+            self.dismiss()
+
+    def _move(self, key: Qt.Key) -> None:
+        rows = self.list.topLevelItemCount()
+        if rows == 0:
+            return
+        self.list.setFocus()  # where Space plucks
+        page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
+        step = {_KEYS.Key_Up: -1, _KEYS.Key_Down: 1, _KEYS.Key_PageUp: -page, _KEYS.Key_PageDown: page}[key]
+        here = self.list.currentIndex().row()
+        row = here + step if here >= 0 else (0 if step > 0 else rows - 1)
+        self.list.setCurrentIndex(self.list.model().index(min(max(row, 0), rows - 1), _TITLE))
+
+    def _place(self) -> None:
+        """Under the bar of the presets; what moves the string and the sound stays in sight."""
+        parent = self.parentWidget()
+        if parent is not None:
+            top = 52
+            width, height = min(1240, parent.width() - 28), min(560, parent.height() - top - 140)
+            self.setGeometry(14, top, width, max(300, height))
+
+
+def _empty(any_listed: bool) -> str:
+    return "The chosen preset is not in this list." if any_listed else "No preset fits: clear the search or a filter."

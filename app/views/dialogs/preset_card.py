@@ -1,0 +1,89 @@
+"""A preset's card: what it is, how good it is and where it comes from, as rich text."""
+
+from __future__ import annotations
+
+from html import escape
+
+from PySide6.QtWidgets import QApplication
+
+from app.presets.library import PresetEntry
+from app.presets.words import (
+    error_word,
+    initial_word,
+    model_meaning,
+    model_word,
+    rate_word,
+    size_word,
+    string_word,
+    time_word,
+)
+from engine.schema import SchemaError
+from training.by_name import load
+
+
+def preset_card(entry: PresetEntry) -> str:
+    """Title, description and a table of facts; what the preset does not say is left out."""
+    info = entry.info
+    faint = QApplication.palette().placeholderText().color().name()
+    rows = "".join(
+        f"<tr><td style='color: {faint}; padding: 3px 14px 3px 0; white-space: nowrap'>{name}</td>"
+        f"<td style='padding: 3px 0'>{escape(text)}</td></tr>"
+        for name, text in _facts(entry)
+    )
+    title = f"<p style='font-size: 15px'><b>{escape(info.title)}</b></p>"
+    what = f"<p style='margin-bottom: 12px'>{escape(info.description)}</p>"
+    return f"{title}{what}<table>{rows}</table>"
+
+
+def preset_summary(entry: PresetEntry) -> list[str]:
+    """The same in one line, the longest wording first; the error is in all of them."""
+    info = entry.info
+    model, rate = model_word(info.model), rate_word(info.rate_hz)
+    string = "tension-modulated string" if info.tension_modulated else "linear string"
+    trained, parameters = f"trained on {info.horizon_s:g} s", f"{entry.parameters:,} parameters"
+    error = [f"validation error {error_word(info)}"] if info.rel_mae is not None else []
+    wordings = (
+        (model, parameters, string, f"{rate}, {info.modes} modes", trained),
+        (model, string, f"{rate}, {info.modes} modes", trained),
+        (model, f"{rate}, {info.modes} modes", trained),
+        (model, rate),
+        (model,),
+    )
+    return ["  ·  ".join([*parts, *error]) for parts in wordings]
+
+
+def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
+    info = entry.info
+    meaning = model_meaning(info.model)
+    facts = [
+        ("String", f"{string_word(info.tension_modulated)}, {info.string.length_m:g} m, {info.modes} partials"),
+        ("Model", model_word(info.model) + (f": {meaning}" if meaning else "")),
+        ("Size", f"{entry.parameters:,} parameters, {size_word(entry.size_bytes)}"),
+        ("Rate", f"{rate_word(info.rate_hz)}: nothing above {rate_word(info.rate_hz // 2)}"),
+        ("Trained on", f"the first {info.horizon_s:g} s ({initial_word(info.initial)}); past that it extrapolates"),
+    ]
+    audible = info.string.modes_below(info.rate_hz / 2)
+    if audible < info.modes:
+        facts.append(("Folded", f"partials {audible + 1} … {info.modes} lie above half the rate, in model and truth"))
+    if info.rel_mae is not None:
+        test = "" if info.test_rel_mae is None else f", on the test set {100 * info.test_rel_mae:.2g} %"
+        facts.append(("Error", f"{100 * info.rel_mae:.2g} % of the motion in validation{test}"))
+    if info.training_seconds is not None:
+        facts.append(("Trained in", time_word(info.training_seconds)))
+    if _can_be_remade(entry.name):
+        facts.append(("To remake", f"learned-strings train {entry.name}"))
+    facts += [("Licence", info.licence), ("File", f"{entry.name}, {_place(entry)}")]
+    return facts
+
+
+def _place(entry: PresetEntry) -> str:
+    return "your own" if entry.own else "shipped with the program"
+
+
+def _can_be_remade(name: str) -> bool:
+    """Whether the command line knows a training of this name."""
+    try:
+        load(name)
+    except (SchemaError, ValueError, OSError):
+        return False
+    return True

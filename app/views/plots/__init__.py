@@ -1,0 +1,1 @@
+"""Curves and pictures of what is measured."""

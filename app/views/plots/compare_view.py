@@ -1,0 +1,153 @@
+"""A table of presets on one pluck, and which of them are in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QHBoxLayout, QMenu, QToolButton, QVBoxLayout, QWidget
+
+from app.analysis.comparison import ComparedRow
+from app.presets.library import PresetEntry
+from app.views.controls.parts import tool_button, words_label
+from app.views.controls.progress_strip import ProgressStrip
+from app.views.controls.segments import SMALL
+from app.views.plots.figures_table import Column, FiguresTable, TableRow
+
+
+def percent(value: float) -> str:
+    if math.isinf(value):
+        return "ran away"
+    return f"{100 * value:.3g} %" if value < 10 else "> 1000 %"
+
+
+def scientific(value: float) -> str:
+    return "ran away" if math.isinf(value) else f"{value:.2e}"
+
+
+def decibels(value: float) -> str:
+    return "+∞" if math.isinf(value) else f"{value:.1f}".replace("-", "−")
+
+
+def times(value: float) -> str:
+    return f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×"
+
+
+COLUMNS = (
+    Column("Preset", "Double-click or Enter loads it"),
+    Column("MAE", "Relative mean absolute error over the trained horizon, all of the string", percent),
+    Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
+    Column(
+        "Null, dB",
+        "What is left of the sound at the listening point where model and truth are subtracted, all of the pluck",
+        decibels,
+    ),
+    Column("Speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
+    Column("Parameters", "Trainable numbers", lambda n: f"{n:,}"),
+    Column("MSE", "Relative mean squared error over the trained horizon", scientific),
+    Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
+    Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
+    Column("Model", "The model's family"),
+    Column("Note", "Why there are no figures"),
+)
+
+
+class CompareView(QWidget):
+    """See the module."""
+
+    preset_toggled = Signal(str, bool)  # by its checkbox: in the table or not
+    same_string_asked = Signal()
+    all_asked = Signal()
+    stop_asked = Signal()
+    preset_opened = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Compare")
+        self.setMinimumHeight(84)
+        self._menu = QMenu(self)
+        self._actions: dict[str, QAction] = {}
+        presets = tool_button("Presets ▾", "Presets to compare", "Choose the presets that are compared")
+        presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        presets.setMenu(self._menu)
+        self._words = words_label()
+        self._stop = tool_button(
+            "Stop", "Stop comparing", "Stop computing; or compute what is missing, or all of it again"
+        )
+        self._stop.clicked.connect(self.stop_asked)
+        copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
+        self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
+        self.table.setToolTip("Double-click or Enter loads a preset; Delete takes it out. Ctrl+C copies the table")
+        copy.clicked.connect(self.table.copy)
+        self.table.row_double_clicked.connect(lambda name: self.preset_opened.emit(name))
+        self.table.row_entered.connect(lambda name: self.preset_opened.emit(name))
+        self.table.row_deleted.connect(lambda name: self.preset_toggled.emit(name, False))
+        self.progress = ProgressStrip("Progress of the comparison")
+        for control in (presets, self._stop, copy):
+            control.setStyleSheet(SMALL)
+        head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
+        head.addWidget(presets)
+        head.addWidget(self._words, 1)
+        head.addWidget(self._stop)
+        head.addWidget(copy)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 2, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(head)
+        column.addWidget(self.progress)
+        column.addWidget(self.table, 1)
+
+    def set_presets(self, entries: Sequence[PresetEntry]) -> None:
+        """What can be compared."""
+        menu = self._menu
+        menu.clear()
+        for text, signal in (("Those of the present string", self.same_string_asked), ("All", self.all_asked)):
+            menu.addAction(text).triggered.connect(signal)
+        menu.addSeparator()
+        self._actions = {}
+        for entry in entries:
+            action = menu.addAction(entry.title)
+            action.setCheckable(True)
+            action.toggled.connect(lambda on, name=entry.name: self.preset_toggled.emit(name, on))
+            self._actions[entry.name] = action
+
+    def set_chosen(self, names: Sequence[str]) -> None:
+        """Which of them are in the table."""
+        for name, action in self._actions.items():
+            with QSignalBlocker(action):
+                action.setChecked(name in names)
+
+    def set_words(self, text: str) -> None:
+        self._words.setText(text)
+
+    def set_computing(self, share: float | None) -> None:
+        """How far the table is; None: nothing is computed."""
+        self.progress.show_share(share)
+        self._stop.setText("Stop" if share is not None else "Compute again")
+        self._stop.setAccessibleName("Stop comparing" if share is not None else "Compare again")
+
+    def show_rows(self, rows: Sequence[tuple[ComparedRow, bool]], present: str) -> None:
+        """Rows, and whether each is of the present pluck; the present preset's is marked."""
+        self.table.show_rows([self._row(row, fresh, row.name == present) for row, fresh in rows])
+
+    @staticmethod
+    def _row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
+        values = (
+            row.title,
+            row.mae,
+            row.past_mae,
+            row.null_db,
+            row.real_time,
+            row.parameters,
+            row.mse,
+            row.past_mse,
+            row.rate_hz,
+            row.model,
+            row.note,
+        )
+        tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
+        return TableRow(row.name, values, grey=not fresh, bold=present, tip=tip)

@@ -1,0 +1,325 @@
+"""A model's learned eigenvalues beside the string's own, on a musician's axes or in the complex plane.
+
+Amber rings are learned, blue dots the string's: a dot within its ring is a mode well learned. A point tells what it
+is when the mouse is on it; a click, or Enter on the one chosen by the arrow keys, lets its mode be heard alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.analysis.poles import PoleFigure, Poles
+from app.views import theme
+from app.views.controls.parts import ENTER_KEYS, combo_box, keeps_own_keys, words_label
+from app.views.controls.segments import SMALL
+from app.views.plots.axis_label import UprightLabel, UprightTicks, fit_foot
+
+NEAR_PIXELS = 16
+CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
+TIP_MS = 3000  # it hides what is pointed at
+SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
+_LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
+AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
+
+Array = NDArray[np.float64]
+
+
+class EigenvaluesView(QWidget):
+    """See the module."""
+
+    mode_chosen = Signal(int)
+    solo_ended = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Eigenvalues")
+        self.setMinimumHeight(84)
+        self._figure: PoleFigure | None = None
+        self._solo = 0
+        self._axes = combo_box("Axes", [(text, key) for key, text in AXES.items()])
+        self._axes.setToolTip("As a musician reads them, or as the mathematics has them")
+        self._axes.activated.connect(lambda _: self._draw())
+        self._layer = combo_box("Layer", [])
+        self._layer.setToolTip("Which layer's eigenvalues are shown")
+        self._layer.activated.connect(lambda _: self._draw())
+        self._layer.hide()
+        self._words = words_label()
+        self.plane = _Plane()
+        self.plane.pointed.connect(self._tell)
+        self.plane.taken.connect(self._take)
+        self.plane.escaped.connect(self.solo_ended)
+        for control in (self._axes, self._layer):
+            control.setStyleSheet(SMALL)
+        head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
+        head.addWidget(self._axes)
+        head.addWidget(self._layer)
+        head.addWidget(self._words, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 2, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(head)
+        column.addWidget(self.plane, 1)
+
+    @property
+    def words(self) -> str:
+        return self._words.text()
+
+    def show_figure(self, figure: PoleFigure | None, words: str = "") -> None:
+        """The eigenvalues of a preset; None, with words that say why, while there is nothing to show."""
+        if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
+            self._layer.clear()
+            for layer in range(figure.layers):
+                self._layer.addItem("First layer" if layer == 0 else f"Layer {layer + 1}", layer)
+            self._layer.addItem("All layers", None)
+        self._figure = figure
+        self._layer.setVisible(figure is not None and figure.layers > 1)
+        self._draw()
+        if figure is None:
+            self._words.say(words)
+
+    def set_solo(self, mode: int) -> None:
+        """The mode that is heard alone; 0: all."""
+        if mode != self._solo:
+            self._solo = mode
+            self._draw(keep_view=True)
+
+    def _draw(self, keep_view: bool = False) -> None:
+        figure = self._figure
+        if figure is None:
+            self.plane.clear_points()
+            return
+        layer = self._layer.currentData() if figure.layers > 1 else None
+        shown = np.ones(len(figure.learned), bool) if layer is None else figure.learned.layer == layer
+        self._shown = np.nonzero(shown)[0]
+        musical = self._axes.currentData() == "musical"
+        place = _musical_places if musical else _complex_places
+        learned, string = place(figure.learned)[self._shown], place(figure.string)
+        first_layer = figure.learned.layer[self._shown] == (layer or 0)
+        modes = np.concatenate([figure.learned.mode[self._shown], figure.string.mode])
+        self.plane.show_points(learned, first_layer, string, modes == self._solo if self._solo else None)
+        if not keep_view:
+            self.plane.set_axes(musical, figure.rate_hz)
+        self._tell(-1)
+
+    def _tell(self, point: int) -> None:
+        """What there is to say of a point, or of the whole where there is none."""
+        figure = self._figure
+        if figure is None:
+            return
+        if point >= 0:
+            self._words.say(*self._describe(figure, point))
+        elif self._solo:
+            self._words.say(f"Mode {self._solo} alone is heard; Esc: all of them")
+        else:
+            self._words.say(figure.note)
+
+    def _describe(self, figure: PoleFigure, point: int) -> list[str]:
+        """In several wordings, the longest first."""
+        count = len(self._shown)
+        learned = point < count
+        poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)
+        mode = int(poles.mode[place])
+        name, short = ("Learned, nearest to", "Learned,") if learned else ("The string’s", "String’s")
+        pitch = f"{poles.mode_hz[place]:.1f} Hz"
+        heard = poles.folded_hz[place]
+        folded = f" (heard at {heard:.0f} Hz)" if heard < poles.mode_hz[place] - 0.1 else ""
+        decay = f"T60 {_t60_text(poles.t60_s[place])}"
+        if not learned:
+            return [f"{name} mode {mode}:  {pitch}{folded},  {decay}", f"{short} mode {mode}:  {pitch},  {decay}"]
+        off, string = f"{poles.cents[place]:+.1f} cents", f"(string {_t60_text(figure.string.t60_s[mode - 1])})"
+        layer = f",  layer {figure.learned.layer[place] + 1}" if figure.layers > 1 else ""
+        return [
+            f"{name} mode {mode}:  {pitch}{folded},  {off},  {decay} {string}{layer}",
+            f"{short} mode {mode}:  {pitch},  {off},  {decay} {string}",
+            f"{mode}:  {pitch},  {off},  {decay} {string}",
+            f"{mode}:  {off},  {decay}",
+        ]
+
+    def _take(self, point: int) -> None:
+        assert self._figure is not None
+        count = len(self._shown)
+        learned, string = self._figure.learned.mode[self._shown], self._figure.string.mode
+        self.mode_chosen.emit(int(learned[point] if point < count else string[point - count]))
+
+
+def _musical_places(poles: Poles) -> Array:
+    """(points, 2): frequency in Hz, and log10 of T60 in s, held within the axis."""
+    return np.stack([poles.folded_hz, np.log10(np.clip(poles.t60_s, SHORTEST_S, LONGEST_S))], axis=1)
+
+
+def _complex_places(poles: Poles) -> Array:
+    values = np.exp(poles.log)
+    return np.stack([values.real, values.imag], axis=1)
+
+
+def _t60_text(t60_s: float) -> str:
+    return "∞: it grows" if math.isinf(t60_s) else f"{t60_s:.3g} s"
+
+
+class _Plane(pg.PlotWidget):
+    """Points that can be pointed at: wheel zooms, drag pans, double-click shows all."""
+
+    pointed = Signal(int)  # at a point, the learned ones first; -1: at none
+    taken = Signal(int)
+    escaped = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Plane of eigenvalues")
+        self.setToolTip(
+            "Amber rings: learned; blue dots: the string's own. Click or Enter: hear this mode alone, again for all\n"
+            "Arrow keys go from point to point; the wheel zooms, double-click shows all"
+        )
+        self.setToolTipDuration(TIP_MS)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMouseTracking(True)
+        item = self.getPlotItem()
+        item.showGrid(x=True, y=True, alpha=0.18)
+        item.setMenuEnabled(False)
+        item.hideButtons()
+        turn = np.linspace(0, np.pi, 721)
+        self._circle = item.plot(np.cos(turn), np.sin(turn), pen=pg.mkPen(theme.FAINT, width=1))
+        self._string = pg.ScatterPlotItem(symbol="o", size=6, pen=None)
+        self._learned = pg.ScatterPlotItem(symbol="o", size=13, brush=None)
+        self._ring = pg.ScatterPlotItem(symbol="o", size=21, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
+        for layer in (self._learned, self._string, self._ring):
+            item.addItem(layer)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._places = np.empty((0, 2))
+        self._learned_count = 0
+        self._at = -1
+        self._pressed: QPointF | None = None
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # it is, while this is being made
+            fit_foot(self)
+
+    def clear_points(self) -> None:
+        self._places, self._at = np.empty((0, 2)), -1
+        for layer in (self._learned, self._string, self._ring):
+            layer.setData([], [])
+
+    def show_points(
+        self, learned: Array, first_layer: NDArray[np.bool_], string: Array, alone: NDArray[np.bool_] | None
+    ) -> None:
+        """Places (points, 2) of both kinds; `alone` are those of the mode that is heard alone."""
+        self._places, self._at = np.concatenate([learned, string]), -1
+        self._learned_count = len(learned)
+        self._ring.setData([], [])
+        heard = np.ones(len(self._places), bool) if alone is None else alone
+        pens = [
+            pg.mkPen(
+                theme.translucent(theme.MODEL if first else theme.FAINT, 230 if loud else 60), width=2 if first else 1
+            )
+            for first, loud in zip(first_layer, heard, strict=False)
+        ]
+        brushes = [pg.mkBrush(theme.translucent(theme.TRUTH, 255 if loud else 80)) for loud in heard[len(learned) :]]
+        self._learned.setData(x=learned[:, 0], y=learned[:, 1], pen=pens)
+        self._string.setData(x=string[:, 0], y=string[:, 1], brush=brushes)
+
+    def set_axes(self, musical: bool, rate_hz: int) -> None:
+        """Frequency in Hz against decay time, or the upper half of the complex plane; all points in view."""
+        item = self.getPlotItem()
+        item.getAxis("bottom").enableAutoSIPrefix(False)
+        self._circle.setVisible(not musical)
+        item.setAspectLocked(not musical)
+        if musical:
+            item.setLabel("bottom", "frequency (Hz)")
+            self._label.set("decay: T60 (s)", "T60 (s)", "s")
+            item.setLimits(xMin=-0.02 * rate_hz, xMax=0.52 * rate_hz)
+        else:
+            item.setLabel("bottom", "Re λ")
+            self._label.set("Im λ")
+            item.setLimits(xMin=None, xMax=None)
+        self._ticks.set([(math.log10(s), f"{s:g}") for s in _LABELLED_S] if musical else None)
+        fit_foot(self)
+        self._musical, self._rate_hz = musical, rate_hz
+        self.show_all()
+
+    def show_all(self) -> None:
+        if not len(self._places):
+            return
+        item, places = self.getPlotItem(), self._places
+        if self._musical:
+            low, high = places[:, 1].min() - 0.15, places[:, 1].max() + 0.15
+            item.setRange(
+                xRange=(0, min(1.06 * places[:, 0].max(), 0.51 * self._rate_hz)), yRange=(low, high), padding=0
+            )
+        else:
+            (left, bottom), (right, top) = places.min(0), places.max(0)
+            item.setRange(xRange=(left, right), yRange=(bottom, top), padding=0.06)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = event.position()
+        super().mousePressEvent(event)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        super().mouseReleaseEvent(event)
+        pressed, self._pressed = self._pressed, None
+        if event.button() == Qt.MouseButton.LeftButton and pressed is not None:
+            still = (event.position() - pressed).manhattanLength() < 4
+            if still and (point := self._nearest(event.position())) >= 0:
+                self._point_at(point)
+                self.taken.emit(point)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        super().mouseMoveEvent(event)
+        if not event.buttons():
+            point = self._nearest(event.position())
+            self.setCursor(Qt.CursorShape.PointingHandCursor if point >= 0 else Qt.CursorShape.ArrowCursor)
+            self._point_at(point)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if self._nearest(event.position()) < 0:
+            self.show_all()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._point_at(-1)
+        super().leaveEvent(event)
+
+    def event(self, event: QEvent) -> bool:
+        """Enter and Esc are the plane's own while it has the keyboard, whatever the window's shortcuts say."""
+        return keeps_own_keys(event) or bool(super().event(event))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()))
+        if step is not None and len(self._places):
+            order = np.lexsort((self._places[:, 1], self._places[:, 0] if self._musical else -self._places[:, 0]))
+            here = int(np.nonzero(order == self._at)[0][0]) if self._at >= 0 else (-1 if step > 0 else 0)
+            self._point_at(int(order[(here + step) % len(order)]))
+        elif event.key() in ENTER_KEYS:
+            if self._at >= 0:
+                self.taken.emit(self._at)
+        elif event.key() == Qt.Key.Key_Escape:
+            self.escaped.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def _nearest(self, at: QPointF) -> int:
+        """The point nearest to a place of the widget, a learned one where both lie there; -1 where none is near."""
+        if not len(self._places):
+            return -1
+        box = self.getPlotItem().vb
+        here = box.mapSceneToView(self.mapToScene(at.toPoint()))
+        wide, high = box.viewPixelSize()
+        off = np.hypot((self._places[:, 0] - here.x()) / wide, (self._places[:, 1] - here.y()) / high)
+        point = int((off + CLOSER_PIXELS * (np.arange(len(off)) >= self._learned_count)).argmin())
+        return point if off[point] <= NEAR_PIXELS else -1
+
+    def _point_at(self, point: int) -> None:
+        if point != self._at:
+            self._at = point
+            at = self._places[point : point + 1] if point >= 0 else np.empty((0, 2))
+            self._ring.setData(x=at[:, 0], y=at[:, 1])
+            self.pointed.emit(point)

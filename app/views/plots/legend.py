@@ -1,0 +1,110 @@
+"""Which colour is which: the sources that are drawn, by slot and title, the heard one in full strength."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.views import theme
+
+STROKE = 16  # the length of a sample of colour
+FAINT_ALPHA = 185
+HEIGHT = 20
+SHARE = 0.92  # of the plot's width, at most
+_GAP, _BETWEEN = 6, 18
+
+
+def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, middle: float, right: float) -> float:
+    """One behind the other from `x` on; titles are cut where all of them do not fit. Returns where they end."""
+    painter.setFont(theme.small_font(12, bold=True))
+    metrics = painter.fontMetrics()
+    for source, text in zip(sources, _texts(sources, metrics, right - x), strict=True):
+        hue = theme.SOURCE_COLOURS[theme.source_kind(source.source)]
+        painter.setPen(QPen(theme.translucent(hue, 255 if source.heard else FAINT_ALPHA), 3))
+        painter.drawLine(QPointF(x, middle), QPointF(x + STROKE, middle))
+        place = QRectF(x + STROKE + _GAP, middle - HEIGHT / 2, metrics.horizontalAdvance(text) + 1, HEIGHT)
+        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
+        x += STROKE + _GAP + metrics.horizontalAdvance(text) + _BETWEEN
+    return x
+
+
+class Legend(QWidget):
+    """Over a plot, in its upper right corner; the mouse does not notice it."""
+
+    def __init__(self, plot: pg.PlotWidget) -> None:
+        super().__init__(plot)
+        self._plot = plot
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._sources: tuple[ShownSource, ...] = ()
+        self._part = ""
+        self.show_sources(DEFAULT_SOURCES)
+        plot.getPlotItem().vb.sigResized.connect(self._place)
+
+    @property
+    def text(self) -> str:
+        """What it says, whole."""
+        return "   ".join([*([self._part] if self._part else []), *map(_whole, self._sources)])
+
+    def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
+        """`part` of the sound stands before them."""
+        self._sources, self._part = sources, part
+        self.setAccessibleName(f"Drawn: {self.text}")
+        self._place()
+        self.update()
+
+    def _place(self) -> None:
+        area = self._plot.mapFromScene(self._plot.getPlotItem().vb.sceneBoundingRect()).boundingRect()
+        room = int(SHARE * area.width())
+        metrics = QFontMetrics(theme.small_font(12, bold=True))
+        texts = _texts(self._sources, metrics, room - self._part_width - 2 * _GAP)
+        width = self._part_width + _width(texts, metrics) + 2 * _GAP + 1
+        self.setGeometry(area.right() - 4 - width, area.top() + 4, width, HEIGHT)
+
+    @property
+    def _part_width(self) -> int:
+        return QFontMetrics(theme.small_font(12)).horizontalAdvance(self._part) + _BETWEEN if self._part else 0
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(theme.translucent(theme.PANEL, 200))
+        painter.drawRoundedRect(QRectF(self.rect()), 4, 4)
+        painter.setFont(theme.small_font(12))
+        painter.setPen(QColor(theme.FAINT))
+        place = QRectF(self.rect()).adjusted(_GAP, 0, 0, 0)
+        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, self._part)
+        paint_sources(painter, self._sources, _GAP + self._part_width, HEIGHT / 2, self.width() - _GAP)
+
+
+def _whole(source: ShownSource) -> str:
+    return f"{source.slots}  {source.title}{source.remark}"
+
+
+def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
+    """What is said of each: all, or where that is too much without what the colour says too, or with titles cut."""
+    for told in (sources, [replace(source, heard=False) for source in sources]):
+        if _width(texts := [_whole(source) for source in told], metrics) <= room:
+            return texts
+    titles = room - _width([_whole(replace(source, title="")) for source in told], metrics)
+    needed = [metrics.horizontalAdvance(source.title) for source in told]
+    for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
+        needed[place] = int(min(needed[place], max(0.0, titles / (len(needed) - done))))
+        titles -= needed[place]
+    elide = Qt.TextElideMode.ElideMiddle
+    return [
+        _whole(replace(source, title=metrics.elidedText(source.title, elide, room)))
+        for source, room in zip(told, needed, strict=True)
+    ]
+
+
+def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
+    """Of all, with their samples of colour."""
+    return sum(STROKE + _GAP + metrics.horizontalAdvance(text) for text in texts) + _BETWEEN * (len(texts) - 1)

@@ -1,0 +1,119 @@
+"""A table of the string's partials: what the model makes of each, beside the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.analysis.take_partials import WINDOWS, PartialRow
+from app.views.controls.parts import combo_box, tool_button, words_label
+from app.views.controls.progress_strip import ProgressStrip
+from app.views.controls.segments import SMALL
+from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from engine.partials import LEAST_DECAY_DB
+
+
+def hertz(value: float) -> str:
+    return f"{value:.1f}"
+
+
+def seconds(value: float) -> str:
+    return "grows" if math.isinf(value) else f"{value:.3g}"
+
+
+def signed(value: float, digits: int = 1) -> str:
+    if math.isinf(value):
+        return "+∞" if value > 0 else "−∞"
+    rounded = round(value, digits) or 0.0  # no minus before a zero
+    return f"{rounded:+.{digits}f}".replace("-", "−")
+
+
+_NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
+COLUMNS = (
+    Column("Mode", "The mode: so many half waves along the string", lambda n: f"{n}"),
+    Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
+    Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
+    Column("Cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
+    Column("Level, dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
+    Column("T60, %", "Error of the model's decay time in %", signed),
+    Column("Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
+    Column("Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
+    Column("Note", "Why a row is grey"),
+)
+
+
+class PartialsView(QWidget):
+    """See the module."""
+
+    window_chosen = Signal(str)  # a key of `WINDOWS`
+    mode_chosen = Signal(int)
+    solo_ended = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Partials")
+        self.setMinimumHeight(84)
+        self._window = combo_box("Window of time", [(text.capitalize(), key) for key, text in WINDOWS.items()])
+        self._window.setToolTip("Which part of the pluck the figures are of")
+        self._window.activated.connect(lambda _: self.window_chosen.emit(self.window_key))
+        self._words = words_label()
+        self.table = FiguresTable("Partials of this pluck", COLUMNS)
+        self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
+        copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
+        copy.clicked.connect(self.table.copy)
+        self.table.row_clicked.connect(lambda mode: self.mode_chosen.emit(mode))
+        self.table.row_entered.connect(lambda mode: self.mode_chosen.emit(mode))
+        self.table.escaped.connect(self.solo_ended)
+        self.progress = ProgressStrip("Progress of the partials")
+        for control in (self._window, copy):
+            control.setStyleSheet(SMALL)
+        head = QHBoxLayout()
+        head.setContentsMargins(4, 0, 4, 0)
+        head.setSpacing(8)
+        head.addWidget(self._window)
+        head.addWidget(self._words, 1)
+        head.addWidget(copy)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 2, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(head)
+        column.addWidget(self.progress)
+        column.addWidget(self.table, 1)
+
+    @property
+    def window_key(self) -> str:
+        return str(self._window.currentData())
+
+    def set_words(self, text: str) -> None:
+        """What there is to say beside the table."""
+        self._words.setText(text)
+
+    def show_partials(self, rows: Sequence[PartialRow]) -> None:
+        self.table.set_dimmed(False)
+        self.table.show_rows([self._row(row) for row in rows])
+
+    def dim(self) -> None:
+        """The figures are of an earlier pluck."""
+        self.table.set_dimmed(True)
+
+    def show_solo(self, mode: int) -> None:
+        """Marks the mode that is heard alone; 0: none."""
+        self.table.choose(mode or None)
+
+    @staticmethod
+    def _row(row: PartialRow) -> TableRow:
+        values = (
+            row.mode,
+            row.truth_hz,
+            row.model_hz,
+            row.cents,
+            row.level_db,
+            row.t60_error_percent,
+            row.truth_t60_s,
+            row.model_t60_s,
+            row.note,
+        )
+        return TableRow(row.mode, values, grey=bool(row.note), tip=row.note)

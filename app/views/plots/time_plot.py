@@ -1,0 +1,205 @@
+"""What all plots over the time of a take share: the end of training, the playhead, gestures and keys.
+
+A click or a drag moves the playhead, the wheel zooms in time, the middle or right button pans. The keyboard does the
+same: arrows, + and -, Home.
+"""
+
+from __future__ import annotations
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
+from PySide6.QtWidgets import QWidget
+
+from app.views import theme
+from app.views.plots.axis_label import fit_foot
+from app.views.plots.kept_plot import KeptPlot
+
+SEEK_STEP_S = 0.1
+SEEK_STEP_SHARE = 0.05  # of what is in view, where that is less
+ZOOM_STEP = 1.25
+SHORTEST_VIEW_S = 0.002
+_PAN_BUTTONS = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
+
+
+class TimePlot(KeptPlot):
+    """See the module. What is drawn in it is its owner's; the line that moves is the playhead."""
+
+    seek_asked = Signal(float)
+    pointed = Signal(float, float)  # a press with Shift: time in s, place on the upright axis
+    hovered = Signal(float, float)  # the same, of the mouse; not a number where it has left
+
+    def __init__(self, name: str, tip: str, parent: QWidget | None = None, *, shaded: bool = True) -> None:
+        """`shaded`: what lies past training; not under a picture, which would hide it as far as it reaches."""
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self.setMinimumHeight(84)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        item = self.getPlotItem()
+        item.setLabel("bottom", "time (s)")
+        item.getAxis("bottom").enableAutoSIPrefix(False)
+        item.setContentsMargins(0, 6, 4, 0)  # room for half of the topmost number
+        item.setMenuEnabled(False)
+        item.hideButtons()
+        item.setMouseEnabled(True, False)
+        self._shaded = shaded
+        self._seconds = 1.0
+        self._pan_from: float | None = None  # in pixels
+        self._untrained = pg.LinearRegionItem(
+            (1, 1), movable=False, brush=pg.mkBrush(theme.translucent(theme.WARNING, 18)), pen=pg.mkPen(None)
+        )
+        self._horizon = pg.InfiniteLine(
+            1,
+            pen=pg.mkPen(theme.WARNING, width=1, style=Qt.PenStyle.DashLine),
+            label="end of training",
+            labelOpts={
+                "color": theme.WARNING,
+                "position": 0.86,
+                "anchors": [(0, 0.5), (0, 0.5)],
+                "fill": theme.translucent(theme.PANEL, 170 if shaded else 235),
+            },
+        )
+        self._edge = pg.InfiniteLine(1, pen=pg.mkPen(theme.translucent(theme.PANEL, 235), width=3))
+        for thing, depth in ((self._untrained, -10), (self._edge, 19), (self._horizon, 20)):
+            thing.setZValue(depth)
+            item.addItem(thing, ignoreBounds=True)
+        item.setXRange(0, self._seconds, padding=0)
+
+    def set_times(self, seconds: float, horizon_s: float) -> None:
+        """The whole of a take of `seconds` of a model that was trained for `horizon_s`.
+
+        What is in view stays, where the take before was as long.
+        """
+        item = self.getPlotItem()
+        item.setLimits(xMin=0, xMax=seconds, minXRange=min(SHORTEST_VIEW_S, seconds))
+        if seconds != self._seconds:
+            self._seconds = seconds
+            self.show_all()
+        inside = horizon_s < seconds
+        self._untrained.setRegion((horizon_s, max(seconds, horizon_s)))
+        self._horizon.setValue(horizon_s)
+        self._edge.setValue(horizon_s)
+        self._edge.setVisible(inside and not self._shaded)  # what sets the line off from a picture
+        self._horizon.setVisible(inside)
+        self._untrained.setVisible(inside and self._shaded)
+
+    def show_playhead(self, position_s: float) -> None:
+        if position_s != self.line_at:
+            self.move_line(position_s)
+
+    @property
+    def times_s(self) -> tuple[float, float]:
+        """What is in view, within the take."""
+        low, high = self.getPlotItem().vb.viewRange()[0]
+        return max(low, 0.0), min(high, self._seconds)
+
+    @property
+    def columns(self) -> int:
+        """How many pixels there are for it."""
+        return max(round(self.getPlotItem().vb.width() * self.devicePixelRatioF()), 1)
+
+    # Zoom and pan
+
+    def show_all(self) -> None:
+        self.show_times(0.0, self._seconds)
+
+    def show_times(self, low_s: float, high_s: float) -> None:
+        """Brings a stretch of time into view, moved into the take where it lies beyond its ends."""
+        span = min(max(high_s - low_s, SHORTEST_VIEW_S), self._seconds)
+        low_s = min(max(low_s, 0.0), self._seconds - span)
+        self.getPlotItem().setXRange(low_s, low_s + span, padding=0)
+
+    def zoom(self, factor: float, about_s: float | None = None) -> None:
+        """Shows `factor` times as much; about the playhead by default, or the middle if that is not in view."""
+        low, high = self.times_s
+        if about_s is None:
+            about_s = self.line_at if low <= self.line_at <= high else (low + high) / 2
+        self.show_times(about_s - (about_s - low) * factor, about_s + (high - about_s) * factor)
+
+    def pan(self, by_s: float) -> None:
+        low, high = self.times_s
+        self.show_times(low + by_s, high + by_s)
+
+    # Gestures
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        turn, low_high = event.angleDelta(), self.times_s
+        if turn.y():
+            self.zoom(ZOOM_STEP ** (-turn.y() / 120), self._point_at(event.position()).x())
+        if turn.x():
+            self.pan(-turn.x() / 120 * 0.1 * (low_high[1] - low_high[0]))
+        event.accept()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._follow(event)
+        elif event.button() & _PAN_BUTTONS:
+            self._pan_from = event.position().x()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._follow(event)
+        elif event.buttons() & _PAN_BUTTONS and self._pan_from is not None:
+            here = event.position()
+            moved = self._point_at(QPointF(self._pan_from, here.y())).x() - self._point_at(here).x()
+            self._pan_from = here.x()
+            self.pan(moved)
+        if self._plot_rect_has(event.position()):
+            point = self._point_at(event.position())
+            self.hovered.emit(point.x(), point.y())
+        else:
+            self._hover_nothing()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._pan_from = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.show_all()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._hover_nothing()
+        super().leaveEvent(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        low, high = self.times_s
+        step_s = min(SEEK_STEP_S, SEEK_STEP_SHARE * (high - low))
+        match event.key():
+            case Qt.Key.Key_Left:
+                self._seek(self.line_at - step_s)
+            case Qt.Key.Key_Right:
+                self._seek(self.line_at + step_s)
+            case Qt.Key.Key_Home:
+                self._seek(0.0)
+            case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
+                self.zoom(1 / ZOOM_STEP**2)
+            case Qt.Key.Key_Minus:
+                self.zoom(ZOOM_STEP**2)
+            case Qt.Key.Key_0:
+                self.show_all()
+            case _:
+                super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        super().resizeEvent(event)
+        if self.getPlotItem() is not None:  # as it is while the plot is being made, and when it has been closed
+            fit_foot(self)
+
+    def _follow(self, event: QMouseEvent) -> None:
+        point = self._point_at(event.position())
+        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            self.pointed.emit(point.x(), point.y())
+        self._seek(point.x())
+
+    def _seek(self, time_s: float) -> None:
+        self.seek_asked.emit(min(max(time_s, 0.0), self._seconds))
+
+    def _hover_nothing(self) -> None:
+        self.hovered.emit(float("nan"), float("nan"))
+
+    def _point_at(self, place: QPointF) -> QPointF:
+        return self.getPlotItem().vb.mapSceneToView(self.mapToScene(place.toPoint()))
+
+    def _plot_rect_has(self, place: QPointF) -> bool:
+        return bool(self.getPlotItem().vb.sceneBoundingRect().contains(self.mapToScene(place.toPoint())))

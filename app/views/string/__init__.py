@@ -1,0 +1,1 @@
+"""The string under the hands."""

@@ -1,0 +1,134 @@
+"""What lies behind the string: the grid, and the plucks that the model was not trained on, with a word why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from PySide6.QtCore import QLineF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QFontMetrics, QLinearGradient, QPainter, QPen
+
+from app.session.shown import ShownSource
+from app.views import theme
+from app.views.plots.legend import paint_sources
+from app.views.string.axes import MARGIN_X, StringAxes
+
+LINE_HEIGHT = 15
+HATCHING = 70  # alpha, 0 … 255
+LEGEND_Y = 17.5  # the middle of the line above the string
+LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
+SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
+
+
+@dataclass(frozen=True)
+class TrainedPlucks:
+    """The positions and amplitudes that the model was trained on; None: all."""
+
+    position: tuple[float, float] | None = None
+    amplitude_mm: tuple[float, float] | None = None
+
+
+def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
+    """All of it.
+
+    `pluck`: 0 or 1, towards which end of the string it is, while it is shown. Only then are amplitudes shaded, for a
+    string in motion crosses them all.
+    """
+    gradient = QLinearGradient(0, 0, 0, axes.height)
+    gradient.setColorAt(0, QColor(theme.face.ground_top))
+    gradient.setColorAt(1, QColor(theme.face.ground_bottom))
+    painter.setPen(QPen(QColor(theme.LINE), 1))
+    painter.setBrush(gradient)
+    painter.drawRoundedRect(QRectF(0.5, 0.5, axes.width - 1, axes.height - 1), 6, 6)
+    paint_grid(painter, axes)
+    _paint_scale(painter, axes)
+    if trained.position is not None:
+        _paint_untrained_positions(painter, axes, trained.position)
+    if pluck is not None and trained.amplitude_mm is not None:
+        _paint_untrained_amplitudes(painter, axes, trained, pluck)
+
+
+def paint_grid(painter: QPainter, axes: StringAxes) -> None:
+    """Tenths of the string and the scale's lines."""
+    painter.setPen(QPen(theme.translucent(theme.LINE, 120), 1))
+    painter.drawLines(_grid(axes))
+
+
+@lru_cache(maxsize=2)
+def _grid(axes: StringAxes) -> list[QLineF]:
+    xs = [round(axes.x(tenth / 10)) + 0.5 for tenth in range(11)]
+    ys = [round(axes.middle - share * axes.half_height) + 0.5 for share in SCALE]
+    return [QLineF(x, axes.top, x, axes.bottom) for x in xs] + [QLineF(axes.x(0), y, axes.x(1), y) for y in ys]
+
+
+def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
+    painter.setFont(theme.small_font(10))
+    painter.setPen(QColor(theme.FAINT))
+    for share in SCALE:
+        y = axes.middle - share * axes.half_height
+        painter.drawText(
+            QRectF(0, y - 8, MARGIN_X - 8, 16),
+            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
+            f"{share * axes.span_mm:+g}" if share else "0 mm",
+        )
+
+
+def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
+    """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`.
+
+    What warns is whole first, as far as it leaves room for the letters of the slots.
+    """
+    warned = QFontMetrics(theme.small_font(11)).horizontalAdvance(warning) + 8 if warning else 0
+    room = right - MARGIN_X
+    x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
+    if warning:
+        painter.setPen(QColor(theme.WARNING))
+        painter.setFont(theme.small_font(11))
+        place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
+        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
+        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+def _shade(painter: QPainter, area: QRectF) -> None:
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(theme.translucent(theme.face.shade, theme.face.shade_alpha))
+    painter.drawRect(area)
+    painter.setBrush(QBrush(theme.translucent(theme.FAINT, HATCHING), Qt.BrushStyle.BDiagPattern))
+    painter.drawRect(area)
+
+
+def _paint_untrained_positions(painter: QPainter, axes: StringAxes, trained: tuple[float, float]) -> None:
+    low, high = trained
+    height = axes.bottom - axes.top
+    words = ("not trained here", f"only plucks at {low:g} … {high:g}")
+    for start, stop in ((0.0, low), (high, 1.0)):
+        if stop <= start:
+            continue
+        area = QRectF(axes.x(start), axes.top, axes.x(stop) - axes.x(start), height)
+        _shade(painter, area)
+        painter.setFont(theme.small_font(11))
+        for row, text in enumerate(words):
+            painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
+            line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
+            if painter.fontMetrics().horizontalAdvance(text) > line.width():
+                continue  # the hatching says it
+            painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
+
+
+def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int) -> None:
+    assert trained.amplitude_mm is not None
+    low_mm, high_mm = trained.amplitude_mm
+    left, right = trained.position or (0.0, 1.0)  # beside them it is shaded already
+    free = Qt.AlignmentFlag.AlignLeft if pluck else Qt.AlignmentFlag.AlignRight
+    for bottom_mm, top_mm, text in (
+        (0.0, min(low_mm, axes.span_mm), f"not trained below {low_mm:g} mm"),
+        (high_mm, axes.span_mm, f"not trained above {high_mm:g} mm"),
+    ):
+        if top_mm <= bottom_mm:
+            continue
+        area = QRectF(axes.at(left, top_mm), axes.at(right, bottom_mm))
+        _shade(painter, area)
+        if area.height() >= LINE_HEIGHT:
+            painter.setFont(theme.small_font(11))
+            painter.setPen(theme.translucent(theme.TEXT, 190))
+            painter.drawText(area.adjusted(8, 0, -8, 0), free | Qt.AlignmentFlag.AlignVCenter, text)

@@ -1,0 +1,197 @@
+"""What is drawn of the string itself: its motion, the pluck with its handle, the ends, and where it is heard."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QLine, QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPen, QPolygonF
+
+from app.analysis.string_frame import Band, StringFrame
+from app.views import theme
+from app.views.string.axes import StringAxes
+from app.views.string.ground import paint_grid
+
+HANDLE_RADIUS = 7.0
+DASH = 4  # pixels
+PIECE, EVERY = 9, 24  # pixels: of a line that another hides, so much is drawn above it, so often
+MERGED = 2.0  # pixels: two lines that are nearer are one to the eye
+
+
+@dataclass(frozen=True)
+class ShownPluck:
+    """The pluck as chosen. shape_mm (points,); `label` says its shape and width."""
+
+    position: float
+    amplitude_mm: float
+    shape_mm: NDArray[np.float64]
+    label: str = ""
+
+
+def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
+    """The sources, the heard one in front, and pieces of what it hides above it.
+
+    Opaque fills and thin pens only: this is drawn sixty times a second.
+    """
+    order = sorted(frame.shapes, key=lambda name: name == heard)
+    painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
+    for name in order:
+        band = frame.lowest[name], frame.highest[name]
+        _paint_band(painter, axes, band, name, 0.24 if name == heard else 0.18)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    paint_grid(painter, axes)  # the opaque bands have covered it
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    for name in order:
+        painter.setPen(QPen(QColor(_hue(name)), 1))
+        curve = axes.curve(frame.shapes[name])
+        for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower
+            painter.drawPolyline(curve.translated(0, shift))
+    for name in order[:-1]:
+        pieces = _hidden_pieces(axes, frame.shapes[name], frame.shapes[order[-1]])
+        painter.setPen(QPen(QColor(_hue(name)), 1))
+        for shift in (-0.6, 0.6) if pieces else ():
+            painter.translate(0, shift)
+            painter.drawLines(pieces)
+            painter.translate(0, -shift)
+    painter.setClipping(False)
+
+
+def _hidden_pieces(axes: StringAxes, below: NDArray[np.float32], above: NDArray[np.float32]) -> list[QLineF]:
+    """Short parts of a line that lies under another: together they make both a line of two colours.
+
+    They stand still while the string moves, and none is where the lines part.
+    """
+    starts = np.arange(EVERY / 2, axes.length - PIECE, EVERY)
+    ends = starts + PIECE
+    firsts, lasts = (_heights(axes, below, at) for at in (starts, ends))
+    apart = np.maximum(np.abs(firsts - _heights(axes, above, starts)), np.abs(lasts - _heights(axes, above, ends)))
+    hidden = apart < MERGED
+    left = axes.x(0)
+    corners = (left + starts[hidden], firsts[hidden], left + ends[hidden], lasts[hidden])
+    return [QLineF(*piece) for piece in zip(*(values.tolist() for values in corners), strict=True)]
+
+
+def _heights(axes: StringAxes, shape_mm: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The line's height in the picture at places along the string, both in pixels."""
+    points = np.linspace(0, axes.length, len(shape_mm))
+    return axes.middle - np.interp(at, points, shape_mm) * (axes.half_height / axes.span_mm)
+
+
+def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], heard: str) -> None:
+    """What lies behind the motion, and changes less often."""
+    painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
+    for name in sorted(envelopes, key=lambda name: name == heard):
+        _paint_band(painter, axes, envelopes[name], name, 0.07)
+
+
+def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
+    """An area with thin edges, so that what lies behind another still tells its extent."""
+    colour = _hue(name)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(theme.blended(colour, theme.PANEL, strength))
+    area, *edges = axes.band(*band)
+    painter.drawPolygon(area)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(QPen(theme.blended(colour, theme.PANEL, 3 * strength), 1))
+    for edge in edges:
+        painter.drawPolyline(edge)
+
+
+def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
+    """The string as it is pulled."""
+    curve = axes.curve(pluck.shape_mm)
+    area = QPolygonF(curve)
+    area.append(axes.at(1, 0))
+    area.append(axes.at(0, 0))
+    fill = QLinearGradient(0, axes.y(pluck.amplitude_mm), 0, axes.middle)
+    fill.setColorAt(0, theme.translucent(theme.TEXT, 60))
+    fill.setColorAt(1, theme.translucent(theme.TEXT, 0))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(fill)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    painter.drawPolygon(area)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(QPen(QColor(theme.TEXT), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+    painter.drawPolyline(curve)
+
+
+def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
+    """The handle: `full` beside a string at rest, a ring while it moves; its words where it is full or grabbed."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    if grabbed:
+        painter.setBrush(theme.translucent(theme.TEXT, 50))
+        painter.drawEllipse(at, 2 * HANDLE_RADIUS, 2 * HANDLE_RADIUS)
+    solid = full or grabbed
+    painter.setPen(QPen(QColor(theme.BACKGROUND if solid else theme.FAINT), 2))
+    painter.setBrush(QColor(theme.TEXT) if solid else QColor(0, 0, 0, 90))
+    painter.drawEllipse(at, HANDLE_RADIUS, HANDLE_RADIUS)
+    if not solid:
+        return
+    painter.setBrush(QColor(theme.BACKGROUND))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.drawEllipse(at, 2.2, 2.2)
+    words = f"{pluck.position:.2f}   {pluck.amplitude_mm:.1f} mm"
+    if pluck.label:
+        words += f"   {pluck.label}"
+    painter.setFont(theme.small_font(12))
+    length = painter.fontMetrics().horizontalAdvance(words)
+    beside = at.x() + 22 if at.x() + 22 + length < right else at.x() - 22 - length
+    plate = QRectF(beside - 6, at.y() - 11, length + 12, 22)
+    painter.setBrush(theme.translucent(theme.RAISED, 220))
+    painter.drawRoundedRect(plate, 4, 4)
+    painter.setPen(QColor(theme.TEXT))
+    painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, words)
+
+
+def paint_ends(painter: QPainter, axes: StringAxes) -> None:
+    """Where the string is fixed."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.FAINT))
+    for x in (axes.x(0), axes.x(1)):
+        painter.drawRoundedRect(QRectF(x - 3, axes.middle - 22, 6, 44), 3, 3)
+
+
+def paint_listening_line(painter: QPainter, axes: StringAxes, position: float, grabbed: bool) -> None:
+    x = axes.x(position)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+    painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if grabbed else 120), 1))
+    painter.drawLines(_dashes(round(x), round(axes.top), round(axes.bottom)))
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+
+
+def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, label: str, grabbed: bool) -> None:
+    """The foot of its line, below the string."""
+    x = axes.x(position)
+    painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.GOOD))
+    y = axes.bottom
+    painter.drawPolygon(QPolygonF([QPointF(x, y + 2), QPointF(x - 8, y + 15), QPointF(x + 8, y + 15)]))
+    painter.setPen(QColor(theme.GOOD))
+    painter.setFont(theme.small_font(11))
+    painter.drawText(QRectF(x - 60, y + 16, 120, 18), Qt.AlignmentFlag.AlignCenter, f"{label} {position:.2f}")
+
+
+def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
+    """The moment, in the corner of the picture."""
+    painter.setFont(theme.small_font(12))
+    painter.setPen(QColor(theme.WARNING if frame.past_horizon else theme.TEXT))
+    area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
+    text = frame.caption + ("   past training" if frame.past_horizon else "")
+    painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+def _hue(source: str) -> str:
+    return theme.SOURCE_COLOURS[theme.source_kind(source)]
+
+
+@lru_cache(maxsize=4)
+def _dashes(x: int, top: int, bottom: int) -> list[QLine]:
+    """A vertical line of dashes: a pen that dashes is a hundred times slower."""
+    return [QLine(x, y, x, y + DASH) for y in range(top, bottom - DASH, 2 * DASH)]

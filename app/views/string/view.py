@@ -1,0 +1,416 @@
+"""The string: what the slots hold in motion, the pluck that is being drawn, and the listening points.
+
+Click on the string: where it is pulled, as far as the last time. Drag on it: where and how far; the wheel over the
+handle sets the width, with Shift the shape. Drag a marker beneath it: where it is heard. A double-click on either
+goes back to the default.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
+from PySide6.QtGui import (
+    QColor,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+    QResizeEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QApplication, QSizePolicy, QToolButton, QWidget
+
+from app.analysis.string_frame import StringFrame
+from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.views import theme
+from app.views.controls.parts import tool_button
+from app.views.string.axes import MARGIN_X, StringAxes
+from app.views.string.ground import TrainedPlucks, paint_ground, paint_legend
+from app.views.string.ink import (
+    ShownPluck,
+    paint_caption,
+    paint_ends,
+    paint_envelopes,
+    paint_handle,
+    paint_listening_line,
+    paint_listening_point,
+    paint_motion,
+    paint_pluck,
+)
+from engine.pluck import DEFAULT_LISTEN
+
+SPANS_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)  # the display's half height, chosen to fit
+GRAB_PIXELS = 14  # how near a handle or a marker counts as on it
+FINE = 0.1  # with Shift
+LEAST_DRAGGED_MM = 0.5  # what ends on the string's line is meant to be heard all the same
+WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
+
+MARKER_TIP = "Drag to hear the string from another point; double-click resets. Shift and arrow keys move it"
+TIPS: dict[str | None, str] = {  # by what the pointer is on
+    None: "Click or drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
+    "pluck": "Drag along the string for the place, up and down for the amplitude; double-click resets.\n"
+    "The wheel sets the width, with Shift the shape. Arrow keys do the same, with Ctrl for width and shape",
+    "left": MARKER_TIP,
+    "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
+}
+
+_Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+
+
+class StringView(QWidget):
+    """See the module. Positions are in lengths, displacement in mm; a `side` is "left" or "right"."""
+
+    pluck_drawn = Signal(float, float)  # position, amplitude: while dragging
+    pluck_released = Signal()
+    pluck_reset = Signal()
+    width_stepped = Signal(float)  # notches
+    shape_stepped = Signal(int)  # the next or the previous
+    listening_point_moved = Signal(str, float)  # side, position
+    listening_point_reset = Signal(str)
+    drag_started = Signal()
+    drag_ended = Signal()
+    motion_toggled = Signal(bool)
+    envelope_toggled = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setMinimumSize(480, 96)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMouseTracking(True)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setAccessibleName("String")
+        self.setToolTip(TIPS[None])
+        self._frame: StringFrame | None = None
+        self._pluck = ShownPluck(0.35, 4.0, np.zeros(2))
+        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
+        self._trained = TrainedPlucks()
+        self._warning = ""
+        self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
+        self._span_mm = 5.0
+        self._drag: str | None = None  # "pluck" or a side
+        self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
+        self._dragged_at = QPointF()
+        self._pressed_at = QPointF()
+        self._on_bare_string = False  # there, not on something to grab
+        self._far = False  # whether the drag has gone too far from there to be a click
+        self._amplitude_mm = 0.0  # at its beginning
+        self._hovered: str | None = None
+        self._on_handle_first = False  # the last press was the first of a series, and on the handle
+        self._last_press_ms = -10_000
+        self._turned = 0.0  # notches of the wheel towards the next shape
+        self._ground_pixmap: QPixmap | None = None
+        self._ground_key: tuple[object, ...] = ()
+        self._backdrop: tuple[object, object, QPixmap] | None = None  # ground, envelopes, and both in one picture
+        self._toggles = (
+            self._toggle("Motion", "Show the string in motion; off saves work (M)", self.motion_toggled),
+            self._toggle(
+                "Envelope", "Show how far the string swung within the last second (E)", self.envelope_toggled
+            ),
+        )
+
+    def _toggle(self, text: str, tip: str, toggled: SignalInstance) -> QToolButton:
+        button = tool_button(text, text, tip)
+        button.setObjectName("chip")
+        button.setParent(self)
+        button.setCheckable(True)
+        button.setCursor(Qt.CursorShape.ArrowCursor)
+        button.clicked.connect(toggled)
+        return button
+
+    # What is shown
+
+    def set_pluck(self, pluck: ShownPluck) -> None:
+        """The pluck as chosen; it is drawn while no motion is shown."""
+        self._pluck = pluck
+        self.setAccessibleDescription(f"position {pluck.position:.2f}, {pluck.amplitude_mm:.2f} mm, {pluck.label}")
+        self.update()
+
+    def set_listening_points(self, left: float, right: float | None = None) -> None:
+        """Where the string is heard; `right` is None in mono."""
+        self._listening = {"left": left} if right is None else {"left": left, "right": right}
+        self.update()
+
+    def set_trained(self, trained: TrainedPlucks) -> None:
+        self._trained = trained
+        self.update()
+
+    def set_warning(self, text: str) -> None:
+        """Why this pluck is silent, or outside what the model knows."""
+        self._warning = text
+        self.update()
+
+    def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
+        """What the slots hold; frames should have their motions."""
+        self._sources = sources
+        self.update()
+
+    def set_shown(self, motion: bool, envelope: bool) -> None:
+        """What of the motion is switched on; the frames given should agree."""
+        for button, on in zip(self._toggles, (motion, envelope), strict=True):
+            button.setChecked(on)
+        self._toggles[1].setEnabled(motion)
+
+    def show_frame(self, frame: StringFrame | None) -> None:
+        """A moment of the motion; None goes back to the pluck."""
+        before, self._frame, span_mm = self._frame, frame, self._span_mm
+        self._fit_span()
+        if frame is None or before is None or self._span_mm != span_mm:
+            if frame is not before:
+                self.update()
+        else:  # all that moves lies in one rectangle, between the words above and those below
+            self.update(0, WORDS_HEIGHT, self.width(), math.ceil(self._axes().bottom) - WORDS_HEIGHT)
+
+    @property
+    def is_dragging_pluck(self) -> bool:
+        return self._drag == "pluck"
+
+    @property
+    def _shows_pluck(self) -> bool:
+        return self._frame is None or self._drag == "pluck"
+
+    # Gestures
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        on = self._under(event.position())
+        follows = event.timestamp() - self._last_press_ms < QApplication.doubleClickInterval()
+        self._on_handle_first = on == "pluck" and not follows
+        self._last_press_ms = event.timestamp()
+        self._start_drag(on, event.position())
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        on = self._under(event.position())
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        if on in self._listening:
+            self.listening_point_reset.emit(on)
+        elif self._on_handle_first:
+            self.pluck_reset.emit()
+        else:  # the same place is plucked again and again
+            self._last_press_ms = event.timestamp()
+            self._start_drag(on, event.position())
+
+    def _start_drag(self, on: str | None, at: QPointF) -> None:
+        if on is None or on == "pluck":  # on the pluck's scale, whatever has decayed meanwhile
+            self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
+        axes = self._axes()
+        self.drag_started.emit()
+        self._drag = on or "pluck"
+        self._dragged_at = self._pressed_at = at
+        self._far, self._on_bare_string, self._amplitude_mm = False, on is None, self._pluck.amplitude_mm
+        if on == "pluck":
+            self._dragged = (self._pluck.position, self._pluck.amplitude_mm)
+            self.setCursor(Qt.CursorShape.ClosedHandCursor)
+        elif on is not None:
+            self._dragged = (self._listening[on], 0.0)
+        else:
+            self._dragged = (axes.position(at.x()), axes.displacement_mm(at.y()))
+            self.pluck_drawn.emit(self._dragged[0], self._amplitude_mm)  # which is all that a click does
+        self.update()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        at = event.position()
+        if self._drag is None:
+            self._hover(self._under(at))
+            self.setToolTip(self._warning if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered])
+            return
+        axes = self._axes()
+        fine = FINE if event.modifiers() & _Shift else 1.0
+        position, displacement_mm = self._dragged
+        self._dragged = (
+            position + fine * (axes.position(at.x()) - axes.position(self._dragged_at.x())),
+            displacement_mm + fine * (axes.displacement_mm(at.y()) - axes.displacement_mm(self._dragged_at.y())),
+        )
+        self._dragged_at = at
+        self._far |= (at - self._pressed_at).manhattanLength() >= QApplication.startDragDistance()
+        if self._far or not self._on_bare_string:
+            self._ask()
+
+    def _ask(self) -> None:
+        position, displacement_mm = self._dragged
+        if self._drag == "pluck":
+            least_mm = LEAST_DRAGGED_MM if self._far else min(LEAST_DRAGGED_MM, self._amplitude_mm)
+            self.pluck_drawn.emit(position, max(abs(displacement_mm), least_mm))
+            self._fit_span()
+        elif self._drag is not None:
+            self.listening_point_moved.emit(self._drag, position)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or self._drag is None:
+            return
+        drag, self._drag = self._drag, None
+        self.drag_ended.emit()
+        if drag == "pluck":
+            self.pluck_released.emit()
+        self._hovered = None
+        self._hover(self._under(event.position()))
+        self.update()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self._under(event.position()) != "pluck":
+            event.ignore()
+            return
+        notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
+        if event.modifiers() & _Shift:
+            self._turned += notches
+            steps, self._turned = int(self._turned), self._turned - int(self._turned)
+            if steps:
+                self.shape_stepped.emit(steps)
+        else:
+            self.width_stepped.emit(notches)
+        event.accept()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
+        sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key)
+        upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key)
+        if sideways is not None and held & _Shift:
+            side = "right" if held & _Control else "left"
+            if side in self._listening:
+                self.listening_point_moved.emit(side, self._listening[side] + 0.01 * sideways)
+        elif sideways is not None and held & _Control:
+            self.shape_stepped.emit(sideways)
+        elif upwards is not None and held & _Control:
+            self.width_stepped.emit(float(upwards))
+        elif sideways is not None:
+            self.pluck_drawn.emit(self._pluck.position + 0.01 * sideways, self._pluck.amplitude_mm)
+        elif upwards is not None:
+            step_mm = 0.5 * (FINE if held & _Shift else 1.0)
+            self.pluck_drawn.emit(self._pluck.position, self._pluck.amplitude_mm + step_mm * upwards)
+        elif key == _Key.Key_Delete and held & _Shift:
+            for side in self._listening:
+                self.listening_point_reset.emit(side)
+        elif key == _Key.Key_Delete:
+            self.pluck_reset.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def leaveEvent(self, event: object) -> None:
+        if self._drag is None:
+            self._hover(None)
+
+    def _hover(self, on: str | None) -> None:
+        cursors = {None: Qt.CursorShape.CrossCursor, "pluck": Qt.CursorShape.OpenHandCursor}
+        self.setCursor(cursors.get(on, Qt.CursorShape.SizeHorCursor))
+        if on != self._hovered:
+            self._hovered = on
+            self.update()
+
+    def _under(self, at: QPointF) -> str | None:
+        """What can be grabbed there: "pluck", a side, or None for the bare string."""
+        axes = self._axes()
+        if at.y() > axes.bottom - 6:
+            near = {side: abs(at.x() - axes.x(position)) for side, position in self._listening.items()}
+            side = min(near, key=lambda name: near[name])
+            return side if near[side] < GRAB_PIXELS else None
+        handle = self._handle(axes)
+        return "pluck" if (at - handle).manhattanLength() < 1.4 * GRAB_PIXELS else None
+
+    # Geometry
+
+    def _axes(self) -> StringAxes:
+        return StringAxes(self.width(), self.height(), self._span_mm)
+
+    def _handle(self, axes: StringAxes) -> QPointF:
+        """In a decayed motion's scale the pluck lies above the picture; its handle stays at the edge."""
+        return axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
+
+    def _fit_span(self) -> None:
+        """The span of the pluck at rest, or what follows the decay; while a pluck is drawn it can only grow."""
+        if self._drag == "pluck":
+            self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
+        elif self._frame is None:
+            self._span_mm = _span_mm(self._pluck.amplitude_mm)
+        else:
+            largest_mm = self._frame.largest_mm()
+            self._span_mm = max(_span_mm(largest_mm), min(self._span_mm, _span_mm(largest_mm, air=1.4)))
+
+    # Painting
+
+    def sizeHint(self) -> QSize:
+        return QSize(1100, 330)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        right = self.width() - MARGIN_X
+        for button in reversed(self._toggles):
+            size = button.sizeHint()
+            right -= size.width()
+            button.setGeometry(right, 6, size.width(), 22)
+            right -= 6
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self._fit_span()
+        axes = self._axes()
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._behind(axes))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self._frame is None or self._drag == "pluck":
+            paint_pluck(painter, axes, self._pluck)
+        else:
+            paint_motion(painter, axes, self._frame, self._heard)
+        paint_ends(painter, axes)
+        labels = {"left": "listen"} if len(self._listening) == 1 else {"left": "left", "right": "right"}
+        for side, label in labels.items():
+            grabbed = side in (self._drag, self._hovered)
+            paint_listening_line(painter, axes, self._listening[side], grabbed)
+            if event.rect().bottom() > axes.bottom:
+                paint_listening_point(painter, axes, self._listening[side], label, grabbed)
+        grabbed = "pluck" in (self._drag, self._hovered)
+        paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
+        if self._frame is not None and not self._shows_pluck:
+            paint_caption(painter, axes, self._frame)
+
+    @property
+    def _heard(self) -> str:
+        return next((source.source for source in self._sources if source.heard), "")
+
+    def _behind(self, axes: StringAxes) -> QPixmap:
+        """The ground, and the envelopes of a motion, painted anew only when one of them changes."""
+        ground = self._ground(axes)
+        if self._frame is None or self._shows_pluck or not self._frame.envelopes:
+            return ground
+        envelopes = self._frame.envelopes
+        if self._backdrop is None or self._backdrop[0] is not ground or self._backdrop[1] is not envelopes:
+            picture = None if self._backdrop is None else self._backdrop[2]
+            if picture is None or picture.size() != ground.size():
+                picture = QPixmap(ground.size())
+            picture.setDevicePixelRatio(ground.devicePixelRatio())
+            painter = QPainter(picture)  # over the last one: to make another takes longer than to paint it
+            painter.drawPixmap(0, 0, ground)
+            paint_envelopes(painter, axes, envelopes, self._heard)
+            painter.end()
+            self._backdrop = (ground, envelopes, picture)
+        return self._backdrop[2]
+
+    def _ground(self, axes: StringAxes) -> QPixmap:
+        """The picture behind the string, painted anew only when something in it changes."""
+        # on which side words would be in the way of the pluck, with the words at its handle
+        pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
+        chosen = (self._trained, pluck, self._sources, self._warning)
+        key = (axes, self.devicePixelRatioF(), *chosen, theme.face, self.hasFocus())
+        if self._ground_pixmap is None or self._ground_key != key:
+            pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
+            pixmap.setDevicePixelRatio(self.devicePixelRatioF())
+            pixmap.fill(QColor(theme.BACKGROUND))
+            painter = QPainter(pixmap)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            paint_ground(painter, axes, self._trained, pluck)
+            paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
+            if self.hasFocus():
+                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
+            painter.end()
+            self._ground_pixmap, self._ground_key = pixmap, key
+        return self._ground_pixmap
+
+
+def _span_mm(largest_mm: float, air: float = 1.15) -> float:
+    """The least span that holds a displacement with some air."""
+    return next((span for span in SPANS_MM if span >= air * largest_mm), SPANS_MM[-1])

@@ -1,0 +1,57 @@
+"""What this program is made of, as text for people and for reports."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from app.presets.folders import user_folder
+from app.shared.version import PROGRAM, program_version
+from app.views.dialogs.help_text import CITATION
+
+LIBRARIES = (
+    "torch",
+    "numpy",
+    "scipy",
+    "numba",
+    "safetensors",
+    "PySide6-Essentials",
+    "pyqtgraph",
+    "sounddevice",
+    "soundfile",
+    "soxr",
+    "pydantic",
+)
+
+
+def library_versions() -> dict[str, str]:
+    """By distribution, as installed."""
+    return {name: _version(name) for name in LIBRARIES}
+
+
+def about_text(settings: Path, presets: Path) -> str:
+    """Program, libraries, licence, source and places, in lines to copy."""
+    return "\n".join(
+        [
+            f"{PROGRAM} {program_version()}",
+            "Licence: MIT",
+            "",
+            f"After {CITATION}",
+            "",
+            f"Settings: {settings}",
+            f"Shipped presets: {presets}",
+            f"Your own presets: {user_folder()}",
+            "",
+            f"Python {platform.python_version()} on {platform.platform()}, {sys.maxsize.bit_length() + 1} bit",
+            *(f"{name} {number}" for name, number in library_versions().items()),
+        ]
+    )
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,149 @@
+"""The sound output as the user has chosen it: opening it, its dialog, its faults, the badge in the header.
+
+A choice is saved once the device plays with it: one that was refused must not leave the next start without sound.
+"""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject
+
+from app.audio.choices import Buffer, DeviceChoice, SoundChoice
+from app.audio.devices import AudioDevice, output_devices
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
+from app.audio.sound import Sound, SoundStatus
+from app.views.dialogs.audio_dialog import AudioDialog, AudioState
+from app.window.main_window import MainWindow
+
+if TYPE_CHECKING:
+    from app.playing.notes import Notes
+    from app.rendering import Take
+    from engine.voices import Gap
+
+# of the device's own buffer; sound waits for nothing else
+LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
+LIST_EVERY = 5  # calls of `show` between two looks at the list of devices
+
+
+class AudioControl(QObject):
+    """`device` and `sound` are to be saved."""
+
+    def __init__(self, window: MainWindow, output: Sound, device: DeviceChoice | None, sound: SoundChoice) -> None:
+        super().__init__(window)
+        self.device, self.sound = device, sound
+        self._wish = (device, sound)
+        self._window, self._output = window, output
+        self._changes = 0
+        self._notice = ""
+        self._latencies_s: tuple[float, ...] = ()
+        self._last_known: Gap | None = None  # the user's zero: gaps up to this one are not counted
+        self._listed: list[DeviceChoice] | None = None
+        self._moments = 0
+        self._dialog: AudioDialog | None = None
+        window.audio_asked.connect(self.show_dialog)
+
+    def open(self, rescan: bool = False) -> None:
+        """Opens what is wished for."""
+        device, sound = self._wish
+        self._changes += 1
+        self._output.open(
+            AudioDevice(device.name, device.host_api) if device else None,
+            LATENCY_S.get(sound.buffer, LATENCY_S["medium"]),
+            sound.rate_hz,
+            sound.buffer if isinstance(sound.buffer, int) else 0,
+            rescan,
+        )
+
+    def tell(self, problem: AudioProblem) -> None:
+        """A fault, with what it means for now."""
+        if self._notice:
+            self._window.notices.withdraw(self._notice)  # one word on the sound at a time
+        self._notice = str(problem)
+        if problem.kind is not ProblemKind.STALLED:
+            device = self._output.status().device
+            self._notice += f" “{device.name}” plays on." if device else " The app goes on without sound."
+        self._window.notices.tell(self._notice, problem.detail)
+
+    def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
+        """The present state, ten times a second."""
+        if status.problem is None:
+            if self._notice:
+                self._window.notices.withdraw(self._notice)  # the sound is back
+                self._notice = ""
+            if status.changes_done == self._changes and status.device is not None:
+                self.device, self.sound = self._wish
+        self._latencies_s = notes.latencies_s
+        if take is not None:
+            self._show_badge(status, take.info.rate_hz)
+        if self._dialog is not None and self._dialog.isVisible():
+            self._moments += 1
+            self._dialog.show_state(self._state(status))
+            if self._moments % LIST_EVERY == 0 and self._listed is not None:
+                self._list_devices()
+
+    def show_dialog(self) -> None:
+        if self._dialog is None:
+            self._dialog = dialog = AudioDialog(self._window)
+            dialog.choice_made.connect(self._choose)
+            dialog.rescan_asked.connect(lambda: self.open(rescan=True))
+            dialog.tone_asked.connect(self._output.sound_tone)
+            dialog.gaps_reset.connect(self._reset_gaps)
+        self._listed = None
+        self._list_devices()
+        self._dialog.show_sound(self._wish[1])
+        self._dialog.show_state(self._state(self._output.status()))
+        self._dialog.show()
+        self._dialog.raise_()
+
+    def _choose(self, device: DeviceChoice | None, sound: SoundChoice) -> None:
+        self._wish = (device, sound)
+        self.open()
+
+    def _reset_gaps(self) -> None:
+        gaps = self._output.status().gaps
+        self._last_known = gaps[-1] if gaps else None
+
+    def _list_devices(self) -> None:
+        """Fills the list when it has changed. Without PortAudio it is asked once only: asking takes long then."""
+        first = self._listed is None
+        try:
+            found = output_devices(rescan=first and self._output.status().device is None)
+        except AudioUnavailable:
+            found, listed = [], None
+        else:
+            listed = [DeviceChoice(name=device.name, host_api=device.host_api) for device in found]
+        if self._dialog is not None and (first or listed != self._listed):
+            self._dialog.show_devices(listed or [], self._wish[0])
+        self._listed = listed
+
+    def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
+        label = self._window.rate_label
+        model = f"{model_rate_hz / 1000:g}"
+        fault = status.device is None
+        text = f"{model} kHz  ·  no sound" if fault else f"{model} → {status.rate_hz / 1000:g} kHz"
+        if label.text() != text:
+            label.setText(text)
+            label.setToolTip(
+                f"{status.problem or 'No sound output'}\nAudio settings: Ctrl+,"
+                if fault
+                else "The model's rate, converted to the sound device's rate"
+            )
+            label.setProperty("fault", fault)
+            label.style().polish(label)
+
+    def _state(self, status: SoundStatus) -> AudioState:
+        device, gaps = status.device, status.gaps  # the latest: what was known may have been dropped
+        if self._last_known in gaps:
+            gaps = gaps[gaps.index(self._last_known) + 1 :]
+        facts = f"{status.rate_hz / 1000:g} kHz, buffer {1000 * status.latency_s:.0f} ms"
+        if self._latencies_s:
+            facts += f", key to device {1000 * statistics.median(self._latencies_s):.1f} ms (measured)"
+        return AudioState(
+            f"“{device.name}” ({device.host_api})" if device else "",
+            facts,
+            status.problem or "",
+            tuple(f"{gap.time_s:.1f} s: {gap.cause}" for gap in gaps),
+            status.load,
+        )

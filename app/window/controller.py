@@ -1,0 +1,340 @@
+"""Where everything is connected: session, performance, sound, panels and window.
+
+    widgets ── intents ──► session ── changed ──► controller ──► performance, sound, panels, widgets
+    a timer ── 60 times a second, 10 when all is still ──► the panels that can be seen, meter
+
+Everything here runs in the window's thread.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from app.analysis.abx.subject import subject_of
+from app.audio.problems import AudioProblem
+from app.audio.sound import Sound
+from app.playing.chosen import mix_of
+from app.presets.library import Library, PresetEntry
+from app.session.choices import Choices, Session
+from app.session.history import History
+from app.session.slots import missing_presets
+from app.views.controls.knob import Knob
+from app.views.controls.slot_buttons import SLOTS
+from app.views.dialogs.about_dialog import AboutDialog
+from app.views.dialogs.abx_dialog import AbxDialog
+from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.help_dialog import HelpDialog
+from app.views.dialogs.preset_browser import PresetBrowser
+from app.views.string.view import StringView
+from app.window.about import about_text
+from app.window.appearance import Appearance
+from app.window.audio_control import AudioControl
+from app.window.dropped_files import receive
+from app.window.instruments import Instruments
+from app.window.main_window import KEYS, PLAYED_KEYS, MainWindow
+from app.window.panels import Moment, StringPanel
+from app.window.panels.rack import fill
+from app.window.performance import Performance
+from app.window.preset_desk import PresetDesk
+from app.window.settings import Settings, save_settings
+from engine.preset import SHIPPED, PresetError
+
+FRAME_MS = 16
+IDLE_MS = 100  # between two looks while nothing moves
+FACTS_S = 0.1  # between two looks at what is read and not watched
+LIVELY_S = 1.0  # after the last movement pictures go on at full pace
+METER_FALL_DB_PER_S = 20.0
+METER_FLOOR_DB = -120.0
+ProblemListener = Callable[[AudioProblem], None]
+
+
+class _AudioMail(QObject):
+    """Carries a fault of the sound device from the caretaker's thread into the window's (Qt queues the signal)."""
+
+    told = Signal(object)
+
+
+class Controller(QObject):
+    """Lives as long as the window."""
+
+    def __init__(
+        self,
+        window: MainWindow,
+        settings: Settings,
+        settings_path: Path,
+        make_sound: Callable[[ProblemListener], Sound] = Sound,
+    ) -> None:
+        super().__init__(window)
+        self.window = window
+        self.session = Session(settings.choices)
+        self._settings = settings
+        self._settings_path = settings_path
+        self._audio_mail = _AudioMail()
+        self.sound = make_sound(self._audio_mail.told.emit)
+        self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
+        self._audio_mail.told.connect(self.audio.tell)
+        self.audio.open()  # it is opened while all else is made
+        self.appearance = Appearance(window, settings.look)
+        self._last_tick_s = time.monotonic()
+        self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._tick)
+        self._lively_until_s = 0.0
+        self._ticks = 0
+        self._facts_due_s = 0.0
+        self._elapsed_before_s = 0.0
+        self._peak_db = METER_FLOOR_DB
+        self._abx: AbxDialog | None = None  # while it is open, the sound is its own
+        self._help: HelpDialog | None = None
+        self.library = Library([])
+        problems = self.library.refresh()
+        self.presets = PresetDesk(
+            self.session, self.library, window.presets, PresetBrowser(window), settings.favourites
+        )
+        self.panels = fill(window, self.session, self.library)
+        self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
+        window.order_tabs()
+        self._connect()
+        if self.entry is None and (first := self.library.first()):
+            self.session.update(preset=first.name)
+        for slot, name in missing_presets(self.session.choices, self.library).items():
+            self.session.update(**{slot: "model" if slot == "a" else "truth"})
+            problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
+        self.history = History(self.session)
+        self._connect_history()
+        self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike)
+        self.instruments.played.connect(self.performance.follow)
+        self.instruments.told.connect(window.notices.tell)
+        self.instruments.start()
+        for problem in problems:
+            self.window.notices.tell(problem)
+        everything = frozenset(type(self.session.choices).model_fields)
+        self.performance.choices_changed(everything)
+        self._choices_shown(everything)
+        self._timer.start()
+
+    # Connections
+
+    def _connect(self) -> None:
+        window, session = self.window, self.session
+        session.changed.connect(self._choices_changed)
+        for panel in self.panels:
+            panel.seek_asked.connect(self.performance.seek)
+            panel.pluck_asked.connect(self.pluck)
+            panel.told.connect(window.notices.tell)
+        self.presets.pluck_asked.connect(self.pluck)
+        self.presets.told.connect(window.notices.tell)
+        window.previous_asked.connect(lambda: self.presets.step(-1))
+        window.next_asked.connect(lambda: self.presets.step(1))
+        window.browse_asked.connect(self.presets.toggle)
+        window.file_dropped.connect(lambda path: self.take_file(Path(path)))
+        window.transport.slots.set_entries(self.library.entries)
+        self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
+        window.transport.change_asked.connect(self._change)
+        window.transport.play_asked.connect(self.play_or_stop)
+        window.transport.export_asked.connect(self.export)
+        window.export_asked.connect(self.export)
+        window.abx_asked.connect(self.listening_test)
+        window.play_asked.connect(self.play_or_stop)
+        window.pluck_asked.connect(self.pluck)
+        window.switch_asked.connect(session.switch_source)
+        window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
+        window.help_asked.connect(self.show_help)
+        window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
+        window.all_modes_asked.connect(lambda: session.update(solo=0))
+        window.closing.connect(self.close)
+
+    def _connect_history(self) -> None:
+        window, session, history = self.window, self.session, self.history
+        window.undo_asked.connect(history.undo)
+        window.redo_asked.connect(history.redo)
+        window.motion_asked.connect(lambda: session.update(motion=not session.choices.motion))
+        window.envelope_asked.connect(lambda: session.update(envelope=not session.choices.envelope))
+        strings = (panel.view for panel in self.panels if isinstance(panel, StringPanel))
+        draggable: list[StringView | Knob] = [*strings, *window.transport.knobs.values()]
+        for dragged in draggable:
+            dragged.drag_started.connect(history.hold)
+            dragged.drag_ended.connect(history.let_go)
+
+    def _change(self, field: str, value: object) -> None:
+        try:
+            self.session.update(**{field: value})
+        except ValueError:  # a knob at its end asks for a hair more
+            self._choices_shown(frozenset({field}))
+
+    # Intents
+
+    def pluck(self) -> None:
+        if self._abx is None:
+            self.performance.pluck()
+
+    def _strike(self, choices: Choices) -> None:
+        """A note of an instrument, in its thread."""
+        if self._abx is None:
+            self.performance.strike(choices)
+
+    def play_or_stop(self) -> None:
+        if self._abx is None:
+            self.performance.play_or_stop()
+            self.window.transport.show_playing(self.performance.playing)
+
+    def export(self) -> None:
+        choices = self.session.choices
+        if self.entry is None:
+            self.window.notices.tell("There is no preset to export: choose one first.")
+            return
+        dialog = ExportDialog(
+            self.library.entries,
+            choices,
+            self._settings.export,
+            self.window,
+            listen_right=choices.listen_right if choices.stereo else None,
+            pickup=choices.pickup,
+        )
+        dialog.exec()
+        self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
+
+    def listening_test(self) -> None:
+        """Opens the ABX test on what is on stage; until it is closed, the sound belongs to it."""
+        entry = self.entry
+        if entry is None or entry.unplayable:
+            self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
+            return
+        try:
+            subject = subject_of(entry, self.session.choices)
+        except PresetError as error:
+            self.window.notices.tell(str(error))
+            return
+        self.performance.stop()
+        render = partial(self.performance.render_sound, self.session.choices)
+        self._abx = AbxDialog(self.sound, subject, self._settings.abx, render, self.window)
+        self._abx.finished.connect(self._listening_test_ended)
+        self._abx.open()
+
+    def _listening_test_ended(self) -> None:
+        dialog, self._abx = self._abx, None
+        assert dialog is not None
+        self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
+        dialog.deleteLater()
+
+    def show_help(self) -> None:
+        if self._help is None:
+            views = [(panel.title, panel.help) for panel in self.panels if panel.help]
+            self._help = HelpDialog([*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)], views, self.window)
+        self._help.show()
+        self._help.raise_()
+
+    def take_file(self, file: Path) -> None:
+        """A dropped preset is taken in and chosen; a dropped WAV's recipe is restored."""
+        dropped = receive(file, self.library)
+        notice = dropped.notice
+        try:
+            self.session.update(**dropped.choices)
+        except ValueError as error:  # a recipe that was edited, or of another version
+            notice = f"{file}: its choices cannot be restored here ({error})."
+        if notice:
+            self.window.notices.tell(notice)
+
+    @property
+    def entry(self) -> PresetEntry | None:
+        """The chosen preset."""
+        return self.performance.entry
+
+    def close(self) -> None:
+        """Saves the choices and ends every thread."""
+        if self._abx is not None:
+            self._abx.abandon()
+        self._timer.stop()
+        self._settings = self._settings.model_copy(
+            update={
+                "choices": self.session.choices,
+                "device": self.audio.device,
+                "sound": self.audio.sound,
+                "look": self.appearance.look,
+                "midi": self.instruments.midi.choices,
+                "favourites": tuple(sorted(self.presets.favourites)),
+                "window_geometry": self.window.geometry_text(),
+            }
+        )
+        try:
+            save_settings(self._settings_path, self._settings)
+        except OSError as error:
+            self.window.notices.tell(f"The settings {self._settings_path} cannot be written ({error.strerror}).")
+        self.instruments.close()
+        for panel in self.panels:
+            panel.close()
+        self.performance.close()
+        self.sound.close()
+
+    # Session → everything
+
+    def _choices_changed(self, names: frozenset[str]) -> None:
+        self.performance.choices_changed(names)
+        self._choices_shown(names)
+
+    def _choices_shown(self, names: frozenset[str]) -> None:
+        choices, window = self.session.choices, self.window
+        window.transport.show_choices(choices)
+        if "preset" in names:
+            self.presets.choice_changed()
+        window.left.show_key(choices.left_view)
+        window.right.show_key(choices.right_view)
+        for panel in self.panels:
+            panel.choices_changed(names)
+        window.show_solo(choices.solo)
+        if "volume_db" in names:
+            self.sound.set_volume_db(choices.volume_db)
+        self._wake()
+
+    def _wake(self) -> None:
+        """Something may move: pictures at full pace for a while."""
+        self._lively_until_s = time.monotonic() + LIVELY_S
+        if self._timer.interval() != FRAME_MS:
+            self._timer.setInterval(FRAME_MS)
+
+    # Sixty times a second
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
+        window, performance, status = self.window, self.performance, self.sound.status()
+        performance.tick()
+        playing, take = performance.playing, performance.take
+        window.transport.show_playing(playing)
+        self._show_level(elapsed_s)
+        self._ticks += 1
+        if now_s >= self._facts_due_s:
+            self._facts_due_s = now_s + FACTS_S
+            mix, choices = mix_of(self.session.choices), self.session.choices
+            window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
+            self.audio.show(status, performance.notes, take)
+        moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
+        of_decks = replace(moment, elapsed_s=elapsed_s + self._elapsed_before_s)
+        self._elapsed_before_s = elapsed_s
+        for panel in self.panels:
+            if panel.view.isVisible():
+                if isinstance(panel, StringPanel):
+                    panel.show_moment(moment)
+                elif panel.on_the_left == bool(self._ticks % 2):  # by turns: no picture keeps a key waiting for long
+                    panel.show_moment(of_decks)
+        if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
+            self._lively_until_s = now_s + LIVELY_S
+        wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS
+        if self._timer.interval() != wanted_ms:
+            self._timer.setInterval(wanted_ms)
+
+    def _show_level(self, elapsed_s: float) -> None:
+        mixer = self.sound.mixer
+        peak, reduction_db = mixer.take_peak(), mixer.take_reduction_db()
+        fallen_db = self._peak_db - METER_FALL_DB_PER_S * elapsed_s
+        self._peak_db = max(20 * math.log10(peak) if peak > 0 else METER_FLOOR_DB, fallen_db, METER_FLOOR_DB)
+        hidden = self._abx is not None  # a level would give away what is heard
+        self.window.transport.meter.show_level(
+            -math.inf if hidden else self._peak_db, reduction_db > 0.01 and not hidden
+        )

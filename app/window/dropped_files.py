@@ -1,0 +1,75 @@
+"""What a dropped file means: a preset becomes one of the user's own, a WAV's recipe is restored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from app.export.recipe import Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
+from app.presets.folders import user_folder
+from app.presets.install import SUFFIX, InstallError, install_preset
+from app.presets.library import Library
+from app.session.choices import DIFFERENCE_GAIN_RANGE_DB, SECONDS_RANGE
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """What follows: new choices of the session, and a line for the user."""
+
+    choices: dict[str, Any] = field(default_factory=dict)
+    notice: str = ""
+
+
+def receive(file: Path, library: Library) -> Dropped:
+    """Takes a file in. A preset is in the library afterwards; errors are notices."""
+    try:
+        if file.suffix.lower() == SUFFIX:
+            return _preset(file, library)
+        if file.suffix.lower() == ".wav":
+            return _recipe(file, library)
+    except (InstallError, RecipeError) as error:
+        return Dropped(notice=str(error))
+    return Dropped(notice=f"{file}: neither a preset ({SUFFIX}) nor an exported WAV; drop one of these")
+
+
+def _preset(file: Path, library: Library) -> Dropped:
+    installed = install_preset(file, user_folder(), [entry.path for entry in library.entries])
+    library.refresh()
+    entry = library.find(installed.name)
+    if entry is None:
+        return Dropped(notice=f"{installed.path}: cannot be used; see whether the file is still there")
+    whose = "your own" if installed.path.parent == user_folder() else "the shipped"
+    notice = f"{file.name} is {whose} preset “{entry.info.title}” already; nothing was copied."
+    return Dropped({"preset": entry.name}, notice if installed.was_there else "")
+
+
+def _recipe(file: Path, library: Library) -> Dropped:
+    recipe = read_recipe(file)
+    path, exact = preset_of(recipe, [entry.path for entry in library.entries])
+    notices = [] if exact else [changed_preset_notice(recipe)]
+    if not SECONDS_RANGE[0] <= recipe.seconds <= SECONDS_RANGE[1]:
+        notices.append(f"its duration of {recipe.seconds:g} s is not one that the window plays, and was limited")
+    notice = f"{file.name}: {'; '.join(notices)}." if notices else ""
+    return Dropped({"preset": path.stem, **restored_choices(recipe)}, notice)
+
+
+def restored_choices(recipe: Recipe) -> dict[str, Any]:
+    """Fields of `Choices` for what a recipe says, but for the preset."""
+    low, high = SECONDS_RANGE
+    found: dict[str, Any] = {
+        "position": recipe.pluck.position,
+        "amplitude_mm": recipe.pluck.amplitude_mm,
+        "shape": recipe.pluck.shape,
+        "width": recipe.pluck.width,
+        "listen": recipe.listen,
+        "seconds": min(max(recipe.seconds, low), high),
+    }
+    found |= {"a": "model", "b": "truth", "heard": "b" if recipe.source == "truth" else "a", "solo": 0}
+    if recipe.source == "difference":
+        low, high = DIFFERENCE_GAIN_RANGE_DB
+        found |= {"a": "difference", "difference_gain_db": min(max(recipe.difference_gain_db, low), high)}
+    found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
+    if recipe.listen_right is not None:
+        found["listen_right"] = recipe.listen_right
+    return found

@@ -1,0 +1,124 @@
+"""The start of the window: it is shown first, and what takes long to load follows."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if sys.platform == "win32":
+    import torch  # noqa: F401 - before Qt: the other order fails there
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QApplication
+
+from app.shared.heap import collect_between_events, return_large_blocks
+from app.views.theme import apply_theme
+from app.window.main_window import MainWindow
+from app.window.settings import Settings, load_settings, settings_file
+
+if TYPE_CHECKING:
+    from app.window.controller import Controller
+
+
+Alive = Callable[["Controller"], None]
+
+
+class _Start(QObject):
+    """Loads the engine in a thread of its own once the window is painted, then brings the window to life."""
+
+    _loaded = Signal()
+
+    def __init__(self, window: MainWindow, settings: Settings, path: Path, notice: str, alive: Alive) -> None:
+        super().__init__()
+        self._window, self._settings, self._path, self._notice = window, settings, path, notice
+        self._alive = alive
+        self._thread = threading.Thread(target=self._load, name="engine-loader")
+        self._controller: Controller | None = None
+        self.failure: Exception | None = None
+        self._loaded.connect(self._begin, Qt.ConnectionType.QueuedConnection)
+        window.first_painted.connect(self._thread.start)
+
+    def wait(self) -> None:
+        """Until nothing is being loaded any more."""
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _load(self) -> None:
+        try:
+            load_engine()
+        except Exception as error:
+            self.failure = error
+        self._loaded.emit()
+
+    def _begin(self) -> None:
+        try:
+            if self.failure is not None:
+                raise self.failure
+            from app.views.plots.plots import dress_plots
+            from app.window.controller import Controller
+
+            dress_plots()
+            self._controller = Controller(self._window, self._settings, self._path)
+            self._collector = collect_between_events()
+        except Exception as error:
+            self.failure = error
+            QApplication.quit()
+            return
+        if self._notice:
+            self._window.notices.tell(self._notice)
+        self._alive(self._controller)
+
+
+def load_engine() -> None:
+    """What the window does not need in order to be seen: two seconds, most of it for torch."""
+    threading.Thread(target=_find_devices, name="sound-finder", daemon=True).start()
+    import torch
+    from threadpoolctl import threadpool_limits
+
+    from engine.kernels.warm import warm
+
+    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
+    # NumPy's products are small here. Its BLAS would wait for the next one in a loop, a thread a core, for nothing.
+    threadpool_limits(limits=1, user_api="blas")
+    warm()
+
+
+def _find_devices() -> None:
+    """PortAudio looks for devices as it is loaded, which may take long: here it does so beside the rest."""
+    with contextlib.suppress(Exception):  # told where it is used
+        import sounddevice  # noqa: F401
+
+
+def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive = lambda controller: None) -> int:
+    """Opens the app and returns its exit status when it is closed.
+
+    Args:
+        watch: is given the window before it is shown.
+        alive: is given the controller as soon as there is one.
+    """
+    gc.disable()  # until `collect_between_events`: nothing is thrown away before
+    return_large_blocks()
+    path = settings_file()
+    settings, notice = load_settings(path)
+    if settings.look.size_percent != 100:  # Qt reads it when the application is made
+        os.environ.setdefault("QT_SCALE_FACTOR", str(settings.look.size_percent / 100))
+    application = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(application, QApplication)
+    application.setApplicationName("Learned Strings")
+    apply_theme(application, settings.look.face)
+    window = MainWindow()
+    window.restore_geometry(settings.window_geometry)
+    start = _Start(window, settings, path, notice, alive)
+    watch(window)
+    window.show()
+    status = application.exec()
+    start.wait()
+    if start.failure is not None:
+        raise start.failure
+    return status

@@ -1,0 +1,269 @@
+"""The window: its parts, where they stand, and its keys. What they do is connected in `controller`."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from PySide6.QtCore import QByteArray, QMargins, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QCloseEvent,
+    QDragEnterEvent,
+    QDropEvent,
+    QKeySequence,
+    QPaintEvent,
+    QResizeEvent,
+    QShortcut,
+    QShowEvent,
+)
+from PySide6.QtWidgets import (
+    QGraphicsView,
+    QHBoxLayout,
+    QLabel,
+    QMainWindow,
+    QSplitter,
+    QTabBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.views.controls.app_menu import AppMenu, menu_button
+from app.views.controls.deck import Deck
+from app.views.controls.focus_ring import FocusRing
+from app.views.controls.notice_bar import NoticeBar
+from app.views.controls.parts import tool_button
+from app.views.controls.preset_bar import PresetBar
+from app.views.controls.sideways import Sideways
+from app.views.controls.transport_bar import TransportBar
+from engine.kernels import cache  # and not the compiler
+
+KEYS = (  # (key, name of the signal, what it does)
+    ("Space", "play_asked", "play from the pluck, or stop"),
+    ("Return", "pluck_asked", "pluck"),
+    ("X", "switch_asked", "switch between A and B at the playhead"),
+    ("Esc", "all_modes_asked", "hear all modes again"),
+    ("Ctrl+L", "loop_asked", "loop"),
+    ("PgUp", "previous_asked", "previous preset"),
+    ("PgDown", "next_asked", "next preset"),
+    ("Ctrl+P", "browse_asked", "browse the presets"),
+    ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
+    ("Ctrl+Shift+Z", "redo_asked", "redo"),
+    ("M", "motion_asked", "show or hide the string's motion"),
+    ("E", "envelope_asked", "show or hide the envelope of the motion"),
+    ("Ctrl+E", "export_asked", "export WAV"),
+    ("Ctrl+T", "abx_asked", "listening test: can you tell model and truth apart?"),
+    ("Ctrl+,", "audio_asked", "audio settings"),
+    ("F8", "notices_asked", "notices of this run"),
+    ("Ctrl+M", "midi_asked", "MIDI"),
+    ("F1", "help_asked", "help"),
+    ("Ctrl+Q", "quit_asked", "quit"),
+)
+LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
+WIDE, HIGH = 1100, 560  # below, the window is sparing
+ROOMY = 1240  # below, the controls stand closer
+FACTS_HEIGHT = 20
+TITLE_BAR = 40  # at most; how high it is, is known too late
+
+PLAYED_KEYS = (  # see `app/keyboard.py`
+    ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
+    ("1 … 9", "how hard, from softest to loudest (not while a knob has the keyboard)"),
+    ("C   V", "softer, harder"),
+)
+
+
+class MainWindow(QMainWindow):
+    """See the module."""
+
+    play_asked = Signal()
+    pluck_asked = Signal()
+    switch_asked = Signal()
+    loop_asked = Signal()
+    all_modes_asked = Signal()
+    previous_asked = Signal()
+    next_asked = Signal()
+    undo_asked = Signal()
+    redo_asked = Signal()
+    motion_asked = Signal()
+    envelope_asked = Signal()
+    export_asked = Signal()
+    abx_asked = Signal()
+    audio_asked = Signal()
+    notices_asked = Signal()
+    midi_asked = Signal()
+    browse_asked = Signal()
+    file_dropped = Signal(str)  # a path
+    help_asked = Signal()
+    about_asked = Signal()
+    quit_asked = Signal()
+    closing = Signal()
+    first_painted = Signal()  # once, as soon as there is something to be seen
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setWindowTitle("Learned Strings")
+        self.setMinimumSize(760, 480)
+        self.resize(1280, 800)
+        self._painted = False
+        self.presets = PresetBar()
+        self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
+        self.transport = TransportBar()
+        self.notices = NoticeBar()
+        self.error_label = QLabel()
+        self.error_label.setToolTip(
+            "Model against truth for this pluck: relative mean absolute error, all of the string"
+        )
+        self._solo = tool_button("", "Hear all modes", "One mode is heard alone; click, or Esc, to hear all of them")
+        self._solo.setObjectName("solo")
+        self._solo.setVisible(False)
+        self._solo.clicked.connect(self.all_modes_asked)
+        self.rate_label = QLabel()
+        self.rate_label.setObjectName("badge")
+        self._audio_button = tool_button("Audio …", "Audio settings", "Where the sound goes, and how (Ctrl+,)")
+        self._audio_button.clicked.connect(self.audio_asked)
+        self.menu = AppMenu(self)
+        self._menu_button = menu_button(self.menu)
+        self._lay_out()
+        self.setAcceptDrops(True)
+        for key, signal, _ in KEYS:
+            shortcut = QShortcut(QKeySequence(key), self)
+            shortcut.setAutoRepeat(False)
+            shortcut.activated.connect(getattr(self, signal))
+        self.notices_asked.connect(self.notices.show_all)
+        for action, signal in self.menu.asked.items():
+            action.triggered.connect(getattr(self, signal))
+        self.quit_asked.connect(self.close)
+
+    def _lay_out(self) -> None:
+        self._brand = QLabel("LEARNED STRINGS")
+        self._brand.setObjectName("brand")
+        self._head = head = QHBoxLayout()
+        head.addWidget(self._brand)
+        head.addWidget(self.presets, 1)
+        tip = "Can you tell model and truth apart, blind? (Ctrl+T)"
+        self._test_button = test = tool_button("ABX …", "Listening test", tip)
+        test.clicked.connect(self.abx_asked)
+        for widget in (test, self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
+            head.addWidget(widget)
+        facts = QHBoxLayout()
+        facts.setSpacing(24)
+        for part in (self.presets.card, self._solo):  # one height, so that a mode alone moves nothing
+            part.setFixedHeight(FACTS_HEIGHT)
+        facts.addWidget(self.presets.card, 1)
+        facts.addWidget(self._solo)
+        facts.addWidget(self.error_label)
+        self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
+        decks.addWidget(self.left)
+        decks.addWidget(self.right)
+        decks.setSizes([560, 720])
+        self._stage = QSplitter(Qt.Orientation.Vertical)
+        self._loading = QLabel(LOADING if cache.is_whole() else COMPILING)
+        self._loading.setObjectName("faint")
+        self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._stage.addWidget(self._loading)
+        self._string: QWidget = self._loading  # until it is there
+        self._stage.addWidget(decks)
+        self._set_alive(False)
+        for splitter in (decks, self._stage):
+            splitter.setChildrenCollapsible(False)
+            splitter.setHandleWidth(8)
+        self._column = column = QVBoxLayout()
+        column.addLayout(head)
+        column.addLayout(facts)
+        column.addWidget(self.notices)
+        column.addWidget(self._stage, 1)
+        column.addWidget(Sideways(self.transport))
+        middle = QWidget()
+        middle.setLayout(column)
+        self.setCentralWidget(middle)
+        FocusRing(middle)
+
+    def show_string(self, view: QWidget) -> None:
+        """Puts the string above the decks; it has the keyboard at first. Until then the window only waits."""
+        self._loading.hide()
+        self._string = view
+        self._stage.insertWidget(0, view)
+        self._stage.setSizes([310, 0, 300])
+        self._set_alive(True)
+        view.setFocus()
+
+    def order_tabs(self) -> None:
+        """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""
+        header = (self.presets, self.notices.bell, self._audio_button, self._menu_button)
+        chain: list[QWidget] = []
+        for part in (*header, self.notices, self._string, self.left, self.right, self.transport):
+            inside = [part, *part.findChildren(QWidget)]
+            stops = [
+                widget
+                for widget in inside
+                if widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+                and widget.focusProxy() is None
+                and widget.window() is self  # a list's pop-up is not
+            ]
+            chain += sorted(stops, key=lambda widget: not isinstance(widget, QTabBar))  # a deck's names come first
+        for before, after in pairwise(chain):
+            QWidget.setTabOrder(before, after)
+
+    def _set_alive(self, alive: bool) -> None:
+        for part in (self.presets, self.transport, self._test_button, self._audio_button, self._menu_button):
+            part.setEnabled(alive)
+        self._decks.setVisible(alive)
+        self.rate_label.setVisible(alive)
+
+    def show_solo(self, mode: int) -> None:
+        """Which mode is heard alone; 0: all are heard."""
+        self._solo.setText(f"Mode {mode} alone  ✕")
+        self._solo.setVisible(mode > 0)
+
+    def geometry_text(self) -> str:
+        """Size and place, for `restore_geometry`."""
+        return bytes(self.saveGeometry().toBase64().data()).decode("ascii")
+
+    def restore_geometry(self, text: str) -> None:
+        """Opens where it was closed; in any case no larger than the screen is now."""
+        if text:
+            self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
+        if not self.isMaximized() and not self.isFullScreen():
+            room = self.screen().availableSize()
+            self.resize(self.size().boundedTo(room.shrunkBy(QMargins(0, TITLE_BAR, 0, 0))))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """A small window spends its room on what is to be seen and turned."""
+        super().resizeEvent(event)
+        self._brand.setVisible(self.width() >= WIDE)
+        narrow, low = self.width() < ROOMY, self.height() < HIGH
+        self.transport.set_compact(narrow)
+        self._head.setSpacing(6 if narrow else 10)
+        aside, above = 8 if narrow else 14, 6 if low else 12
+        self._column.setContentsMargins(aside, above, aside, above)
+        self._column.setSpacing(6 if low else 10)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if not self._painted:
+            self._painted = True
+            QTimer.singleShot(0, self.first_painted.emit)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        for plot in self.findChildren(QGraphicsView):
+            for part in (plot, plot.viewport()):
+                part.setAcceptDrops(False)  # it would keep dropped files from the window
+        super().showEvent(event)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if any(url.isLocalFile() for url in event.mimeData().urls()):
+            _copy(event)
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        _copy(event)
+        for url in event.mimeData().urls():
+            if url.isLocalFile():
+                self.file_dropped.emit(url.toLocalFile())
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.closing.emit()
+        super().closeEvent(event)
+
+
+def _copy(event: QDropEvent) -> None:
+    """Never a move, after which a file manager would delete the user's file."""
+    event.setDropAction(Qt.DropAction.CopyAction)
+    event.accept()

@@ -1,0 +1,134 @@
+"""MIDI in the window: the input's messages become what the string does, and the dialog what is remembered.
+
+Messages come in mido's thread. Notes are played there, without the window; controllers reach the window's thread
+through a queued signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QWidget
+
+from app.playing.keyboard import Reach
+from app.playing.midi import TURNED, Control, Message, MidiChoices, Note, meaning_of
+from app.playing.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
+from app.views.dialogs.midi_dialog import MidiDialog
+
+
+class MidiControl(QObject):
+    """`performed` asks for new values of `Choices`; `told` is for the user.
+
+    Args:
+        play: plucks with new values of `Choices`; called in mido's thread.
+
+    Attributes:
+        choices: what is to be remembered.
+    """
+
+    performed = Signal(dict)
+    told = Signal(str)
+    _received = Signal(object)  # emitted in mido's thread
+
+    def __init__(
+        self,
+        choices: MidiChoices,
+        reach: Callable[[], Reach],
+        presets: Callable[[], list[str]],
+        play: Callable[[dict[str, Any]], None],
+        parent: QObject | None = None,
+        load: Callable[[], Backend] = load_backend,
+    ) -> None:
+        super().__init__(parent)
+        self.choices = choices
+        self._reach = reach
+        self._presets = presets
+        self._play = play
+        self._learning: str | None = None  # the field that the next controller is taught
+        self._dialog: MidiDialog | None = None
+        self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
+        self.input = MidiInput(self._receive, load)
+
+    def start(self) -> None:
+        """Opens the remembered input, if any; says why it cannot."""
+        if self.choices.port:
+            try:
+                self.input.open(self.choices.port)
+            except MidiUnavailable as error:
+                self.told.emit(str(error))
+
+    def close(self) -> None:
+        self.input.close()
+
+    # The dialog
+
+    def show_dialog(self, window: QWidget) -> None:
+        """Opens it beside the window, which can be played on; or brings it to the front."""
+        if self._dialog is None:
+            dialog = self._dialog = MidiDialog({field: turned.label for field, turned in TURNED.items()}, window)
+            dialog.port_chosen.connect(self._choose_port)
+            dialog.notes_chosen.connect(lambda mode: self._remember(self.choices.model_copy(update={"notes": mode})))
+            dialog.learn_asked.connect(self._learn)
+            dialog.forget_asked.connect(lambda field: self._remember(self.choices.forgotten(field)))
+            dialog.finished.connect(lambda _: self._learn(""))
+        self._show_inputs()
+        self._show_choices()
+        self._dialog.show()
+        self._dialog.raise_()
+
+    def _show_inputs(self) -> None:
+        assert self._dialog is not None
+        try:
+            self._dialog.show_inputs(self.input.names(), self.input.name, "")
+            self._dialog.set_learnable("")
+        except MidiUnavailable as error:
+            self._dialog.show_inputs([], "", str(error))
+            self._dialog.set_learnable(str(error))
+
+    def _show_choices(self) -> None:
+        if self._dialog is not None:
+            controllers = {str(field): number for field, number in self.choices.controllers.items()}
+            self._dialog.show_choices(self.choices.notes, controllers, self._learning)
+
+    def _choose_port(self, name: str) -> None:
+        assert self._dialog is not None
+        problem = ""
+        try:
+            if name:
+                self.input.open(name)
+            else:
+                self.input.close()
+        except MidiUnavailable as error:
+            problem = str(error)
+        self._remember(self.choices.model_copy(update={"port": self.input.name}))
+        if problem:
+            self._dialog.show_problem(problem)
+
+    def _learn(self, field: str) -> None:
+        """The next controller that moves is taught `field`; "", or the same again: none."""
+        self._learning = field if field and field != self._learning else None
+        self._show_choices()
+
+    def _remember(self, choices: MidiChoices) -> None:
+        self.choices = choices
+        self._show_choices()
+
+    # Messages
+
+    def _receive(self, message: Message) -> None:
+        """In mido's thread. A note is played at once; all else waits for the window."""
+        if isinstance(message, Note):
+            meaning = meaning_of(message, self.choices, self._reach(), self._presets())
+            self._play(meaning.changes)
+        else:
+            self._received.emit(message)
+
+    def _answer(self, message: Message) -> None:
+        if self._learning is not None and isinstance(message, Control):
+            field, self._learning = self._learning, None
+            self._remember(self.choices.learned(field, message.controller))
+        meaning = meaning_of(message, self.choices, self._reach(), self._presets())
+        if meaning.changes:
+            self.performed.emit(meaning.changes)

@@ -1,0 +1,122 @@
+"""The error of the chosen preset over all plucks of the chosen shape, computed while nothing else needs the time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.analysis.error_plane import ErrorPlane, PlanePicture
+from app.analysis.job import Job
+from app.presets.digest import preset_digest
+from app.presets.library import Library
+from app.rendering import Take
+from app.session.choices import Session
+from app.views.plots.error_plane_view import ErrorPlaneView
+from app.window.panels._background import Background
+from app.window.panels.base import Moment, Panel
+from engine.pluck import Pluck
+from engine.preset import load_preset
+
+MM = 1000.0
+SETTLED_S = 0.3  # a width that is still being turned is not computed
+MOST_KEPT = 64  # planes of some 13 KB
+
+
+class ErrorPlanePanel(Panel):
+    key = "error_plane"
+    title = "Error map"
+    help = (
+        "The model's error as trained, which is the first figure in the header, over pluck position and amplitude, "
+        "computed in the background. A click plucks there."
+    )
+    view: ErrorPlaneView
+
+    def __init__(self, session: Session, library: Library) -> None:
+        super().__init__(session, library)
+        self.view = ErrorPlaneView()
+        self.view.pluck_chosen.connect(self._audition)
+        self._asked: tuple[object, ...] = ()
+        self._unchanged_s = 0.0
+        self._moved = False  # the pluck's mark is of choices that have changed since
+        self._planes = _Planes()
+        self._background = Background("error-map", self)
+        self._background.progressed.connect(self._progressed)
+        self._background.finished.connect(self._finished)
+        self._background.failed.connect(self._failed)
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        entry = self.library.find(self.session.choices.preset)
+        self._moved |= bool(names & {"position", "amplitude_mm"})
+        if "preset" in names and entry is not None:
+            trained = entry.info.trained_range
+            self.view.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
+        if names & {"preset", "shape", "width"} and self._wanted() != self._asked:
+            self._background.cancel()
+            self._asked = ()
+            self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
+            self.view.show_picture(None)
+            self.view.progress.show_share(None)
+            self.view.set_words("")
+
+    def take_started(self, take: Take) -> None:
+        self._background.give_way_to(take)
+
+    def show_moment(self, moment: Moment) -> None:
+        self._background.look()
+        self._unchanged_s += moment.elapsed_s
+        if self._moved:
+            self.view.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)
+            self._moved = False
+        entry = self.library.find(self.session.choices.preset)
+        if entry is None or self._asked == self._wanted() or self._unchanged_s < SETTLED_S:
+            return
+        self._asked = self._wanted()
+        path, pluck = entry.path, self.session.choices.pluck
+        self.view.progress.show_share(0.0)
+        self.view.set_words("The model's error for every pluck: computing …")
+        self._background.start(lambda job: self._planes.compute(path, pluck, job))
+
+    def close(self) -> None:
+        self._background.close()
+
+    def _wanted(self) -> tuple[object, ...]:
+        return (self.session.choices.preset, *_form(self.session.choices.pluck))
+
+    def _progressed(self, share: float, picture: PlanePicture | None) -> None:
+        self.view.progress.show_share(share)
+        if picture is not None:
+            self.view.show_picture(picture)
+
+    def _finished(self, picture: PlanePicture) -> None:
+        self.view.progress.show_share(None)
+        self.view.show_picture(picture)
+        self.view.set_words("Error as trained, for every pluck of this shape; click to hear one")
+
+    def _failed(self, message: str, details: str) -> None:
+        self.view.progress.show_share(None)
+        self.view.set_words("There is no map of this preset")
+        self.told.emit(message, details)
+
+    def _audition(self, position: float, amplitude_mm: float) -> None:
+        self.session.move_pluck(round(position, 3), round(amplitude_mm, 2))
+        self.pluck_asked.emit()
+
+
+class _Planes:
+    """The planes so far, by what is in the preset's file and the form of the pluck. Used by one thread."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], ErrorPlane] = {}
+
+    def compute(self, path: Path, pluck: Pluck, job: Job) -> PlanePicture:
+        preset = load_preset(path)
+        key = (preset_digest(path), *_form(pluck))
+        plane = self._known.pop(key, None) or ErrorPlane()
+        self._known[key] = plane  # the latest last
+        for oldest in list(self._known)[:-MOST_KEPT]:
+            del self._known[oldest]
+        return plane.compute(preset, pluck, job)
+
+
+def _form(pluck: Pluck) -> tuple[object, ...]:
+    """What a plane belongs to beside its preset: shape and width, where there is one."""
+    return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)

@@ -1,0 +1,163 @@
+"""The string in motion, the pluck that is being drawn, and why a pluck may be silent or beyond the training."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from app.analysis.heard import HeardMotion
+from app.analysis.strobe import Envelope, Strobe, frame_at
+from app.presets.library import Library
+from app.presets.words import shape_word
+from app.rendering import Take
+from app.session.choices import Choices, Session
+from app.session.shown import LEGEND_FIELDS, shown_sources
+from app.session.silence import why_difference_silent, why_silent
+from app.shared.vocabulary import DIFFERENCE
+from app.views.string.ground import TrainedPlucks
+from app.views.string.ink import ShownPluck
+from app.views.string.view import StringView
+from app.window.panels.base import Moment, Panel
+from engine.metrics import ErrorSums
+from engine.pluck import SHAPES, WIDTH_RANGE
+from engine.preset import PresetInfo, outside_training
+
+MM = 1000.0
+WIDTH_STEP = 1.05  # of a wheel notch
+SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
+PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset"}
+HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
+WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
+
+
+class StringPanel(Panel):
+    key = "string"
+    title = "String"
+    help = (
+        "The string seen from the side: what slots A and B hold in motion, slowed as by a stroboscope, or the pluck "
+        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Hatched parts lie "
+        "outside the training."
+    )
+    view: StringView
+
+    def __init__(self, session: Session, library: Library) -> None:
+        super().__init__(session, library)
+        self.view = StringView()
+        self.view.pluck_drawn.connect(session.move_pluck)
+        self.view.pluck_released.connect(self.pluck_asked)
+        self.view.pluck_reset.connect(self._reset_pluck)
+        self.view.width_stepped.connect(self._step_width)
+        self.view.shape_stepped.connect(self._step_shape)
+        self.view.listening_point_moved.connect(self._move_listening_point)
+        self.view.listening_point_reset.connect(self._reset_listening_point)
+        self.view.motion_toggled.connect(lambda on: session.update(motion=on))
+        self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
+        self._strobe = Strobe()
+        self._envelope: Envelope | None = None
+        self._standing: tuple[object, ...] = ()
+        self._shown: tuple[object, ...] = ()
+        self._take: Take | None = None  # the complete one of this pluck
+
+    @property
+    def drawing(self) -> bool:
+        """Whether the string is held in the hand and not yet let go."""
+        return self.view.is_dragging_pluck
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        choices = self.session.choices
+        if names & PLUCK_FIELDS:
+            self._take = None
+        if names & WARNING_FIELDS:
+            self._show_pluck()
+        if names & LEGEND_FIELDS:
+            self.view.set_sources(shown_sources(choices, self.library))
+            self._shown = ()
+        if names & {"motion", "envelope"}:
+            self.view.set_shown(choices.motion, choices.envelope)
+
+    def take_started(self, take: Take) -> None:
+        self._strobe.restart()
+        self._envelope = Envelope()
+        self._standing = ()
+
+    def take_finished(self, take: Take, errors: ErrorSums) -> None:
+        self._take = take
+        self.view.set_warning(self._pluck_warning())
+
+    def show_moment(self, moment: Moment) -> None:
+        take, position_s, choices = moment.take, moment.position_s, self.session.choices
+        standing = moment.standing(choices)
+        if not moment.playing and standing == self._standing:
+            return
+        self._standing = standing
+        if not choices.motion or take is None or not (moment.playing or position_s > 0):
+            self.view.show_frame(None)
+            self._shown = ()
+            return
+        motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        there = [motion for motion in motions if motion.there]
+        # the sound may be ahead of the motion, and one motion ahead of another: all are of one moment
+        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
+        shown = (take, position_s, len(there), choices.speed, choices.envelope, choices.solo)
+        if not moment.playing and shown == self._shown:
+            return
+        self._shown = shown
+        self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, choices.speed, take.fundamental_hz)
+        shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
+        envelope = self._envelope if choices.envelope else None
+        frame = frame_at(take, motions, position_s, shown_s, choices.speed, envelope)
+        if choices.solo:
+            frame = replace(frame, caption=f"all modes, though mode {choices.solo} is heard alone   {frame.caption}")
+        self.view.show_frame(frame)
+
+    def _show_pluck(self) -> None:
+        choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
+        shape_mm = choices.pluck.displacement(SHAPE_POINTS).numpy() * MM
+        view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
+        view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
+        view.set_trained(_trained(entry.info) if entry else TrainedPlucks())
+        view.set_warning(self._pluck_warning())
+
+    def _pluck_warning(self) -> str:
+        choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
+        silent = why_silent(choices, self.library)
+        if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
+            silent = why_difference_silent(choices, self._take)
+        if silent:
+            return silent
+        return "; ".join(outside_training(entry.info, choices.pluck)) if entry else ""
+
+    # Gestures
+
+    def _reset_pluck(self) -> None:
+        default = Choices()
+        self.session.update(position=default.position, amplitude_mm=default.amplitude_mm, width=default.width)
+        self.pluck_asked.emit()
+
+    def _step_width(self, notches: float) -> None:
+        choices = self.session.choices
+        if choices.shape != "triangular":  # it has no width
+            width = choices.width * WIDTH_STEP**notches
+            self.session.update(width=min(max(width, WIDTH_RANGE[0]), WIDTH_RANGE[1]))
+
+    def _step_shape(self, steps: int) -> None:
+        here = SHAPES.index(self.session.choices.shape)
+        self.session.update(shape=SHAPES[(here + steps) % len(SHAPES)])
+
+    def _move_listening_point(self, side: str, position: float) -> None:
+        if side == "right":
+            self.session.update(listen_right=min(max(position, 0.0), 1.0))
+        else:
+            self.session.move_listening_point(position)
+
+    def _reset_listening_point(self, side: str) -> None:
+        self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)
+
+
+def _label(choices: Choices) -> str:
+    words = shape_word(choices.shape)
+    return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
+
+
+def _trained(info: PresetInfo) -> TrainedPlucks:
+    low_m, high_m = info.trained_range.peak_m
+    return TrainedPlucks(info.trained_range.position, (MM * low_m, MM * high_m))

@@ -1,0 +1,323 @@
+"""The pluck that is played and the pluck that is shown.
+
+A gesture strikes a note, which sounds at once; the picture follows: the render worker makes the motion of the same
+pluck, and the views show it at the note's own time. Everything here runs in the window's thread, but for `strike`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject
+
+from app.audio.sound import Sound
+from app.playing.chosen import mix_of, render_request, stroke_of
+from app.playing.keyboard import PLACES, Reach
+from app.playing.notes import Note, Notes
+from app.playing.sources import Sources
+from app.playing.stroke import Stroke
+from app.presets.library import Library, PresetEntry
+from app.presets.words import percent
+from app.rendering import RenderRequest, RenderWorker, Take
+from app.session.choices import Choices, Session
+from app.session.ears import heard_ear
+from app.session.silence import why_ran_away
+from app.window.main_window import MainWindow
+from app.window.panels import Panel
+from app.window.render_signals import RenderMail
+from engine.metrics import ErrorSums
+from engine.pluck import Pluck
+
+MotionKey = tuple[str, Pluck, int]  # the preset's name, the pluck, the number of frames
+LOOP_AHEAD_S = 0.5  # the next turn of a loop is handed over so long before it begins
+EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
+KEY_FIELDS = {"preset", "amplitude_mm", "shape", "width"}  # what the keys' plucks depend on beside their places
+MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
+
+
+def motion_key(take: Take) -> MotionKey:
+    """What tells the motion of a take from others."""
+    return take.preset_name, take.pluck, take.frames
+
+
+@dataclass
+class _Shown:
+    """What the views show: a motion, and the note that says how far it is; None: it stands at `parked_s`."""
+
+    take: Take | None = None
+    note: Note | None = None
+    parked_s: float = 0.0
+
+
+class Performance(QObject):
+    """See the module. `notes` may be told from any thread."""
+
+    def __init__(
+        self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
+    ) -> None:
+        super().__init__(window)
+        self._window, self._session, self._library, self._sound = window, session, library, sound
+        self._panels = panels
+        self._asked: RenderRequest | None = None
+        self._shown = _Shown()
+        self._latest: Note | None = None  # struck last
+        self._next_turn: Note | None = None  # of the loop, handed over and waiting for its frame
+        self._waiting_words = self._error_words = ""
+        mail = self._mail = RenderMail()
+        mail.started.connect(self._take_started)
+        mail.finished.connect(self._take_finished)
+        mail.other_refused.connect(self._other_refused)
+        mail.failed.connect(self._render_failed)
+        mail.refused.connect(self._window.notices.tell)
+        self._sources = Sources()
+        self.notes = Notes(sound, self._sources, mail.refused.emit)
+        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
+
+    @property
+    def entry(self) -> PresetEntry | None:
+        """The chosen preset."""
+        return self._library.find(self._session.choices.preset)
+
+    @property
+    def take(self) -> Take | None:
+        """The motion that is shown."""
+        return self._shown.take
+
+    @property
+    def ready(self) -> bool:
+        """Whether what is shown is what was chosen."""
+        return self.take is not None and motion_key(self.take) == self._key(self._session.choices)
+
+    @property
+    def at_hand(self) -> bool:
+        """Whether a pluck of what is chosen would sound at once: its sources are loaded, and the output is open."""
+        stroke = self._stroke()
+        return stroke is not None and self._sound.status().changes_done > 0 and self.notes.have(stroke)
+
+    @property
+    def playing(self) -> bool:
+        """Whether anything rings that has not been told to end."""
+        return self.notes.ringing > 0
+
+    @property
+    def position_s(self) -> float:
+        """Of what is shown: how far what is heard of it is now."""
+        shown = self._shown
+        if shown.take is None:
+            return 0.0
+        heard_s = shown.parked_s
+        if shown.note is not None:
+            heard_s = shown.note.seconds - self._sound.mixer.output_latency_s
+        return min(max(heard_s, 0.0), shown.take.seconds)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the playhead moves."""
+        note, take = self._shown.note, self._shown.take
+        return note is not None and take is not None and not note.over and note.seconds < take.seconds
+
+    @property
+    def settled(self) -> bool:
+        """Whether the motion that is shown is whole, so that views may rest."""
+        return self.take is None or self.take.complete
+
+    @property
+    def match(self) -> Mapping[str, float] | None:
+        """The gains that bring the sources of the latest note to one level, once they are known."""
+        return None if self._latest is None else self._latest.match
+
+    # Intents
+
+    def strike(self, choices: Choices) -> Note | None:
+        """Lets the string go as `choices` say, beside those that ring. From any thread; the picture is told later."""
+        entry = self._library.find(choices.preset)
+        if entry is None or entry.unplayable:
+            return None
+        note = self.notes.strike(stroke_of(choices, entry.path, self._library))
+        self._latest = note
+        return note
+
+    def pluck(self) -> None:
+        """Lets the string go as it is chosen."""
+        self.strike(self._session.choices)
+        self.follow()
+
+    def follow(self) -> None:
+        """Shows the latest note while it rings, where its motion is there; otherwise when it comes."""
+        latest = self._latest
+        if latest is None or latest is self._shown.note or latest.released or latest.over:
+            return
+        if self.ready and self._is_of(latest, self._session.choices):
+            self._forget_turn()
+            self._shown.note, self._shown.parked_s = latest, latest.from_s
+
+    def play_or_stop(self) -> None:
+        if self.playing:
+            self.stop()
+        else:
+            self.pluck()
+
+    def stop(self) -> None:
+        """Everything fades out; the playhead stays."""
+        self._forget_turn()
+        self._shown.parked_s = self.position_s
+        self._shown.note = None
+        self.notes.stop()
+
+    def seek(self, position_s: float) -> None:
+        """Moves the playhead; what rings goes on from there alone."""
+        if self.take is None:
+            return
+        position_s = min(max(position_s, 0.0), self.take.seconds)
+        self._forget_turn()
+        self._shown.note, self._shown.parked_s = None, position_s
+        if self.playing and (stroke := self._stroke()) is not None:
+            self._latest = self._shown.note = self.notes.strike(stroke, from_s=position_s, alone=True)
+
+    def render(self) -> None:
+        """Asks for the motion of what is chosen."""
+        entry = self.entry
+        self._asked = None if entry is None else render_request(self._session.choices, entry.path, self._library)
+        if self._asked is None:
+            self._window.notices.tell("No preset was found: train one, or get the presets again.")
+            return
+        self.notes.prepare(self._asked.preset, *self._asked.others)
+        self._worker.submit(self._asked)
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        """Tells the notes what concerns them, and asks for another motion where another is chosen."""
+        choices, entry = self._session.choices, self.entry
+        if names & MIX_FIELDS:
+            self.notes.set_mix(mix_of(choices))
+        if names & EAR_FIELDS:
+            self.notes.listen(heard_ear(choices))
+        if names & KEY_FIELDS and entry is not None:
+            reach = Reach.of(entry.info)
+            places = (reach.place(number / (PLACES - 1)) for number in range(PLACES))
+            plucks = [replace(choices.pluck, position=place) for place in places]
+            self.notes.prepare_plucks(entry.path, plucks)
+        if "loop" in names and not choices.loop:
+            self._forget_turn()
+        if entry is not None and render_request(choices, entry.path, self._library) != self._asked:
+            self.render()
+        self.follow()
+
+    def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
+        """Model and truth of a pluck as they are heard, (frames, channels), in the background."""
+        entry = self._library.find(choices.preset)
+        assert entry is not None
+        stroke = replace(stroke_of(choices, entry.path, self._library), sources=("model", "truth"))
+        return self.notes.render(stroke, rate_hz, choices.seconds)
+
+    def close(self) -> None:
+        """Ends the threads; may be called again."""
+        self.notes.stop()
+        self._worker.close()
+        self.notes.close()
+
+    # Sixty times a second
+
+    def tick(self) -> None:
+        self.notes.poll()
+        if self._session.choices.loop:
+            self._turn()
+        waits = self._waiting()
+        if waits != self._waiting_words:
+            self._waiting_words = waits
+            self._show_words()
+
+    def _waiting(self) -> str:
+        """Of a model that is rendered before it is heard."""
+        latest = self._latest
+        if latest is None or not latest.waits_s:
+            return ""
+        entry = self._library.find(latest.stroke.preset.stem)
+        name = entry.info.model.upper() if entry else "model"
+        return f"{name}: sounds in {latest.waits_s:.1f} s"
+
+    def _turn(self) -> None:
+        """Hands over the next turn of the loop in time."""
+        note, take, turn = self._shown.note, self._shown.take, self._next_turn
+        if note is None or take is None or not note.began:
+            return
+        if turn is not None:
+            if turn.began and not turn.cut:
+                self._latest = self._shown.note = turn
+            if turn.began:  # or its mixer has gone: there will be another
+                self._next_turn = None
+            return
+        if note.cut or note.released or (stroke := self._stroke()) is None:
+            return
+        frame, mixer = note.frame_at(take.seconds), self._sound.mixer
+        if frame > (mixer.seconds + LOOP_AHEAD_S) * mixer.rate_hz:
+            return
+        note.release_at(frame)
+        self._next_turn = self.notes.strike(stroke, begin_frame=frame)
+
+    def _forget_turn(self) -> None:
+        turn, self._next_turn = self._next_turn, None
+        if turn is not None:
+            turn.release(0.0)
+            if self._shown.note is not None:
+                self._shown.note.release_at(0)
+
+    # What the worker says
+
+    def _take_started(self, take: Take) -> None:
+        if motion_key(take) != self._key(self._session.choices):  # overtaken by the next one
+            return
+        self._shown = _Shown(take)
+        for panel in self._panels:
+            panel.take_started(take)
+        self.follow()
+        self._tell("rendering …")
+
+    def _take_finished(self, take: Take, errors: ErrorSums) -> None:
+        if take is not self.take:
+            return
+        for panel in self._panels:
+            panel.take_finished(take, errors)
+        if reason := why_ran_away(take):
+            self._window.notices.tell(reason)
+        windows = errors.windows(
+            take.info.rate_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s))
+        )
+        parts = [
+            f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, ("as trained", "past it"), strict=False)
+        ]
+        self._tell("error of this pluck: " + ", ".join(parts))
+
+    def _other_refused(self, preset: str, message: str) -> None:
+        self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
+
+    def _render_failed(self, message: str, detail: str) -> None:
+        self._tell("")
+        self._window.notices.tell(message, detail)
+
+    # Helpers
+
+    def _tell(self, words: str) -> None:
+        self._error_words = words
+        self._show_words()
+
+    def _show_words(self) -> None:
+        """Of a model that one waits for rather than of its error."""
+        self._window.error_label.setText(self._waiting_words or self._error_words)
+
+    def _stroke(self) -> Stroke | None:
+        entry = self.entry
+        return None if entry is None else stroke_of(self._session.choices, entry.path, self._library)
+
+    def _is_of(self, note: Note, choices: Choices) -> bool:
+        entry = self._library.find(choices.preset)
+        return entry is not None and (note.stroke.preset, note.stroke.pluck) == (entry.path, choices.pluck)
+
+    def _key(self, choices: Choices) -> MotionKey | None:
+        entry = self._library.find(choices.preset)
+        if entry is None:
+            return None
+        return entry.name, choices.pluck, round(choices.seconds * entry.info.rate_hz) + 1

@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import pytest
+
+from app.analysis.abx.record import AbxRecord, HeardPluck, HeardSource, HeardThrough, make_record
+from app.analysis.abx.trials import Run
+
+
+def finished(planned: int, right: int, answered: int | None = None) -> Run:
+    """A run in which the first `right` answers are right."""
+    run = Run(seed=5, planned=planned)
+    for place in range(planned if answered is None else answered):
+        x = run.heard_as("X")
+        other = "B" if x == "A" else "A"
+        run = run.auditioned("A").auditioned("X").answered(x if place < right else other, 2.25)
+    return run
+
+
+def record_of(run: Run, remark: str = "") -> AbxRecord:
+    a, b = (
+        HeardSource(label=label, preset="nylon", preset_sha256="0f" * 32, gain_db=gain_db)
+        for label, gain_db in (("Model", -0.5), ("Truth", 0.0))
+    )
+    pluck = HeardPluck(position=0.35, amplitude_mm=4, shape="gaussian", width=0.06, listen=0.37, seconds=2)
+    through = HeardThrough(
+        device="Headphones", host_api="ALSA", rate_hz=48_000, volume_db=-3, restart_at_switch=False
+    )
+    return make_record(run, a, b, pluck, through, remark)
+
+
+@pytest.fixture
+def record() -> AbxRecord:
+    """9 right of 10."""
+    return record_of(finished(10, 9))
+
+
+@pytest.fixture
+def stopped() -> AbxRecord:
+    """Stopped after 4 of 10."""
+    return record_of(finished(10, 3, answered=4))

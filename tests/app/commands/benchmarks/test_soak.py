@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import warnings
+from collections import Counter
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from PySide6.QtCore import qWarning
+
+from app.commands.benchmarks.random_changes import Repertoire, random_change
+from app.commands.benchmarks.soak import PROGRAMS, _holes, collected_faults
+from app.session.choices import Choices, Session
+
+REPERTOIRE = Repertoire(("first", "second"), ("spectrum", "partials"), ("waveform", "compare"))
+
+
+RUN = """
+import sys
+from pathlib import Path
+import app.commands.benchmarks.soak, app.commands.cli, app.presets.library
+app.presets.library.SHIPPED = Path(sys.argv[1])
+app.commands.benchmarks.soak.EVERY_S = 0.1
+app.commands.benchmarks.soak.REST_S = 0.2
+sys.exit(app.commands.cli.main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.skipif(any(shutil.which(name) is None for name in PROGRAMS), reason="no PulseAudio")
+@pytest.mark.parametrize("how", [(), ("--playing",)])
+def test_a_short_soak_plays_into_the_private_card_and_reports(
+    small_preset: Path, tmp_path: Path, how: tuple[str, ...]
+) -> None:
+    """In a process of its own, where PortAudio has not been loaded yet."""
+    (tmp_path / "presets").mkdir()
+    for name in ("first", "second"):
+        shutil.copy(small_preset, tmp_path / "presets" / f"{name}.safetensors")
+    words = ["bench", "soak", "--minutes", "0.03", "--seed", "3", "--json", *how]
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(tmp_path / "presets"), *words],
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    if "libasound2-plugins" in done.stderr:
+        pytest.skip("ALSA does not play into PulseAudio here")
+    assert done.returncode == 0, done.stderr + done.stdout
+    found = json.loads(done.stdout)
+    assert found["faults"] == []
+    assert found["threads_left"] == []
+    assert found["plucks"] > 2
+    assert found["end_mib"] > 0
+    assert found["drift_mib"] >= 0
+    assert found["seed"] == 3
+    assert found["holes"]["seconds"] > 1.0  # it was recorded
+    assert found["holes"]["heard"] == len(found["holes"]["heard_at_s"])
+
+
+def test_the_recording_is_judged_by_who_played(tmp_path: Path) -> None:
+    sound = np.sin(np.arange(48_000) * 0.05).astype(np.float32)
+    sound[10_000:10_480] = 0
+    sound[20_000:20_960] = 0
+    sound[19_000:20_000] *= np.linspace(1, 0, 1000, dtype=np.float32)
+    sound[20_960:21_960] *= np.linspace(0, 1, 1000, dtype=np.float32)
+    (tmp_path / "recording").write_bytes(sound.tobytes())
+    told = Counter({"device": 1})
+    playing, restless = (_holes(tmp_path / "recording", playing, told) for playing in (True, False))
+    assert (playing.heard, restless.heard) == (2, 1)
+    assert restless.heard_ms == pytest.approx(10, abs=0.1)
+    assert playing.longest_ms == pytest.approx(20, abs=0.1)
+    assert restless.a_minute == 60
+    assert restless.told == {"device": 1}
+
+
+def test_random_changes_are_allowed_and_touch_everything() -> None:
+    random, session = Random(1), Session()
+    touched: set[str] = set()
+    session.changed.connect(lambda names: touched.update(names))
+    for _ in range(500):
+        session.update(**random_change(random, session.choices, REPERTOIRE))
+    assert touched == set(Choices.model_fields)
+
+
+def test_the_same_seed_changes_the_same() -> None:
+    def some(seed: int) -> list[object]:
+        random = Random(seed)
+        return [random_change(random, Choices(), REPERTOIRE) for _ in range(20)]
+
+    assert some(5) == some(5)
+    assert some(5) != some(6)
+
+
+def test_faults_are_collected_once_each_with_their_number() -> None:
+    def fail() -> None:
+        raise ArithmeticError("a slip")
+
+    with collected_faults() as faults:
+        for _ in range(2):
+            thread = threading.Thread(target=fail)
+            thread.start()
+            thread.join()
+        qWarning("odd")
+        warnings.warn("careful", stacklevel=1)
+    told = sorted(faults.items(), key=lambda fault: -fault[1])
+    assert told[0][1] == 2
+    assert "ArithmeticError: a slip" in told[0][0]
+    assert any(text == "Qt: odd" for text in faults)
+    assert any("careful" in text for text in faults)

@@ -1,0 +1,273 @@
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+import torch
+
+from app.export import files as export
+from app.export import sound
+from app.export.files import (
+    ExportCancelled,
+    ExportError,
+    SoundRequest,
+    Source,
+    WavSettings,
+    default_file_name,
+    export_sound,
+    export_sounds,
+    render_sound,
+    write_wav,
+)
+from app.export.recipe import Recipe
+from app.export.wav_chunks import Marker, read_markers
+from app.playing.ahead import AheadVoice
+from engine.pluck import FULL_SCALE_M_S, Pluck
+from engine.preset import SHIPPED, load_preset
+from engine.sine_transform import listening_weights
+from engine.sources import FULL_SCALE_M, ModelSource, TruthSource, project
+from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program
+from engine.voices.voice import ATTACK_S
+
+PLAIN = WavSettings("32f", fade_out_s=0)
+
+
+@pytest.fixture
+def request_(small_preset: Path) -> SoundRequest:
+    return SoundRequest(load_preset(small_preset), Pluck(0.35, 4.0), listen=0.37, seconds=0.2)
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
+    request_: SoundRequest, kind: Source
+) -> None:
+    preset = request_.preset
+    source = ModelSource(preset) if kind == "model" else TruthSource(preset.info)
+    start_m = project(request_.pluck.displacement(101), 10)
+    frames, _ = source.advance(source.start(start_m[None]), 799)
+    whole_m = torch.cat([start_m[None], frames[0].double()]) @ listening_weights(torch.tensor([0.37]), 101)[:, 0]
+    found = render_sound(replace(request_, source=kind))
+    assert len(found) == 800
+    attack = round(ATTACK_S * preset.info.rate_hz)
+    assert found[attack:] == pytest.approx(whole_m.numpy()[attack:] / FULL_SCALE_M, abs=2e-5)
+    assert (np.abs(found[:attack]) < np.abs(whole_m.numpy()[:attack]) / FULL_SCALE_M).all()
+
+
+COMPILED = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+
+
+@pytest.mark.parametrize(("preset", "kind"), [("compiled", "model"), ("compiled", "truth"), ("small", "model")])
+def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
+    request_: SoundRequest, preset: str, kind: Source, tmp_path: Path
+) -> None:
+    asked = replace(request_, source=kind)
+    if preset == "compiled":
+        asked = replace(asked, preset=load_preset(COMPILED))
+    model, info = asked.preset.model, asked.preset.info
+    export_sound(asked, tmp_path / "a.wav", WavSettings("32f", 48_000, fade_out_s=0))
+    exported, _ = soundfile.read(tmp_path / "a.wav", dtype="float32")
+    program = truth_program(info, 48_000) if kind == "truth" else model_program(model, info, 48_000)
+    assert program.rendered == (preset == "small")
+    initial_m, ear = project(asked.pluck.displacement(101), info.modes), Ear((0.37,))
+    voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
+    if program.rendered:
+        source = ModelSource(asked.preset)
+        ahead = AheadVoice(voice, source, initial_m, ear.weights(101), (), lambda: None, lambda error: None)
+        while not ahead.finished:
+            ahead.advance()
+    mixer = Mixer(48_000)
+    mixer.add(voice)
+    played = np.concatenate([mixer.render(frames) for frames in (256, 100, 7, 9237)])
+    assert (played[:, 0] == exported).all()
+
+
+def test_the_difference_is_model_minus_truth(request_: SoundRequest) -> None:
+    model, truth, difference = (render_sound(replace(request_, source=s)) for s in ("model", "truth", "difference"))  # type: ignore[arg-type]
+    assert np.abs(difference).max() > 1e-3
+    assert (difference == model - truth).all()
+
+
+@pytest.mark.parametrize("bits", export.BITS)
+def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: export.Bits, tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    settings = WavSettings(bits, fade_out_s=0)
+    report = export_sound(request_, path, settings)
+    expected = render_sound(request_)
+    with soundfile.SoundFile(path) as file:
+        found = file.read(dtype="float64")
+        recipe = json.loads(file.comment)
+        assert (file.title, file.samplerate) == ("A small string", 4000)
+        assert file.software.startswith("Learned Strings ")
+    assert np.abs(found - expected).max() < {"16": 5e-5, "24": 1e-7, "32f": 1e-7}[bits]
+    assert (report.frames, report.rate_hz, report.clipped) == (800, 4000, 0)
+    assert report.peak_db == pytest.approx(20 * np.log10(np.abs(expected).max()))
+    assert report.size_bytes == path.stat().st_size
+    assert recipe == json.loads(Recipe.of(request_, settings).model_dump_json())
+    assert recipe["preset_sha256"] == hashlib.sha256(request_.preset.path.read_bytes()).hexdigest()
+    assert Pluck(**recipe["pluck"]) == request_.pluck
+
+
+def test_the_duration_is_the_same_at_every_rate(request_: SoundRequest, tmp_path: Path) -> None:
+    report = export_sound(request_, tmp_path / "a.wav", WavSettings(rate_hz=44_100))
+    assert (report.rate_hz, report.frames) == (44_100, 8820)
+
+
+def test_normalising_keeps_the_ratio_of_model_and_truth(request_: SoundRequest, tmp_path: Path) -> None:
+    gains = set()
+    for source in ("model", "truth"):
+        settings = WavSettings("24", normalise=True)
+        report = export_sound(replace(request_, source=source), tmp_path / "a.wav", settings)  # type: ignore[arg-type]
+        gains.add(round(report.gain_db, 9))
+        assert report.peak_db <= -1 + 1e-9
+    assert len(gains) == 1
+
+
+def test_progress_rises_to_one(request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(offline, "BLOCK_FRAMES", 100)
+    shares: list[float] = []
+    export_sound(replace(request_, source="difference"), tmp_path / "a.wav", progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+
+
+def test_cancelling_leaves_no_file(request_: SoundRequest, tmp_path: Path) -> None:
+    with pytest.raises(ExportCancelled):
+        export_sound(request_, tmp_path / "a.wav", cancelled=lambda: True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_refuses_is_told_before_the_work(request_: SoundRequest, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"missing.a\.wav: cannot be written .*; make the folder first"):
+        export_sound(request_, tmp_path / "missing" / "a.wav", progress=lambda share: pytest.fail("rendered"))
+
+
+def test_a_full_disk_leaves_what_was_there(
+    request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"old")
+
+    def full(self: Path, target: Path) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(ExportError, match=r"a\.wav: cannot be written .*; free some space"):
+        export_sound(request_, path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_preset_that_vanished_is_told(request_: SoundRequest, tmp_path: Path) -> None:
+    gone = replace(request_, preset=replace(request_.preset, path=tmp_path / "gone.safetensors"))
+    with pytest.raises(ExportError, match=r"gone\.safetensors: the preset cannot be read any more"):
+        export_sound(gone, tmp_path / "a.wav")
+
+
+def test_samples_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"a\.wav: .*not finite"):
+        write_wav(tmp_path / "a.wav", np.array([np.inf]), 4000)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_samples_can_be_written_with_several_channels(tmp_path: Path) -> None:
+    report = write_wav(tmp_path / "a.wav", np.zeros((50, 2)), 4000, PLAIN, title="two")
+    with soundfile.SoundFile(tmp_path / "a.wav") as file:
+        assert (file.channels, file.frames, file.title) == (2, 50, "two")
+    assert report.frames == 50
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"listen": 1.2}, "0 … 1, not 1.2"),
+        ({"seconds": 0.0}, "at most 600, not 0"),
+        ({"seconds": 601.0}, "at most 600, not 601"),
+        ({"seconds": float("nan")}, "not nan"),
+        ({"source": "all"}, "model, truth, difference, both"),
+        ({"source": "both", "listen_right": 0.5}, "choose two files, or mono"),
+        ({"listen_right": -0.1}, "right listening point must lie in 0 … 1"),
+        ({"pickup": "magnet"}, "displacement, velocity"),
+        ({"decay_db": 5.0}, "decay_db must lie in 10 … 120, not 5"),
+        ({"difference_gain_db": 99.0}, "difference_gain_db must lie in 0 … 80, not 99"),
+    ],
+)
+def test_a_request_out_of_range_is_refused(request_: SoundRequest, change: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(request_, **change)
+
+
+def test_the_file_name_tells_what_is_in_it() -> None:
+    assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth") == "nylon_x0.35_a4.0_48000_truth.wav"
+    assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both") == "b_x0.1234_a0.25_4000_both.wav"
+
+
+def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(request_: SoundRequest, tmp_path: Path) -> None:
+    model, truth = (render_sound(replace(request_, source=s)) for s in ("model", "truth"))  # type: ignore[arg-type]
+    assert (render_sound(replace(request_, source="both")) == np.stack([model, truth], axis=1)).all()
+    paths = {"model": tmp_path / "m.wav", "truth": tmp_path / "t.wav", "difference": tmp_path / "d.wav"}
+    reports, _ = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
+    assert [report.path for report in reports] == list(paths.values())
+    assert len({report.gain_db for report in reports}) == 1
+    m, t, d = (soundfile.read(path)[0] for path in paths.values())
+    assert d == pytest.approx(m - t, abs=1e-6)
+    assert max(np.abs(m).max(), np.abs(t).max()) == pytest.approx(10 ** (-1 / 20), rel=1e-6)
+
+
+def test_the_difference_is_made_louder_by_its_gain(request_: SoundRequest) -> None:
+    plain = render_sound(replace(request_, source="difference"))
+    loud = render_sound(replace(request_, source="difference", difference_gain_db=20.0))
+    assert loud == pytest.approx(10 * plain)
+
+
+def test_a_right_listening_point_makes_stereo(request_: SoundRequest) -> None:
+    stereo = render_sound(replace(request_, listen_right=0.6))
+    assert stereo[:, 0] == pytest.approx(render_sound(request_), abs=1e-6)
+    assert stereo[:, 1] == pytest.approx(render_sound(replace(request_, listen=0.6)), abs=1e-6)
+
+
+def test_velocity_is_the_derivative_of_displacement(request_: SoundRequest) -> None:
+    displacement_m = render_sound(request_) * FULL_SCALE_M
+    expected = np.gradient(displacement_m, 1 / 4000) / FULL_SCALE_M_S
+    found = render_sound(replace(request_, pickup="velocity"))
+    slow = np.convolve(found - expected, np.ones(16) / 16, "valid")  # central differences are low at high partials
+    assert np.abs(slow[4:]).max() < 0.05 * np.abs(found).max()
+    assert found[0] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_decay_ends_where_it_is_so_far_down_and_not_before() -> None:
+    rate_hz, rate = 1000, 10.0  # 1/s: 86.9 dB in a second
+    signal = np.exp(-rate * np.arange(3000) / rate_hz)[:, None]
+    assert sound.decayed_frames(signal, rate_hz, 60.0) / rate_hz == pytest.approx(6.9 / rate, abs=0.06)
+    assert sound.decayed_frames(signal[:200], rate_hz, 60.0) == 200
+    assert sound.decayed_frames(np.zeros((500, 1)), rate_hz, 60.0) == 50
+
+
+def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_told(
+    request_: SoundRequest, tmp_path: Path
+) -> None:
+    decaying = replace(request_, seconds=8.0, decay_db=10.0)
+    model = export_sound(decaying, tmp_path / "m.wav")
+    truth = export_sound(replace(decaying, source="truth"), tmp_path / "t.wav")
+    assert model.frames == truth.frames < 8 * 4000
+    assert model.decayed
+    assert truth.past_training_s == 0 < model.past_training_s
+    assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "m.wav").decayed
+
+
+@pytest.mark.parametrize("bits", export.BITS)
+def test_the_end_of_training_is_marked_in_the_file(request_: SoundRequest, bits: export.Bits, tmp_path: Path) -> None:
+    for source, marks in (("model", [Marker(1200, "end of training")]), ("truth", [])):
+        path = tmp_path / f"{source}.wav"
+        export_sound(replace(request_, source=source), path, WavSettings(bits, 12_000))  # type: ignore[arg-type]
+        assert read_markers(path.read_bytes()) == marks
+        with soundfile.SoundFile(path) as file:
+            assert file.frames == 2400
+            assert ("Cue ID :  1  Pos :  1200" in file.extra_info) == bool(marks)  # as libsndfile reads it
+            assert ("labl : 1 : end of training" in file.extra_info) == bool(marks)

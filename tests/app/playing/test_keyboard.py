@@ -1,0 +1,76 @@
+"""Which key means what, without any window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.playing.keyboard import KeyPress, Reach, place_of, play
+from engine.preset import read_info
+
+REACH = Reach((0.3, 0.7), (1.0, 10.0))
+
+
+def test_the_row_goes_from_end_to_end_of_what_is_trained() -> None:
+    played = [play(KeyPress(letter), REACH, 4.0) for letter in "ASDFGHJKL;"]
+    places = [p.changes["position"] for p in played if p is not None and p.plucks]
+    assert places == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
+    assert all(p is not None and set(p.changes) == {"position"} for p in played)
+
+
+@pytest.mark.parametrize(
+    ("platform", "press", "place"),
+    [
+        ("linux", KeyPress("Q", 38), 0),  # AZERTY: Q is where A is elsewhere
+        ("linux", KeyPress("A", 24), None),
+        ("linux", KeyPress("", 47), 9),  # ö
+        ("win32", KeyPress("Q", 0x1E), 0),
+        ("darwin", KeyPress("d", 2), 2),  # its codes are not told: the letter counts
+        ("linux", KeyPress("q"), None),
+        ("linux", KeyPress(""), None),
+    ],
+)
+def test_keys_are_known_by_their_place(platform: str, press: KeyPress, place: int | None) -> None:
+    assert place_of(press, platform) == place
+
+
+def test_digits_and_c_and_v_set_the_amplitude_and_do_not_pluck() -> None:
+    levels = []
+    for digit in "123456789":
+        played = play(KeyPress(digit), REACH, 4.0)
+        assert played is not None
+        assert not played.plucks
+        levels.append(played.changes["amplitude_mm"])
+    assert levels == sorted(levels)
+    assert (levels[0], levels[-1]) == pytest.approx((1.0, 10.0))
+    harder, softer = play(KeyPress("V"), REACH, 4.0), play(KeyPress("c"), REACH, 4.0)
+    assert harder is not None and softer is not None
+    assert softer.changes["amplitude_mm"] < 4 < harder.changes["amplitude_mm"]
+    loudest = play(KeyPress("V"), REACH, 10.0)
+    assert loudest is not None and loudest.changes["amplitude_mm"] == 10
+
+
+@pytest.mark.parametrize("letter", ["X", "0", " ", "", "É"])
+def test_other_keys_are_left_alone(letter: str) -> None:
+    assert play(KeyPress(letter), REACH, 4.0) is None
+
+
+def test_velocity_and_amplitude_go_back_and_forth_in_equal_steps_of_level() -> None:
+    for velocity in (1, 40, 64, 127):
+        assert REACH.velocity_of(REACH.amplitude_of(velocity)) == velocity
+    assert REACH.amplitude_of(64) == 3.1623
+    assert REACH.amplitude_of(999) == 10
+    assert REACH.velocity_of(0.0) == 1
+
+
+def test_what_is_played_is_round_and_within_reach() -> None:
+    assert Reach((0.05, 0.95)).place(2 / 9) == 0.25
+    odd = Reach((1 / 3, 2 / 3), (1 / 3, 2 / 3))
+    assert (odd.place(0), odd.place(1)) == odd.position
+    assert (odd.amplitude_of(1), odd.amplitude_of(127)) == odd.amplitude_mm
+
+
+def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
+    assert Reach.of(read_info(small_preset)) == Reach((0.3, 0.7), (1.0, 10.0))
+    assert Reach.of(None).position == (0.05, 0.95)

@@ -1,0 +1,185 @@
+"""The library and what comes into it: refreshing, searching, installing, dropped files."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from app.export.files import SoundRequest, export_sound
+from app.presets.filter import PresetFilter
+from app.presets.install import InstallError, install_preset
+from app.presets.library import Library, PresetEntry, list_presets
+from app.window.dropped_files import receive
+from engine.pluck import Pluck
+from engine.preset import load_preset
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's folder, not made yet."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    return tmp_path / "own"
+
+
+@pytest.fixture
+def library(preset_folder: Path, own: Path) -> Library:
+    made = Library([])
+    made.refresh()
+    return made
+
+
+def other_preset(small_preset: Path, path: Path) -> Path:
+    """A preset of the same form with other bytes."""
+    path.write_bytes(small_preset.read_bytes().replace(b"A small string", b"Another string"))
+    return path
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_refresh_tells_only_when_there_are_others(library: Library, small_preset: Path, own: Path) -> None:
+    seen: list[None] = []
+    library.changed.connect(lambda: seen.append(None))
+    assert (library.refresh(), library.names, seen) == ([], ["first", "second"], [])
+    own.mkdir()
+    shutil.copy(small_preset, own / "mine.safetensors")
+    shutil.copy(small_preset, own / "first.safetensors")
+    (problem,) = library.refresh()
+    assert "first.safetensors: there is a preset of this name already" in problem
+    assert library.refresh() == []  # it has been told
+    assert (library.names, len(seen)) == (["first", "mine", "second"], 1)
+    mine = library.find("mine")
+    assert mine is not None
+    first = library.find("first")
+    assert first is not None
+    assert [mine.title, mine.info.title] == [f"{first.title} (yours)", first.title]
+    assert (mine.path, mine.size_bytes) == (own / "mine.safetensors", small_preset.stat().st_size)
+
+
+def test_a_preset_is_installed_and_a_taken_name_gets_a_number(
+    library: Library, small_preset: Path, own: Path, tmp_path: Path
+) -> None:
+    given = other_preset(small_preset, tmp_path / "first.safetensors")
+    present = [entry.path for entry in library.entries]
+    installed = install_preset(given, own, present)
+    assert (installed.name, installed.was_there) == ("first_2", False)
+    assert installed.path.read_bytes() == given.read_bytes()
+    again = install_preset(given, own, [*present, installed.path])
+    assert (again.name, again.was_there) == ("first_2", True)
+    assert files(own) == ["first_2.safetensors"]
+    assert install_preset(small_preset, own, present).was_there
+
+
+@pytest.mark.parametrize("data", [b"", b"no preset", None])
+def test_what_is_no_preset_is_refused_and_leaves_nothing(
+    small_preset: Path, own: Path, tmp_path: Path, data: bytes | None
+) -> None:
+    given = tmp_path / "bad.safetensors"
+    given.write_bytes(small_preset.read_bytes()[:-9] if data is None else data)
+    with pytest.raises(InstallError, match=r"bad\.safetensors: not a whole safetensors file"):
+        install_preset(given, own, [])
+    assert not own.exists()
+
+
+def test_a_folder_that_cannot_be_made_is_told(small_preset: Path, own: Path) -> None:
+    own.write_text("in the way")
+    with pytest.raises(InstallError, match="cannot be written"):
+        install_preset(small_preset, own, [])
+
+
+def test_a_dropped_preset_is_chosen_at_once(library: Library, small_preset: Path, own: Path, tmp_path: Path) -> None:
+    dropped = receive(other_preset(small_preset, tmp_path / "New.safetensors"), library)
+    assert (dropped.choices, dropped.notice) == ({"preset": "New"}, "")
+    assert library.names == ["New", "first", "second"]
+    assert files(own) == ["New.safetensors"]
+
+
+def test_a_dropped_preset_that_is_there_is_chosen_and_told(
+    library: Library, small_preset: Path, own: Path, tmp_path: Path
+) -> None:
+    dropped = receive(small_preset, library)
+    assert dropped.choices == {"preset": "first"}
+    assert "is the shipped preset “A small string" in dropped.notice
+    assert not own.exists()
+    new = other_preset(small_preset, tmp_path / "New.safetensors")
+    for notice in ("", "New.safetensors is your own preset “Another string"):
+        assert receive(new, library).notice.startswith(notice)
+    assert files(own) == ["New.safetensors"]
+
+
+def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Path, tmp_path: Path) -> None:
+    preset = load_preset(preset_folder / "second.safetensors")
+    other_preset(preset_folder / "second.safetensors", preset_folder / "second.safetensors")
+    pluck = Pluck(0.61, 2.5, "raised_cosine", 0.2)
+    request = SoundRequest(preset, pluck, 0.22, 0.7, "truth")
+    export_sound(request, tmp_path / "A.WAV")
+    (tmp_path / "A.WAV").rename(tmp_path / "b.WAV")
+    dropped = receive(tmp_path / "b.WAV", library)
+    assert dropped.notice == ""
+    assert dropped.choices == {
+        "preset": "second",
+        "position": 0.61,
+        "amplitude_mm": 2.5,
+        "shape": "raised_cosine",
+        "width": 0.2,
+        "listen": 0.22,
+        "seconds": 0.7,
+        "a": "model",
+        "b": "truth",
+        "heard": "b",
+        "solo": 0,
+        "stereo": False,
+        "pickup": "displacement",
+    }
+    shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
+    os.utime(preset_folder / "second.safetensors", ns=(1, 1))
+    assert "is not the one that made this file" in receive(tmp_path / "b.WAV", library).notice
+    export_sound(replace(request, seconds=0.1, source="difference"), tmp_path / "c.wav")
+    dropped = receive(tmp_path / "c.wav", library)
+    assert "its duration of 0.1 s" in dropped.notice
+    assert dropped.choices["seconds"] == 0.5
+    assert (dropped.choices["a"], dropped.choices["heard"]) == ("difference", "a")
+
+
+def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Path) -> None:
+    for name, words in (
+        ("a.txt", "neither a preset"),
+        ("a.wav", "no sound file that can be read"),
+        ("a.safetensors", "no such preset file"),
+    ):
+        dropped = receive(tmp_path / name, library)
+        assert dropped.choices == {}
+        assert words in dropped.notice
+    soundfile.write(tmp_path / "a.wav", np.zeros(5), 8000)
+    assert "has no recipe" in receive(tmp_path / "a.wav", library).notice
+
+
+def entry(**changes: object) -> PresetEntry:
+    (one, *_), _ = list_presets()
+    return replace(one, name=str(changes.pop("name", one.name)), info=replace(one.info, **changes))  # type: ignore[arg-type]
+
+
+def test_the_filter_finds_words_in_any_order_and_every_field(preset_folder: Path) -> None:
+    low = entry(name="low", title="Nylon B3, plucked")
+    high = entry(name="high", title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman")
+    both = [low, high]
+    for search, found in (
+        (PresetFilter(), [high, low]),  # a favourite is on top
+        (PresetFilter("b3, nyl"), [low]),
+        (PresetFilter("STEEL 16"), [high]),
+        (PresetFilter("steel nylon"), []),
+        (PresetFilter("glide"), [low]),
+        (PresetFilter(string="linear"), [high]),
+        (PresetFilter(model="koopman"), [high]),
+        (PresetFilter(rate_hz=4000), [low]),
+        (PresetFilter("koopman", rate_hz=16_000), [high]),
+        (PresetFilter(favourites_only=True), [high]),
+    ):
+        assert search.applied(both, {"high"}) == found, search

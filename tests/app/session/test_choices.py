@@ -1,0 +1,94 @@
+"""The session: validated choices and notice of what really changed."""
+
+import pytest
+
+from app.session.choices import Choices, Session
+
+
+def recorded(session: Session) -> list[frozenset[str]]:
+    seen: list[frozenset[str]] = []
+    session.changed.connect(seen.append)
+    return seen
+
+
+def test_only_real_changes_are_told() -> None:
+    session = Session()
+    seen = recorded(session)
+    session.update(listen=0.5, seconds=session.choices.seconds)
+    session.update(listen=0.5)
+    assert seen == [frozenset({"listen"})]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("position", 1.0), ("listen", -0.1), ("seconds", 99), ("volume_db", 40), ("shape", "saw"), ("heard", "both")],
+)
+def test_a_bad_value_changes_nothing_and_is_named(field: str, value: object) -> None:
+    session = Session()
+    seen, before = recorded(session), session.choices
+    with pytest.raises(ValueError, match=field):
+        session.update(listen=0.5, **{field: value}) if field != "listen" else session.update(listen=value)
+    assert session.choices is before
+    assert seen == []
+
+
+def test_an_unknown_field_is_refused() -> None:
+    with pytest.raises(ValueError, match="colour"):
+        Session().update(colour="red")
+
+
+def test_gestures_are_clamped_to_what_is_allowed() -> None:
+    session = Session()
+    session.move_pluck(-3, 400)
+    assert (session.choices.position, session.choices.amplitude_mm) == (0.02, 20.0)
+    session.move_listening_point(7)
+    assert session.choices.listen == 1
+
+
+def test_switching_source_goes_there_and_back() -> None:
+    session = Session()
+    session.switch_source()
+    assert (session.choices.heard, session.source_heard) == ("b", "truth")
+    session.switch_source()
+    assert (session.choices.heard, session.source_heard) == ("a", "model")
+
+
+def test_slots_hold_any_two_sources() -> None:
+    session = Session(Choices(a="preset:other one", b="difference"))
+    assert session.source_heard == "preset:other one"
+    session.switch_source()
+    assert session.source_heard == "difference"
+    for wrong in ("noise", "preset:", "model "):
+        with pytest.raises(ValueError, match="a: "):
+            session.update(a=wrong)
+
+
+@pytest.mark.parametrize("source", ["model", "truth"])
+def test_choices_from_before_the_slots_are_understood(source: str) -> None:
+    choices = Choices.model_validate_json(f'{{"heard": "{source}", "position": 0.4}}')
+    assert (choices.a, choices.b, choices.source_heard) == ("model", "truth", source)
+    assert choices.position == 0.4
+
+
+def test_presets_go_round() -> None:
+    session = Session(Choices(preset="b"))
+    session.step_preset(["a", "b", "c"], 1)
+    assert session.choices.preset == "c"
+    session.step_preset(["a", "b", "c"], 1)
+    assert session.choices.preset == "a"
+    session.step_preset(["a", "b", "c"], -1)
+    assert session.choices.preset == "c"
+    session.step_preset([], 1)
+    assert session.choices.preset == "c"
+
+
+def test_what_a_note_changes_is_told_as_played_before_it_is_told_as_changed() -> None:
+    session, told = Session(), []
+    session.played.connect(lambda names: told.append(("played", set(names), session.choices.position)))
+    session.changed.connect(lambda names: told.append(("changed", set(names), session.choices.position)))
+    session.play(position=0.5)
+    session.play(position=0.5)  # nothing new
+    session.update(position=0.6)
+    assert told == [("played", {"position"}, 0.5), ("changed", {"position"}, 0.5), ("changed", {"position"}, 0.6)]
+    with pytest.raises(ValueError, match="position"):
+        session.play(position=2)

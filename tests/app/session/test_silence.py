@@ -1,0 +1,77 @@
+"""Silence is explained."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.presets.library import Library, list_presets
+from app.rendering import Take
+from app.session.choices import Choices
+from app.session.silence import why_difference_silent, why_ran_away, why_silent
+from engine.pluck import Pluck
+from engine.preset import read_info
+
+
+@pytest.fixture
+def library(small_preset: Path) -> Library:
+    """The preset `small`, and `needy`, whose model needs two frames."""
+    entries, _ = list_presets(small_preset.parent)
+    small = entries[0]
+    configuration = {**small.info.model_configuration, "input": "two_frames"}
+    needy = replace(small, name="needy", info=replace(small.info, model_configuration=configuration))
+    return Library([small, needy])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, ""),
+        ({"amplitude_mm": 0}, "amplitude is 0"),
+        ({"volume_db": -60}, "volume"),
+        ({"listen": 0.0}, "listening point is at a fixed end"),
+        ({"listen": 0.0, "stereo": True}, "left silent"),
+        ({"listen_right": 1.0}, ""),
+        ({"listen_right": 1.0, "stereo": True}, "right silent"),
+        ({"listen": 0.0, "listen_right": 1.0, "stereo": True}, "both listening points are at a fixed end"),
+        ({"solo": 2}, ""),
+        ({"solo": 2, "listen": 0.5}, "a node of mode 2"),
+        ({"solo": 11}, "this string has 10"),
+        ({"solo": 2, "position": 0.5}, "does not excite mode 2"),
+        ({"a": "preset:gone"}, "gone is not there"),
+        ({"a": "preset:needy"}, "the frame before the first"),
+        ({"b": "preset:needy"}, ""),
+    ],
+)
+def test_the_reason_is_named(library: Library, changes: dict[str, object], words: str) -> None:
+    found = why_silent(Choices(preset="small", **changes), library)
+    assert words in found
+    assert bool(found) == bool(words)
+
+
+def test_a_difference_of_nothing_or_too_little_is_named(small_preset: Path) -> None:
+    take = Take("small", read_info(small_preset), Pluck(), 0.5)
+    rest = np.zeros((take.frames, take.info.grid_points), np.float32)
+    take.append(rest, rest)
+    assert "do not differ" in why_difference_silent(Choices(), take)
+    for off_m, gain_db, words in ((1e-7, 20, "raise its gain"), (1e-7, 60, ""), (1e-3, 0, "")):
+        take = Take("small", take.info, Pluck(), 0.5)
+        take.append(rest + np.float32(off_m), rest)
+        found = why_difference_silent(Choices(difference_gain_db=gain_db), take)
+        assert words in found
+        assert bool(found) == bool(words)
+
+
+def test_a_model_that_runs_away_is_told_with_the_reason(small_preset: Path) -> None:
+    take = Take("small", read_info(small_preset), Pluck(amplitude_mm=20.0), 0.5)
+    assert why_ran_away(take) == ""
+    take.model_ends_s = 0.0
+    at_once = why_ran_away(take)
+    assert take.info.title in at_once
+    assert "cannot play this pluck" in at_once
+    assert "amplitude 20 mm is outside" in at_once
+    take.model_ends_s = 0.25
+    assert "0.25 s after the pluck" in why_ran_away(take)

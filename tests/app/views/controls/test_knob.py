@@ -1,0 +1,143 @@
+"""A knob asks for what the hand wants, and shows what became of it."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
+from PySide6.QtWidgets import QApplication, QToolTip
+from pytestqt.qtbot import QtBot
+
+from app.views.controls.knob import DRAG_PIXELS, Knob, KnobRange
+
+LEFT = Qt.MouseButton.LeftButton
+SHIFT, NONE = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.NoModifier
+
+
+@pytest.fixture
+def knob(qtbot: QtBot) -> Knob:
+    """From 0 to 20 by 0.25, at 4; it follows what is asked."""
+    made = Knob("amplitude", KnobRange(0, 20, 4.0, 0.25, "{:.2f} mm"))
+    qtbot.addWidget(made)
+    made.value_asked.connect(made.set_value)
+    made.show()
+    return made
+
+
+def move(knob: Knob, up: float, held: Qt.KeyboardModifier) -> None:
+    """The pointer goes up from where it was pressed or was last."""
+    at = QPointF(30, 40 - up)
+    event = QMouseEvent(QEvent.Type.MouseMove, at, knob.mapToGlobal(at), LEFT, LEFT, held)
+    QApplication.sendEvent(knob, event)
+
+
+def test_a_drag_goes_with_the_pointer_and_shows_the_value(qtbot: QtBot, knob: Knob) -> None:
+    qtbot.mousePress(knob, LEFT, pos=QPoint(30, 40))
+    move(knob, DRAG_PIXELS / 4, NONE)
+    assert knob.value == pytest.approx(9)
+    assert QToolTip.text() == "9.00 mm"
+    move(knob, -2 * DRAG_PIXELS, NONE)
+    assert knob.value == 0
+    qtbot.mouseRelease(knob, LEFT)
+    move(knob, 0, NONE)
+    assert knob.value == 0
+
+
+def test_shift_in_the_middle_of_a_drag_is_finer_and_does_not_leap(qtbot: QtBot, knob: Knob) -> None:
+    qtbot.mousePress(knob, LEFT, pos=QPoint(30, 40))
+    move(knob, 45, NONE)
+    assert knob.value == pytest.approx(9)
+    move(knob, 45, SHIFT)
+    assert knob.value == pytest.approx(9)
+    move(knob, 54, SHIFT)
+    assert knob.value == pytest.approx(9.1)
+    move(knob, 63, NONE)
+    assert knob.value == pytest.approx(10.1)
+    qtbot.mouseRelease(knob, LEFT)
+
+
+def test_a_drag_tells_its_begin_and_its_end(qtbot: QtBot, knob: Knob) -> None:
+    with qtbot.waitSignals([knob.drag_started, knob.drag_ended], order="strict"):
+        qtbot.mousePress(knob, LEFT)
+        qtbot.mouseRelease(knob, LEFT)
+
+
+@pytest.mark.parametrize(
+    ("delta", "held", "value"),
+    [((0, 120), NONE, 4.25), ((0, -240), NONE, 3.5), ((0, 120), SHIFT, 4.025), ((120, 0), SHIFT, 4.025)],
+)
+def test_the_wheel(knob: Knob, delta: tuple[int, int], held: Qt.KeyboardModifier, value: float) -> None:
+    at = QPointF(30, 40)
+    event = QWheelEvent(
+        at, at, QPoint(), QPoint(*delta), Qt.MouseButton.NoButton, held, Qt.ScrollPhase.NoScrollPhase, False
+    )
+    QApplication.sendEvent(knob, event)
+    assert knob.value == pytest.approx(value)
+    assert event.isAccepted()
+
+
+@pytest.mark.parametrize(
+    ("key", "held", "value"),
+    [
+        (Qt.Key.Key_Up, NONE, 4.25),
+        (Qt.Key.Key_Left, NONE, 3.75),
+        (Qt.Key.Key_Right, SHIFT, 4.025),
+        (Qt.Key.Key_PageUp, NONE, 6.5),
+        (Qt.Key.Key_PageDown, NONE, 1.5),
+        (Qt.Key.Key_Home, NONE, 0),
+        (Qt.Key.Key_End, NONE, 20),
+    ],
+)
+def test_keys(qtbot: QtBot, knob: Knob, key: Qt.Key, held: Qt.KeyboardModifier, value: float) -> None:
+    qtbot.keyClick(knob, key, held)
+    assert knob.value == pytest.approx(value)
+
+
+def test_page_keys_are_the_knobs_and_not_the_windows(knob: Knob) -> None:
+    for key, accepted in ((Qt.Key.Key_PageUp, True), (Qt.Key.Key_Space, False)):
+        event = QKeyEvent(QEvent.Type.ShortcutOverride, key, NONE)
+        event.ignore()
+        QApplication.sendEvent(knob, event)
+        assert event.isAccepted() == accepted
+
+
+@pytest.mark.parametrize(
+    ("typed", "value", "told"),
+    [("7,5", 7.5, ""), ("99", 20, "At most 20.00 mm"), ("-1", 0, "At least 0.00 mm"), ("3-", 4.0, "")],
+)
+def test_a_typed_number_is_taken_within_the_range(
+    qtbot: QtBot, knob: Knob, typed: str, value: float, told: str
+) -> None:
+    QToolTip.hideText()
+    qtbot.waitUntil(lambda: not QToolTip.isVisible())
+    qtbot.keyClicks(knob, typed[0])
+    assert knob._editor is not None
+    qtbot.keyClicks(knob._editor, typed[1:])
+    qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
+    assert knob.value == value
+    assert knob._editor is None
+    assert (QToolTip.text() if QToolTip.isVisible() else "") == told
+
+
+def test_escape_gives_typing_up(qtbot: QtBot, knob: Knob) -> None:
+    qtbot.keyClicks(knob, "9")
+    assert knob._editor is not None
+    qtbot.keyClick(knob._editor, Qt.Key.Key_Escape)
+    assert (knob.value, knob._editor) == (4.0, None)
+
+
+def test_double_click_and_delete_reset(qtbot: QtBot, knob: Knob) -> None:
+    for reset in (lambda: qtbot.mouseDClick(knob, LEFT), lambda: qtbot.keyClick(knob, Qt.Key.Key_Delete)):
+        knob.set_value(12)
+        reset()
+        assert knob.value == 4.0
+
+
+def test_what_became_of_it_is_seen_and_said(knob: Knob) -> None:
+    assert knob.accessibleDescription() == "4.00 mm"
+    before = knob.grab().toImage()
+    knob.set_value(11)
+    assert knob.grab().toImage() != before
+    assert knob.accessibleDescription() == "11.00 mm"
+    knob.setEnabled(False)
+    assert knob.grab().toImage() != before

@@ -1,0 +1,59 @@
+"""Keys reach the instrument wherever the keyboard is, but never from someone who writes."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QVBoxLayout, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.views.controls.playing_keys import PlayingKeys
+
+
+@pytest.fixture
+def window(qtbot: QtBot) -> QWidget:
+    made = QWidget()
+    qtbot.addWidget(made)
+    column = QVBoxLayout(made)
+    for child in (QLineEdit(), QComboBox()):
+        column.addWidget(child)
+    made.findChild(QComboBox).addItems(["first", "a song"])
+    made.show()
+    return made
+
+
+@pytest.fixture
+def heard(window: QWidget) -> list[str]:
+    seen: list[str] = []
+    PlayingKeys(window).pressed.connect(lambda press: seen.append(press.letter))
+    return seen
+
+
+def test_a_list_does_not_take_the_notes(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
+    box = window.findChild(QComboBox)
+    QApplication.instance().focusChanged.emit(None, box)  # type: ignore[union-attr]
+    qtbot.keyClick(box, Qt.Key.Key_A)
+    assert heard == ["A"]
+    assert box.currentText() == "first"
+    QApplication.instance().focusChanged.emit(box, None)  # type: ignore[union-attr]
+    qtbot.keyClick(box, Qt.Key.Key_A)
+    assert box.currentText() == "a song"
+
+
+def test_who_writes_is_left_alone(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
+    line = window.findChild(QLineEdit)
+    QApplication.instance().focusChanged.emit(None, line)  # type: ignore[union-attr]
+    qtbot.keyClicks(line, "asdc1")
+    assert (line.text(), heard) == ("asdc1", [])
+
+
+def test_a_key_that_is_held_down_is_told_once_and_shortcuts_are_not_notes(
+    qtbot: QtBot, window: QWidget, heard: list[str]
+) -> None:
+    qtbot.keyPress(window, Qt.Key.Key_S)
+    for _ in range(5):
+        repeated = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_S, Qt.KeyboardModifier.NoModifier, "s", True)
+        QApplication.sendEvent(window, repeated)
+    qtbot.keyClick(window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    assert heard == ["S"]

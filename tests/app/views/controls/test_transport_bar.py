@@ -1,0 +1,33 @@
+"""The button that plays: it says what a click does, whoever began or ended the sound."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.views.controls.transport_bar import TransportBar
+
+
+def test_it_tells_what_plays_and_is_left_alone_while_nothing_changes(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bar = TransportBar()
+    qtbot.addWidget(bar)
+
+    def shown(playing: bool) -> tuple[bool, str]:
+        bar.show_playing(playing)
+        return bar._play.isChecked(), bar._play.text()
+
+    assert shown(True) == (True, "■  Stop")
+    assert shown(False) == (False, "▶  Play")
+    qtbot.mouseClick(bar._play, Qt.MouseButton.LeftButton)  # it checks itself
+    assert shown(False) == (False, "▶  Play")
+    qtbot.mouseClick(bar._play, Qt.MouseButton.LeftButton)
+    assert shown(True) == (True, "■  Stop")
+    texts: list[str] = []
+    monkeypatch.setattr(bar._play, "setText", texts.append)
+    bar.show_playing(True)
+    assert not texts
+    bar.show_playing(False)
+    assert texts == ["▶  Play"]

@@ -1,0 +1,295 @@
+"""The listening test by keyboard: it runs, hides what must be hidden, and keeps a record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.analysis.abx.choices import AbxChoices
+from app.analysis.abx.record import AbxRecord, HeardPluck, load_record
+from app.analysis.abx.sound import Candidate
+from app.analysis.abx.subject import Subject
+from app.analysis.abx.trials import draw_order
+from app.audio.devices import AudioDevice
+from app.audio.output import Output
+from app.audio.sound import Sound
+from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
+from engine.kernels import layout as at
+from engine.voices import Mixer
+
+RATE_HZ = 48_000
+FRAMES = 4800
+HEADPHONES = AudioDevice("Headphones", "Test API", RATE_HZ)
+PLUCK = HeardPluck(position=0.4, amplitude_mm=4, shape="gaussian", width=0.06, listen=0.37, seconds=0.1)
+CANDIDATES = tuple(Candidate(name, name.capitalize(), "small", "0f" * 32) for name in ("model", "truth"))
+Open = Callable[..., AbxDialog]
+Sounds = Mapping[str, NDArray[np.float32]]
+
+
+@pytest.fixture
+def sound(numb_output: Callable[[AudioDevice, float, Mixer], Output], qtbot: QtBot) -> Iterator[Sound]:
+    with Sound(look_up=lambda *_: HEADPHONES, open_output=numb_output) as made:
+        made.open()
+        qtbot.waitUntil(lambda: made.status().device is not None)
+        yield made
+
+
+def sounds_of(model_hz: float = 401.0, truth_hz: float = 400.0) -> Sounds:
+    time_s = np.arange(FRAMES)[:, None] / RATE_HZ
+    sounds = {"model": 0.2 * np.sin(6.28 * model_hz * time_s), "truth": 0.3 * np.sin(6.28 * truth_hz * time_s)}
+    return {source: samples.astype(np.float32) for source, samples in sounds.items()}
+
+
+def done(sounds: Sounds) -> Future[Sounds]:
+    rendered: Future[Sounds] = Future()
+    rendered.set_result(sounds)
+    return rendered
+
+
+@pytest.fixture
+def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
+    def open_dialog(
+        seed: int = 1, trials: int = 3, rendered: Future[Sounds] | None = None, through: Sound = sound
+    ) -> AbxDialog:
+        choices = AbxChoices(trials=trials, folder=str(tmp_path / "records"))
+        rendering = rendered or done(sounds_of())
+        dialog = AbxDialog(
+            through, Subject(CANDIDATES, PLUCK, 0.0), choices, lambda rate_hz: rendering, seed=lambda: seed
+        )
+        qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
+        dialog.open()
+        qtbot.waitExposed(dialog)
+        if rendered is None and through is sound:
+            qtbot.waitUntil(dialog._setup.start.isEnabled)
+        return dialog
+
+    return open_dialog
+
+
+def press(qtbot: QtBot, dialog: AbxDialog, *keys: str) -> None:
+    codes = {"left": Qt.Key.Key_Left, "right": Qt.Key.Key_Right, " ": Qt.Key.Key_Space, "esc": Qt.Key.Key_Escape}
+    for key in keys:
+        qtbot.keyClick(dialog.focusWidget() or dialog, codes.get(key) or Qt.Key(ord(key.upper())))
+
+
+def start(dialog: AbxDialog) -> None:
+    dialog._setup.start.click()
+    assert dialog.testing
+
+
+def texts(widget: QWidget) -> str:
+    """All that can be read now."""
+    shown = [w for w in widget.findChildren(QLabel) + widget.findChildren(QAbstractButton) if w.isVisible()]
+    return "\n".join(w.text() for w in shown)
+
+
+def saved(tmp_path: Path) -> AbxRecord:
+    (path,) = (tmp_path / "records").iterdir()
+    return load_record(path)
+
+
+def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
+    seed, order = 4, draw_order(4, 3)
+    dialog = open_dialog(seed)
+    start(dialog)
+    keys = {"A": ("1", "left"), "B": ("2", "right")}
+    for number, x in enumerate(order):
+        assert f"Trial {number + 1} of 3" in texts(dialog)
+        assert "right" not in texts(dialog)
+        press(qtbot, dialog, "a", "b", "x", " ", keys[x][number % 2])
+    text = texts(dialog)
+    assert "3 of 3 right" in text
+    assert "p = 0.125" in text
+    record = saved(tmp_path)
+    assert str(tmp_path / "records") in text
+    assert (record.seed, record.correct, record.complete) == (seed, 3, True)
+    assert [(trial.x, trial.auditions) for trial in record.trials] == [(x, 4) for x in order]
+    assert (record.through.device, record.through.rate_hz) == ("Headphones", RATE_HZ)
+    assert (record.a.label, record.b.label) == ("Model", "Truth")
+    assert record.a.gain_db == pytest.approx(0, abs=0.01)
+    assert record.b.gain_db == pytest.approx(-3.52, abs=0.02)
+
+
+@pytest.mark.parametrize("key", ["a", "b", "x"])
+def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, sound: Sound, key: str) -> None:
+    dialog = open_dialog(seed=2)
+    start(dialog)
+    assert draw_order(2, 3)[0] == "B"
+    press(qtbot, dialog, "a" if key != "a" else "b", key)
+    assert dialog._pair is not None
+    voices = dialog._pair._voices
+    qtbot.waitUntil(lambda: all(voice.sounding for voice in voices.values()))
+    assert {name: voice.memory[at.WANTED_GAIN] for name, voice in voices.items()} == (
+        {"A": 1.0, "B": 0.0} if key == "a" else {"A": 0.0, "B": 1.0}
+    )
+    assert len({voice.began_frame for voice in voices.values()}) == 1
+
+
+def test_x_must_be_heard_before_it_is_judged(qtbot: QtBot, open_dialog: Open) -> None:
+    dialog = open_dialog()
+    start(dialog)
+    press(qtbot, dialog, "1", "a", "b", "2", "right")
+    assert "Trial 1 of 3" in texts(dialog)
+    press(qtbot, dialog, "x", "1", "1")
+    assert "Trial 2 of 3" in texts(dialog)
+
+
+def test_nothing_that_is_shown_depends_on_x(qtbot: QtBot, open_dialog: Open) -> None:
+    """Two tests with another X: after the same keys the dialogs are the same, pixel by pixel, word by word."""
+    seeds = [next(seed for seed in range(99) if "".join(draw_order(seed, 2)) == order) for order in ("AB", "BA")]
+    pictures, words = [], []
+    for seed in seeds:
+        dialog = open_dialog(seed, trials=2)
+        start(dialog)
+        pictures.append([])
+        words.append([])
+        for key in ("x", "a", "x", "b", "x", " ", "1", "x"):
+            press(qtbot, dialog, key)
+            pictures[-1].append(dialog.grab().toImage())
+            widgets = [dialog, *dialog.findChildren(QWidget)]
+            words[-1].append(
+                [(w.objectName(), w.accessibleName(), w.accessibleDescription(), w.toolTip()) for w in widgets]
+                + [(texts(dialog), dialog.windowTitle(), "", "")]
+            )
+        dialog.abandon()
+    assert words[0] == words[1]
+    assert pictures[0] == pictures[1]
+    assert pictures[0][0] != pictures[0][1]
+
+
+def test_a_test_that_is_stopped_is_incomplete(
+    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = [QMessageBox.StandardButton.No, QMessageBox.StandardButton.Yes]
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: answers.pop(0))
+    dialog = open_dialog()
+    start(dialog)
+    press(qtbot, dialog, "x", "1", "esc")
+    assert dialog.testing
+    press(qtbot, dialog, "esc")
+    assert not dialog.testing
+    assert dialog.isVisible()
+    assert "no p-value can be given" in texts(dialog)
+    assert "p =" not in texts(dialog)
+    record = saved(tmp_path)
+    assert (record.complete, record.p_value, len(record.trials)) == (False, None, 1)
+    press(qtbot, dialog, "esc")
+    assert not dialog.isVisible()
+
+
+def test_a_device_that_vanishes_ends_the_test(qtbot: QtBot, open_dialog: Open, sound: Sound, tmp_path: Path) -> None:
+    dialog = open_dialog()
+    start(dialog)
+    press(qtbot, dialog, "x", "1", "x")
+    other = AudioDevice("Loudspeaker", "Test API", RATE_HZ)
+    sound._look_up = lambda *_: other
+    sound.open(other)
+    qtbot.waitUntil(lambda: not dialog.testing)
+    assert saved(tmp_path).remark == DEVICE_CHANGED
+    assert saved(tmp_path).through.device == "Headphones"
+
+
+def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> None:
+    with Sound() as silent:
+        dialog = open_dialog(through=silent)
+        qtbot.waitUntil(lambda: NO_DEVICE in texts(dialog))
+        assert not dialog._setup.start.isEnabled()
+
+
+@pytest.mark.parametrize(("model_hz", "message", "can_start"), [(400.0, SAME, False), (900.0, TRIVIAL, True)])
+def test_a_test_without_a_point_is_told(
+    qtbot: QtBot, open_dialog: Open, model_hz: float, message: str, can_start: bool
+) -> None:
+    sounds = sounds_of(model_hz)
+    if model_hz == 400:
+        sounds = dict.fromkeys(sounds, sounds["truth"])
+    dialog = open_dialog(rendered=done(sounds))
+    qtbot.waitUntil(lambda: message in texts(dialog))
+    assert dialog._setup.start.isEnabled() == can_start
+
+
+def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open) -> None:
+    rendered: Future[Sounds] = Future()
+    dialog = open_dialog(rendered=rendered)
+    qtbot.waitUntil(lambda: "still being rendered" in texts(dialog))
+    rendered.set_result(sounds_of())
+    qtbot.waitUntil(dialog._setup.start.isEnabled)
+
+
+def test_a_sound_that_cannot_be_rendered_is_told(qtbot: QtBot, open_dialog: Open) -> None:
+    rendered: Future[Sounds] = Future()
+    rendered.set_exception(RuntimeError("the model's output runs away 0.1 s after the pluck"))
+    dialog = open_dialog(rendered=rendered)
+    qtbot.waitUntil(lambda: "runs away" in texts(dialog))
+    assert not dialog._setup.start.isEnabled()
+
+
+def test_at_another_rate_of_the_device_it_is_rendered_anew(qtbot: QtBot, sound: Sound, tmp_path: Path) -> None:
+    asked: list[int] = []
+
+    def render(rate_hz: int) -> Future[Sounds]:
+        asked.append(rate_hz)
+        return done(sounds_of())
+
+    dialog = AbxDialog(sound, Subject(CANDIDATES, PLUCK, 0.0), AbxChoices(folder=str(tmp_path)), render)
+    qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
+    dialog.open()
+    for rate_hz, channels in ((44_100, 2), (44_100, 1)):
+        other = AudioDevice("Loudspeaker", "Test API", rate_hz, channels)
+        sound._look_up = lambda *_, other=other: other  # type: ignore[misc]
+        sound.open(other)
+        qtbot.waitUntil(lambda channels=channels: sound.mixer.channels == channels and sound.rate_hz == 44_100)
+        qtbot.waitUntil(lambda: dialog._pair is not None and dialog._pair.mixer is sound.mixer)
+    assert asked == [RATE_HZ, 44_100]
+
+
+def test_a_record_that_cannot_be_written_is_told_and_saved_elsewhere(
+    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "records").write_text("in the way")
+    dialog = open_dialog(trials=1)
+    start(dialog)
+    press(qtbot, dialog, "x", "1")
+    assert "cannot be written" in texts(dialog)
+    monkeypatch.setattr(
+        "app.views.dialogs.abx_dialog.QFileDialog.getExistingDirectory", lambda *_: str(tmp_path / "other")
+    )
+    dialog._result._save.click()
+    assert len(list((tmp_path / "other").iterdir())) == 1
+    assert "cannot be written" not in texts(dialog)
+
+
+def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
+    dialog = open_dialog(trials=16)
+    assert "12 right of 16" in texts(dialog)
+    setup = dialog._setup
+    setup._usual.button(25).click()
+    assert "18 right of 25" in texts(dialog)
+    setup._trials.setValue(4)
+    assert "Too few" in texts(dialog)
+    assert not any(button.isChecked() for button in setup._usual.buttons())
+    assert dialog.choices().trials == 4
+
+
+def test_earlier_records_are_shown_and_exported(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
+    dialog = open_dialog(trials=1)
+    start(dialog)
+    press(qtbot, dialog, "x", "1")
+    (tmp_path / "records" / "abx_broken.json").write_text("{")
+    dialog._result.records_asked.emit()
+    page = dialog._records
+    assert page._list.count() == 1
+    assert "Headphones (Test API)" in page._text.toPlainText()
+    assert "abx_broken.json" in texts(page)
+    page.export(tmp_path / "record.txt")
+    assert (tmp_path / "record.txt").read_text(encoding="utf-8") == page._text.toPlainText()
+    page.back_asked.emit()
+    assert "of 1 right" in texts(dialog)

@@ -1,0 +1,55 @@
+"""Help and About name everything that there is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.views.dialogs.about_dialog import AboutDialog
+from app.views.dialogs.help_text import MODELS
+from app.window.about import about_text, library_versions
+from app.window.controller import Controller
+from app.window.main_window import KEYS
+from engine.models import MODELS as KNOWN_MODELS
+
+
+def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller) -> None:
+    controller.window.help_asked.emit()
+    dialog = controller._help
+    assert dialog is not None
+    assert dialog.isVisible()
+    assert not dialog.isModal()
+    texts = {dialog.tabs.tabText(row): dialog.tabs.widget(row).toPlainText() for row in range(dialog.tabs.count())}
+    for key, _, what in KEYS:
+        assert key in texts["Keys"]
+        assert what in texts["Keys"]
+    for panel in controller.panels:
+        assert panel.title in texts["Views"]
+        assert panel.help, panel.key
+        assert panel.help in texts["Views"]
+    assert len(MODELS) == len(KNOWN_MODELS)
+    for title, _ in MODELS:
+        assert title in texts["Models"]
+    dialog.close()
+
+
+def test_about_can_be_copied_whole(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", "my/own")
+    text = about_text(Path("here/settings.json"), Path("there"))
+    for part in (
+        "Learned Strings",
+        "MIT",
+        "DAFx24",
+        str(Path("here/settings.json")),
+        "there",
+        str(Path("my/own")),
+        "torch",
+        "PySide6",
+    ):
+        assert part in text
+    assert "not installed" not in library_versions().values()
+    dialog = AboutDialog(text)
+    qtbot.addWidget(dialog)
+    assert dialog.windowTitle() == "About"

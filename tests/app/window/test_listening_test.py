@@ -1,0 +1,127 @@
+"""The listening test in the window: it has the sound for itself, nothing behind it tells, and all is restored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.analysis.abx.choices import AbxChoices
+from app.audio.devices import AudioDevice
+from app.audio.output import Output
+from app.audio.sound import Sound
+from app.session.choices import Choices
+from app.views.dialogs.abx_dialog import AbxDialog
+from app.window.controller import Controller
+from app.window.main_window import MainWindow
+from app.window.settings import Settings, load_settings
+from engine.voices import Mixer
+
+Open = Callable[[AudioDevice, float, Mixer], Output]
+
+
+HEADPHONES = AudioDevice("Headphones", "Test API", 48_000)
+
+
+@pytest.fixture
+def window(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[MainWindow]:
+    made = MainWindow()
+    qtbot.addWidget(made)
+    made.show()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def heard(qtbot: QtBot, window: MainWindow, tmp_path: Path, numb_output: Open) -> Controller:
+    """A controller whose pluck is rendered, with a device that makes no sound."""
+
+    def make_sound(on_problem: object) -> Sound:
+        return Sound(look_up=lambda *_: HEADPHONES, open_output=numb_output)
+
+    abx = AbxChoices(trials=2, folder=str(tmp_path / "records"))
+    settings = Settings(choices=Choices(seconds=0.5, volume_db=-6), abx=abx)
+    made = Controller(window, settings, tmp_path / "settings.json", make_sound)
+    qtbot.waitUntil(lambda: "error of this pluck" in window.error_label.text(), timeout=20_000)
+    return made
+
+
+def open_test(qtbot: QtBot, controller: Controller) -> AbxDialog:
+    qtbot.keyClick(controller.window, Qt.Key.Key_T, Qt.KeyboardModifier.ControlModifier)
+    dialog = controller.window.findChild(AbxDialog)
+    assert dialog is not None
+    qtbot.waitUntil(dialog._setup.start.isEnabled, timeout=5_000)
+    return dialog
+
+
+def sounds(controller: Controller) -> bool:
+    """Whether the mixer has a voice that is not silent."""
+    return any(voice.sounding for voice in controller.sound.mixer.voices)
+
+
+def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> None:
+    window = heard.window
+    heard.pluck()
+    qtbot.waitUntil(lambda: window.transport.meter._peak_db > -60, timeout=5_000)
+    dialog = open_test(qtbot, heard)
+    assert dialog.isModal()
+    dialog._setup.start.click()
+    before = heard.session.choices
+    for key in (Qt.Key.Key_X, Qt.Key.Key_A, Qt.Key.Key_B, Qt.Key.Key_X):
+        qtbot.keyClick(dialog._trial, key)
+        qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
+        heard._tick()
+        assert window.transport.meter._peak_db == -60
+        assert not window.transport.meter.limit_light
+    assert heard.session.choices == before
+    dialog.abandon()
+
+
+def test_the_sound_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:
+    heard.pluck()
+    qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
+    dialog = open_test(qtbot, heard)
+    assert not heard.performance.playing
+    qtbot.waitUntil(lambda: not sounds(heard), timeout=5_000)
+    dialog._setup.audition_asked.emit("B")
+    qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
+    dialog._setup._trials.setValue(25)
+    qtbot.keyClick(dialog, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: not sounds(heard), timeout=5_000)
+    heard.pluck()
+    qtbot.waitUntil(lambda: heard.performance.position_s > 0.3, timeout=5_000)
+    heard.window.close()
+    assert load_settings(tmp_path / "settings.json")[0].abx.trials == 25
+
+
+def test_instruments_are_silent_meanwhile_and_the_test_keeps_its_pluck(qtbot: QtBot, heard: Controller) -> None:
+    dialog = open_test(qtbot, heard)
+    heard.instruments.perform({"position": 0.6, "amplitude_mm": 8.0}, True)  # a MIDI keyboard
+    qtbot.waitUntil(lambda: heard.session.choices.position == 0.6, timeout=5_000)
+    assert not heard.performance.playing
+    assert not sounds(heard)
+    first, model = dialog._stimuli, dialog._rendering.result()["model"]
+    assert first is not None
+    dialog._ask_for_sound()  # as after a change of the device's rate
+    assert (dialog._rendering.result(20)["model"] == model).all()
+    dialog.abandon()
+
+
+def test_closing_the_window_keeps_an_incomplete_record(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:
+    dialog = open_test(qtbot, heard)
+    dialog._setup.start.click()
+    for key in (Qt.Key.Key_X, Qt.Key.Key_1):
+        qtbot.keyClick(dialog._trial, key)
+    heard.window.close()
+    (path,) = (tmp_path / "records").iterdir()
+    assert '"complete": false' in path.read_text()
+
+
+def test_it_waits_for_no_picture(qtbot: QtBot, heard: Controller) -> None:
+    heard.session.update(preset="second")
+    dialog = open_test(qtbot, heard)
+    assert [candidate.label for candidate in dialog._setup.pair]
+    dialog.abandon()

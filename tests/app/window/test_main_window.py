@@ -1,0 +1,209 @@
+"""The window as a place: it fits small screens, is walked through with Tab, and needs no engine to be seen."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMenu, QTabBar, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.views import theme
+from app.views.controls.focus_ring import FocusRing
+from app.views.look import Look
+from app.window.appearance import Appearance
+from app.window.controller import Controller
+from app.window.main_window import KEYS, MainWindow
+
+ROOT = Path(__file__).parents[3]
+
+
+def stops(window: MainWindow) -> list[QWidget]:
+    """What the Tab key can reach, as far as it can be seen."""
+    return [
+        widget
+        for widget in window.findChildren(QWidget)
+        if widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and widget.focusProxy() is None
+        and widget.isEnabled()
+        and widget.isVisibleTo(window)
+        and widget.window() is window
+    ]
+
+
+def walk(window: MainWindow, start: QWidget) -> list[QWidget]:
+    """Where Tab leads from `start` until it comes back, or to a place where it has been."""
+    wanted = set(stops(window))
+    visited = [start]
+    widget = start.nextInFocusChain()
+    while widget not in visited:
+        if widget in wanted:
+            visited.append(widget)
+        widget = widget.nextInFocusChain()
+        if widget is start:
+            break
+    return visited
+
+
+def test_the_window_shows_without_the_engine() -> None:
+    code = (
+        "import sys, app.window.main, app.window.main_window, app.window.appearance\n"
+        "assert not {'torch', 'scipy', 'numba', 'pyqtgraph'} & set(sys.modules), 'too much'"
+    )
+    if sys.platform != "win32":  # there torch must come before Qt
+        done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+def test_it_waits_until_its_parts_are_there(qtbot: QtBot) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    with qtbot.waitSignal(window.first_painted):
+        window.show()
+    assert not window.transport.isEnabled()
+    assert window.presets.name.text() == "Reading presets …"  # nobody has looked yet whether there are any
+    window.show_string(QWidget())
+    assert window.transport.isEnabled()
+
+
+def test_everything_that_tab_reaches_has_a_name(controller: Controller) -> None:
+    found = stops(controller.window)
+    assert len(found) > 15
+    for widget in found:
+        text = widget.text() if isinstance(widget, QAbstractButton) else ""
+        assert widget.accessibleName() or text, widget
+        assert widget.toolTip() or isinstance(widget, QTabBar), widget
+
+
+def test_tab_visits_everything_and_returns(controller: Controller) -> None:
+    window = controller.window
+    window.notices.tell("Something to dismiss.")
+    visited = walk(window, window.presets.findChildren(QAbstractButton)[0])
+    assert set(visited) == set(stops(window))
+    assert len(visited) == len(set(visited))
+
+
+def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
+    window = controller.window
+    window.notices.tell("Something to dismiss.")
+    visited = walk(window, window.presets.findChildren(QAbstractButton)[0])
+    string = next(panel.view for panel in controller.panels if panel.key == "string")
+    parts = [window.presets, window.notices.bell, window.notices, string, window.left, window.right, window.transport]
+    met = [
+        number
+        for widget in visited
+        for number, part in enumerate(parts)
+        if widget is part or part.isAncestorOf(widget)
+    ]
+    assert met == sorted(met)
+    assert set(met) == set(range(len(parts)))
+
+
+def test_the_plot_that_has_the_keyboard_is_ringed(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    (ring,) = window.findChildren(FocusRing)
+    plot = window.right.currentWidget()
+    plot.setFocus()
+    qtbot.waitUntil(ring.isVisible)
+    assert ring.geometry().size() == plot.size()
+    window.resize(window.width() - 100, window.height())
+    qtbot.waitUntil(lambda: ring.geometry().size() == plot.size())
+    window.transport.knobs["width"].setFocus()
+    qtbot.waitUntil(lambda: not ring.isVisible())
+
+
+@pytest.fixture
+def themed(qapp: QApplication) -> Iterator[None]:
+    """As users see it: the theme's parts are larger than the bare style's."""
+    sheet = qapp.styleSheet()
+    theme.apply_theme(qapp, "dark")
+    yield
+    qapp.setStyleSheet(sheet)
+
+
+@pytest.mark.usefixtures("themed")
+def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    window.notices.tell("A fault in words that are long enough for two lines where the window is narrow. " * 2)
+    middle = window.centralWidget()
+    for size in (QSize(1024, 560), QSize(820, 490)):
+        window.resize(size)
+        qtbot.waitUntil(lambda size=size: middle.minimumSizeHint().expandedTo(size) == size)
+        assert window.size() == size
+
+
+@pytest.mark.usefixtures("themed")
+def test_in_a_narrow_window_the_controls_stand_closer_and_all_are_seen(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    transport = window.transport
+    for width, words in ((1000, "Export …"), (1280, "Export WAV …"), (958, "Export …")):
+        window.resize(width, 600)
+        qtbot.waitUntil(lambda words=words: transport._export.text() == words)
+        qtbot.waitUntil(lambda: transport.minimumSizeHint().width() <= transport.parentWidget().width())
+        right = transport._export.mapTo(window, transport._export.rect().topRight()).x()
+        assert right < width
+
+
+@pytest.mark.usefixtures("themed")
+def test_in_a_small_window_with_a_filter_the_header_does_not_overlap(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    bar = window.presets
+    bar.set_listed(1, 21)
+    bar.name.setText("★  Nylon B3, noise, 16 kHz (integrated phase, blind recipe)   ▾")
+
+    def apart() -> bool:
+        parts = [bar.layout().itemAt(at).geometry() for at in range(4)]
+        return all(left.right() < right.left() for left, right in pairwise(parts))
+
+    for width in (760, 1000, 1280):
+        window.resize(width, 600)
+        qtbot.waitUntil(lambda width=width: bar.geometry().right() < width == window.width())
+        qtbot.waitUntil(apart)
+        assert bar.minimumSizeHint().width() <= bar.width()
+        assert bar.name.text().endswith("▾")
+
+
+def test_it_opens_no_larger_than_the_screen(qtbot: QtBot) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    room = window.screen().availableSize()
+    window.resize(room + QSize(200, 100))
+    for saved in ("", window.geometry_text()):
+        window.resize(room + QSize(200, 100))
+        window.restore_geometry(saved)
+        assert window.width() <= room.width()
+        assert window.height() < room.height()
+
+
+def test_every_key_has_its_signal_and_words() -> None:
+    assert len({key for key, _, _ in KEYS}) == len(KEYS)
+    for _, signal, what in KEYS:
+        assert hasattr(MainWindow, signal)
+        assert what
+
+
+def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> None:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    style, palette = qapp.styleSheet(), qapp.palette()
+    made = Appearance(window, Look(face="dark"))
+    try:
+        actions = {action.text(): action for menu in window.menu.findChildren(QMenu) for action in menu.actions()}
+        assert actions["Dark"].isChecked()
+        actions["Light"].trigger()
+        assert made.look.face == "light"
+        assert theme.face == theme.LIGHT
+        assert actions["Light"].isChecked()
+        actions["150 %"].trigger()
+        assert made.look.size_percent == 150
+        assert "next start" in window.notices.text
+    finally:
+        theme.apply_theme(qapp, "dark")
+        qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
+        qapp.setStyleSheet(style)
+        qapp.setPalette(palette)

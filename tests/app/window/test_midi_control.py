@@ -1,0 +1,197 @@
+"""The input with a backend of our own in place of mido, and what the window makes of it."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.playing.keyboard import Reach
+from app.playing.midi import Control, Message, MidiChoices
+from app.playing.midi_port import MidiInput, MidiUnavailable, load_backend, same_device
+from app.window.midi_control import MidiControl
+
+
+class FakeBackend:
+    """Two inputs; `send` speaks in a thread of its own, as mido does."""
+
+    def __init__(self) -> None:
+        self.names = ["Keys:Keys 20:0", "Pads:Pads 24:0"]
+        self.busy = False
+        self.open_name = ""
+        self._callback: Callable[[Any], None] | None = None
+
+    def get_input_names(self) -> list[str]:
+        return self.names
+
+    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> FakeBackend:
+        if self.busy:
+            raise OSError("resource busy")
+        self.open_name, self._callback = name, callback
+        return self
+
+    def close(self) -> None:
+        self.open_name, self._callback = "", None
+
+    def send(self, kind: str, **facts: int) -> None:
+        callback = self._callback
+        assert callback is not None
+        thread = threading.Thread(target=callback, args=(SimpleNamespace(type=kind, **facts),))
+        thread.start()
+        thread.join()
+
+
+def test_an_input_is_found_again_under_new_numbers() -> None:
+    backend, heard = FakeBackend(), list[Message]()
+    midi = MidiInput(heard.append, lambda: backend)
+    midi.open("Pads:Pads 31:0")
+    assert (midi.name, backend.open_name) == ("Pads:Pads 24:0", "Pads:Pads 24:0")
+    backend.send("control_change", control=1, value=2)
+    backend.send("clock")
+    assert heard == [Control(1, 2)]
+    midi.close()
+    midi.close()
+    assert (midi.name, backend.open_name) == ("", "")
+    assert not same_device("Keys 1", "Keys 2")
+
+
+def test_faults_are_told_in_plain_words() -> None:
+    backend = FakeBackend()
+    midi = MidiInput(lambda message: None, lambda: backend)
+    with pytest.raises(MidiUnavailable, match="Strings is not connected"):
+        midi.open("Strings")
+    backend.busy = True
+    with pytest.raises(MidiUnavailable, match="Another program"):
+        midi.open("Keys:Keys 20:0")
+    assert midi.name == ""
+
+
+def test_without_the_packages_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mido", None)
+    with pytest.raises(MidiUnavailable, match=r"pip install mido python-rtmidi"):
+        load_backend()
+
+
+@pytest.fixture
+def backend() -> FakeBackend:
+    return FakeBackend()
+
+
+Played = list[tuple[dict[str, Any], threading.Thread]]
+
+
+@pytest.fixture
+def played() -> Played:
+    """Notes, and the threads that they were played in."""
+    return []
+
+
+def control(choices: MidiChoices, presets: list[str], played: Played, load: Callable[[], FakeBackend]) -> MidiControl:
+    def play(changes: dict[str, Any]) -> None:
+        played.append((changes, threading.current_thread()))
+
+    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: presets, play, load=load)
+
+
+@pytest.fixture
+def midi(qtbot: QtBot, backend: FakeBackend, played: Played) -> MidiControl:
+    return control(MidiChoices(port="Keys:Keys 9:0"), ["a", "b"], played, lambda: backend)
+
+
+def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
+    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, played: Played
+) -> None:
+    """The window may be busy with anything; it hears nothing of it here."""
+    midi.start()
+    with qtbot.assertNotEmitted(midi.performed, wait=50):
+        backend.send("note_on", note=96, velocity=127)
+        ((changes, thread),) = played
+        assert changes == {"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}
+        assert thread is not threading.main_thread()
+        backend.send("note_on", note=96, velocity=0)  # a key is let go
+        backend.send("note_off", note=96, velocity=64)
+    assert len(played) == 1
+
+
+def test_controllers_reach_the_windows_thread(
+    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, played: Played
+) -> None:
+    midi.start()
+    midi._remember(midi.choices.learned("width", 74))
+    threads = []
+    midi.performed.connect(lambda changes: threads.append(threading.current_thread()))
+    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+        backend.send("control_change", control=74, value=0)
+    assert performed.args == [{"width": pytest.approx(0.02)}]
+    assert threads == [threading.main_thread()]
+    assert played == []
+
+
+def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.show_dialog(window)
+    dialog = midi._dialog
+    assert dialog is not None
+    taught, learn, forget = dialog._rows["width"]
+    assert not forget.isEnabled()
+    dialog.port_chosen.emit("Pads:Pads 24:0")
+    assert midi.choices.port == "Pads:Pads 24:0"
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
+    assert "Move" in taught.text()
+    with qtbot.waitSignal(midi.performed, timeout=5_000):
+        backend.send("control_change", control=74, value=127)
+    assert midi.choices.controllers == {"width": 74}
+    assert taught.text() == "Controller 74"
+    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+        backend.send("control_change", control=74, value=0)
+    assert performed.args == [{"width": pytest.approx(0.02)}]
+    qtbot.mouseClick(forget, Qt.MouseButton.LeftButton)
+    assert midi.choices.controllers == {}
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)  # thought better of it
+    assert not learn.isChecked()
+
+
+def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
+    """And the dialog says how to get them; with them, it can."""
+    window, missing = QWidget(), True
+    qtbot.addWidget(window)
+
+    def load() -> FakeBackend:
+        if missing:
+            raise MidiUnavailable("Get them with: pip install mido python-rtmidi")
+        return FakeBackend()
+
+    midi = control(MidiChoices(), [], [], load)
+    midi.show_dialog(window)
+    dialog = midi._dialog
+    assert dialog is not None
+    for _, learn, _ in dialog._rows.values():
+        assert not learn.isEnabled()
+        assert "pip install mido" in learn.toolTip()
+    assert "pip install mido" in dialog._problem.text()
+    missing = False
+    midi.show_dialog(window)
+    assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())
+    assert "move the controller" in dialog._rows["width"][1].toolTip()
+
+
+def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+    backend.names = []
+    with qtbot.waitSignal(midi.told) as told:
+        midi.start()
+    assert "not connected" in told.args[0]
+    assert midi.choices.port == "Keys:Keys 9:0"
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.show_dialog(window)
+    assert midi._dialog is not None
+    assert midi._dialog._inputs.currentText() == "No MIDI input found"

@@ -1,0 +1,310 @@
+"""What is played and what is shown: notes at once and in their own time, pictures when they are there."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import torch
+from pytestqt.qtbot import QtBot
+
+from app.audio.devices import AudioDevice
+from app.audio.output import Output
+from app.audio.sound import Sound
+from app.playing.notes import Note
+from app.session.choices import Choices
+from app.window.controller import Controller
+from app.window.main_window import MainWindow
+from app.window.performance import Performance
+from app.window.settings import Settings
+from engine.kernels.layout import QUANTUM
+from engine.models import KoopmanVar
+from engine.models.koopman_var import KoopmanState
+from engine.preset import SHIPPED
+from engine.voices import Mixer
+
+RATE_HZ = 48_000
+TURN_S = 0.5  # the shortest that can be chosen
+SPEAKERS = AudioDevice("Speakers", "Test API", RATE_HZ)
+
+
+@pytest.fixture
+def window(
+    qtbot: QtBot,
+    small_preset: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    numb_output: Callable[[AudioDevice, float, Mixer], Output],
+) -> Iterator[Controller]:
+    """With a device that makes no sound, a preset that sounds at once and one that is rendered first."""
+    folder = tmp_path / "presets"
+    folder.mkdir()
+    shutil.copy(SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors", folder / "bank.safetensors")
+    shutil.copy(small_preset, folder / "rendered.safetensors")
+    monkeypatch.setattr("app.presets.library.SHIPPED", folder)
+    made = MainWindow()
+    qtbot.addWidget(made)
+    controller = Controller(
+        made,
+        Settings(choices=Choices(preset="bank", seconds=1.0)),
+        tmp_path / "settings.json",
+        lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output),
+    )
+    made.show()
+    qtbot.waitUntil(lambda: "error of this pluck" in made.error_label.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: controller.sound.status().device == SPEAKERS, timeout=5_000)
+    yield controller
+    made.close()
+
+
+@pytest.fixture
+def performance(window: Controller) -> Performance:
+    return window.performance
+
+
+def ringing(performance: Performance) -> list[Note]:
+    return [note for note in performance.notes._notes if not note.over and not note.released]
+
+
+def pluck(qtbot: QtBot, performance: Performance) -> Note:
+    """One that sounds."""
+    performance.pluck()
+    note = ringing(performance)[-1]
+    qtbot.waitUntil(lambda: note.seconds > 0, timeout=20_000)
+    return note
+
+
+def test_the_position_is_that_of_the_note(qtbot: QtBot, window: Controller, performance: Performance) -> None:
+    assert not performance.playing
+    assert performance.position_s == 0
+    note = pluck(qtbot, performance)
+    assert performance.playing
+    assert performance.moving
+    for _ in range(5):
+        before_s, shown_s, after_s = note.seconds, performance.position_s, note.seconds
+        assert before_s <= shown_s <= after_s
+        qtbot.wait(20)
+    assert note.seconds == pytest.approx(window.sound.mixer.seconds - note.began_frame / RATE_HZ, abs=0.05)
+    qtbot.waitUntil(lambda: not performance.moving, timeout=5_000)
+    assert performance.position_s == 1.0, "the picture ends there"
+    assert performance.playing, "the string rings on"
+
+
+def test_stop_keeps_the_playhead_whatever_else_is_chosen(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    note = pluck(qtbot, performance)
+    qtbot.waitUntil(lambda: performance.position_s > 0.1)
+    performance.stop()
+    stopped_s = performance.position_s
+    assert not performance.playing
+    qtbot.waitUntil(lambda: note.over, timeout=5_000)
+    for changes in ({"volume_db": -6.0}, {"listen": 0.2}, {"heard": "b"}):
+        window.session.update(**changes)
+        assert performance.position_s == stopped_s
+    assert not performance.moving
+    performance.play_or_stop()
+    assert performance.playing
+    assert performance.position_s < stopped_s
+
+
+def test_a_seek_goes_on_from_there_alone(qtbot: QtBot, performance: Performance) -> None:
+    first = pluck(qtbot, performance)
+    performance.seek(0.5)
+    assert first.released
+    assert performance.position_s >= 0.5, "at once"
+    (note,) = ringing(performance)
+    qtbot.waitUntil(lambda: performance.position_s > 0.55, timeout=5_000)
+    assert performance.position_s == pytest.approx(note.seconds, abs=0.05)
+    performance.seek(9.0)
+    assert performance.position_s == 1.0
+
+
+def test_a_seek_where_nothing_rings_moves_the_playhead_alone(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    performance.seek(0.25)
+    assert performance.position_s == 0.25
+    note = pluck(qtbot, performance)
+    for voice in note.voices.values():
+        voice.release(0.01)  # it ends by itself
+    qtbot.waitUntil(lambda: not performance.playing, timeout=5_000)
+    performance.seek(0.7)
+    assert performance.position_s == 0.7
+    window.session.update(volume_db=-3.0)
+    assert performance.position_s == 0.7
+    assert ringing(performance) == []
+
+
+def loop(qtbot: QtBot, window: Controller, seconds: float = TURN_S) -> Note:
+    """The first turn."""
+    window.session.update(seconds=seconds, loop=True)
+    qtbot.waitUntil(lambda: window.performance.ready, timeout=20_000)
+    return pluck(qtbot, window.performance)
+
+
+def next_turn(qtbot: QtBot, performance: Performance, before: Note) -> Note:
+    qtbot.waitUntil(lambda: performance._shown.note is not before, timeout=5_000)
+    assert performance._shown.note is not None
+    return performance._shown.note
+
+
+@pytest.mark.parametrize("preset", ["bank", "rendered"])
+def test_a_loop_begins_each_turn_at_its_frame(
+    qtbot: QtBot, window: Controller, performance: Performance, preset: str
+) -> None:
+    window.session.update(preset=preset)
+    note = loop(qtbot, window)
+    for _ in range(3):
+        turn = next_turn(qtbot, performance, note)
+        expected = note.began_frame + round(TURN_S * RATE_HZ)
+        assert turn.began_frame == -(-expected // QUANTUM) * QUANTUM
+        qtbot.waitUntil(lambda note=note: note.over, timeout=5_000)  # type: ignore[misc]
+        note = turn
+    assert len(ringing(performance)) <= 2
+    assert performance.position_s <= TURN_S
+
+
+def test_a_seek_in_a_loop_shortens_its_turn(qtbot: QtBot, window: Controller, performance: Performance) -> None:
+    loop(qtbot, window, seconds=1.0)
+    performance.seek(0.75)
+    note = performance._shown.note
+    assert note is not None
+    turn = next_turn(qtbot, performance, note)
+    assert turn.began_frame - note.began_frame == pytest.approx(0.25 * RATE_HZ, abs=QUANTUM)
+
+
+def test_a_loop_that_is_switched_off_rings_out(qtbot: QtBot, window: Controller, performance: Performance) -> None:
+    note = loop(qtbot, window)
+    qtbot.waitUntil(lambda: performance._next_turn is not None, timeout=5_000)
+    waiting = performance._next_turn
+    assert waiting is not None
+    window.session.update(loop=False)
+    qtbot.wait(600)
+    assert waiting.over
+    assert waiting.seconds == 0
+    assert note.seconds > TURN_S + 0.05
+    assert not note.over
+
+
+def test_a_loop_goes_on_where_its_note_has_fallen_silent(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    note = loop(qtbot, window, seconds=0.6)
+    for voice in note.voices.values():
+        voice.release(0.01)
+    qtbot.waitUntil(lambda: note.over, timeout=5_000)
+    turn = next_turn(qtbot, performance, note)
+    assert turn.began_frame - note.began_frame == pytest.approx(0.6 * RATE_HZ, abs=QUANTUM)
+
+
+def test_a_pluck_in_a_loop_is_what_goes_on(qtbot: QtBot, window: Controller, performance: Performance) -> None:
+    loop(qtbot, window)
+    qtbot.waitUntil(lambda: performance._next_turn is not None, timeout=5_000)
+    waiting = performance._next_turn
+    assert waiting is not None
+    struck = pluck(qtbot, performance)
+    assert performance._shown.note is struck
+    turn = next_turn(qtbot, performance, struck)
+    assert turn.began_frame - struck.began_frame == pytest.approx(TURN_S * RATE_HZ, abs=QUANTUM)
+    assert waiting.seconds == 0
+
+
+def test_the_picture_follows_the_latest_note(qtbot: QtBot, window: Controller, performance: Performance) -> None:
+    first = pluck(qtbot, performance)
+    window.session.update(position=0.6)
+    second = pluck(qtbot, performance)
+    qtbot.waitUntil(lambda: performance.ready and performance._shown.note is second, timeout=20_000)
+    assert performance.take is not None
+    assert performance.take.pluck.position == 0.6
+    third = pluck(qtbot, performance)  # the same again: its motion is there
+    assert performance._shown.note is third
+    assert ringing(performance) == [first, second, third]
+
+
+def test_a_note_of_an_instrument_is_in_the_mixer_before_the_window_knows(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    """The window's thread is busy here until it waits."""
+    qtbot.waitUntil(lambda: window.sound.mixer.voices == [], timeout=5_000)
+    before = window.session.choices
+    changes = [{"position": 0.4, "amplitude_mm": 5.0}, {"position": 0.6}]
+    for number, change in enumerate(changes, 1):
+        player = threading.Thread(target=window.instruments.perform, args=(change, True))
+        player.start()
+        player.join()
+        assert len({voice.program for voice in window.sound.mixer.voices}) == 2  # model and truth
+        assert len(ringing(performance)) == number
+    time.sleep(0.1)
+    assert all(note.seconds > 0 for note in ringing(performance)), "it sounds"
+    assert window.session.choices == before
+    told: list[Choices] = []
+    window.instruments.played.connect(lambda: told.append(window.session.choices))
+    plucks = [note.stroke.pluck for note in ringing(performance)]
+    assert [(each.position, each.amplitude_mm) for each in plucks] == [(0.4, 5.0), (0.6, 5.0)]
+    qtbot.waitUntil(lambda: told != [], timeout=5_000)
+    assert (told[-1].position, told[-1].amplitude_mm) == (0.6, 5.0)
+    qtbot.waitUntil(lambda: performance._shown.note is ringing(performance)[-1], timeout=20_000)
+    assert performance.notes.latencies_s
+
+
+def test_another_rate_of_the_device_leaves_what_rings_and_what_is_shown(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    note = pluck(qtbot, performance)
+    mixer, other = window.sound.mixer, AudioDevice("Other", "Test API", 44_100)
+    window.sound._look_up = lambda *_: other
+    window.sound.open(other)
+    qtbot.waitUntil(lambda: window.sound.mixer is not mixer, timeout=5_000)
+    qtbot.waitUntil(lambda: note.mixer is window.sound.mixer, timeout=5_000)
+    here_s = performance.position_s
+    assert here_s > 0
+    qtbot.waitUntil(lambda: performance.position_s > here_s, timeout=5_000)
+    performance.stop()
+    assert not performance.playing
+
+
+@pytest.fixture
+def slow_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    advance = KoopmanVar.advance
+
+    def slow(
+        self: KoopmanVar, state: KoopmanState, steps: int, readout: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, KoopmanState]:
+        if readout is not None:  # for the ear, not for the picture
+            time.sleep(steps / 2_000)
+        return advance(self, state, steps, readout)
+
+    monkeypatch.setattr(KoopmanVar, "advance", slow)
+
+
+def test_how_long_a_model_is_waited_for_is_told_and_then_its_error(
+    qtbot: QtBot, window: Controller, performance: Performance, slow_model: None
+) -> None:
+    window.session.update(preset="rendered", seconds=0.8)
+    label = window.window.error_label
+    qtbot.waitUntil(lambda: performance.settled and "error of this pluck" in label.text(), timeout=20_000)
+    performance.pluck()
+    qtbot.waitUntil(lambda: label.text().startswith("KOOPMAN_VAR: sounds in 0."), timeout=5_000)
+    (note,) = ringing(performance)
+    assert performance.position_s == 0
+    qtbot.waitUntil(lambda: not note.pending, timeout=20_000)
+    qtbot.waitUntil(lambda: "error of this pluck" in label.text(), timeout=5_000)
+
+
+def test_space_stops_what_has_not_sounded_yet(
+    qtbot: QtBot, window: Controller, performance: Performance, slow_model: None
+) -> None:
+    window.session.update(preset="rendered", seconds=10.0)
+    qtbot.waitUntil(lambda: performance.ready, timeout=20_000)
+    window.play_or_stop()
+    assert performance.playing
+    (note,) = ringing(performance)
+    window.play_or_stop()
+    assert not performance.playing
+    assert note.over
+    qtbot.waitUntil(lambda: "sounds in" not in window.window.error_label.text(), timeout=5_000)

@@ -1,0 +1,273 @@
+"""The preset bar and browser in the window: gestures and keys change the session, the session what they show."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeWidget
+from pytestqt.qtbot import QtBot
+
+from app.export.files import SoundRequest, export_sound
+from app.views.dialogs.preset_browser import PresetBrowser
+from app.window.controller import Controller
+from app.window.settings import FIRST_FAVOURITES, load_settings
+from engine.pluck import Pluck
+from engine.preset import load_preset, preset_files
+
+KEY = Qt.Key
+CONTROL = Qt.KeyboardModifier.ControlModifier
+
+
+@pytest.fixture
+def browser(qtbot: QtBot, controller: Controller) -> PresetBrowser:
+    """Open, with the keyboard in its search."""
+    qtbot.waitUntil(controller.window.isActiveWindow, timeout=5_000)
+    qtbot.keyClick(controller.window, KEY.Key_P, CONTROL)
+    found = controller.presets.browser
+    assert found.isVisible()
+    found.search.setFocus()
+    return found
+
+
+def listed(browser: PresetBrowser) -> list[str]:
+    return [entry.name for entry in browser._entries]
+
+
+def test_arrows_load_from_the_search_and_enter_closes(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    qtbot.keyClick(browser.search, KEY.Key_Down)
+    assert controller.session.choices.preset == "second"
+    assert browser.isVisible()
+    assert not controller.performance.playing
+    qtbot.keyClick(browser.search, KEY.Key_Down)
+    assert controller.session.choices.preset == "second"
+    qtbot.keyClick(browser.list, KEY.Key_Up)
+    assert controller.session.choices.preset == "first"
+    qtbot.keyClick(browser.search, KEY.Key_Return)
+    assert not browser.isVisible()
+
+
+def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+    qtbot.keyClick(browser.search, KEY.Key_Space)
+    assert browser.isVisible()
+    assert browser.search.text() == ""
+    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
+
+
+def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    asked: list[None] = []
+    browser.pluck_asked.connect(lambda: asked.append(None))
+    for key in "small sec":
+        qtbot.keyClick(browser.search, key)
+    assert (browser.search.text(), listed(browser), asked) == ("small sec", ["second"], [])
+    qtbot.keyClick(browser.search, KEY.Key_Down)
+    assert browser.list.hasFocus()
+    qtbot.keyClick(browser.list, KEY.Key_Space)
+    assert (browser.search.text(), len(asked)) == ("small sec", 1)
+    qtbot.keyClick(browser.list, KEY.Key_Backspace)
+    assert browser.search.hasFocus()
+    assert browser.search.text() == "small se"
+    browser.dismiss()
+    controller.presets.toggle()  # with the words of last time, to be typed over
+    qtbot.keyClick(browser.search, KEY.Key_Space)
+    assert (browser.search.text(), len(asked)) == ("small se", 2)
+
+
+def test_typing_filters_and_what_was_chosen_stays(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    qtbot.keyClicks(browser.list, "sec")
+    assert browser.search.text() == "sec"
+    assert listed(browser) == ["second"]
+    assert controller.session.choices.preset == "first"
+    assert browser._card.text().startswith("The chosen preset is not in this list")
+    qtbot.keyClicks(browser.search, "x")
+    assert listed(browser) == []
+    assert "No preset fits" in browser._card.text()
+    qtbot.keyClick(browser.search, KEY.Key_Down)  # nothing to move to
+    browser.search.setText("sec")
+    qtbot.keyClick(browser.search, KEY.Key_Return)
+    assert controller.session.choices.preset == "second"
+    qtbot.keyClick(controller.window, KEY.Key_PageDown)  # goes round in the filtered list
+    assert controller.session.choices.preset == "second"
+    controller.session.update(preset="first")
+    qtbot.keyClick(controller.window, KEY.Key_PageDown)
+    assert controller.session.choices.preset == "second"
+
+
+def test_keys_of_the_window_rest_while_the_search_is_typed_in(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    qtbot.keyClick(browser.list, KEY.Key_X)
+    assert controller.session.choices.heard == "a"
+    assert browser.search.text() == "x"
+
+
+def test_filters_by_kind(controller: Controller, browser: PresetBrowser) -> None:
+    browser._strings.setCurrentIndex(browser._strings.findData("linear"))
+    assert listed(browser) == []
+    browser._strings.setCurrentIndex(0)
+    browser._rates.setCurrentIndex(browser._rates.findData(4000))
+    browser._models.setCurrentIndex(browser._models.findData("koopman_var"))
+    assert listed(browser) == ["first", "second"]
+
+
+def test_a_filter_is_told_beside_the_preset_and_cleared_there(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    """Previous and next go through what it leaves."""
+    bar, session = controller.window.presets, controller.session
+    assert not bar.filtered.isVisible()
+    qtbot.keyClicks(browser.search, "second")
+    browser._rates.setCurrentIndex(1)
+    browser.dismiss()
+    assert bar.filtered.isVisible()
+    assert bar.filtered.text() == "1 of 2  ✕"
+    for _ in range(2):
+        bar.step_asked.emit(1)
+        assert session.choices.preset == "second"
+    bar.filtered.click()
+    assert not bar.filtered.isVisible()
+    assert (browser.search.text(), browser._rates.currentIndex(), len(listed(browser))) == ("", 0, 2)
+    bar.step_asked.emit(1)
+    assert session.choices.preset == "first"
+
+
+def test_a_search_without_a_find_ends_with_the_browser(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    qtbot.keyClicks(browser.search, "zzz")
+    assert controller.window.presets.filtered.isVisible()
+    qtbot.keyClick(browser.search, KEY.Key_Escape)
+    assert not controller.window.presets.filtered.isVisible()
+    qtbot.keyClick(controller.window, KEY.Key_PageDown)
+    assert controller.session.choices.preset == "second"
+
+
+def test_the_marked_row_is_the_chosen_preset(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+    controller.session.update(preset="second")
+    for words, marked in (("first", []), ("", ["second"]), ("zzz", []), ("", ["second"])):
+        browser.search.setText(words)
+        rows = browser.list.selectionModel().selectedRows()
+        assert [listed(browser)[row.row()] for row in rows] == marked
+
+
+def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -> None:
+    browser.favourite_asked.emit("second")
+    assert listed(browser) == ["second", "first"]
+    browser.favourite_asked.emit("second")
+    assert listed(browser) == ["first", "second"]
+
+
+def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
+    qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
+    assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}
+    assert "★" in controller.window.presets.name.text()
+    browser._starred.click()
+    assert listed(browser) == ["first"]
+    place = browser.list.visualItemRect(browser.list.topLevelItem(0)).topLeft() + QPoint(6, 6)
+    qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert listed(browser) == []
+    browser._starred.click()
+    browser.favourite_asked.emit("second")
+    controller.window.close()
+    assert load_settings(tmp_path / "settings.json")[0].favourites == ("second", *sorted(FIRST_FAVOURITES))
+
+
+def test_the_first_favourites_are_shipped() -> None:
+    assert {path.stem for path in preset_files()} >= set(FIRST_FAVOURITES)
+
+
+def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, browser: PresetBrowser) -> None:
+    card = browser._card.text()
+    for words in ("A small string", "4 kHz", "the first 0.1 s", "25 % of the motion", "Licence", "MIT", "kB"):
+        assert words in card
+    assert "To remake" not in card
+    assert "A small string" in controller.window.presets.name.text()
+
+
+def test_the_error_stays_in_the_header_where_there_is_little_room(controller: Controller) -> None:
+    card = controller.window.presets.card
+    for width in (1200, 400, 300):
+        card.resize(width, 20)
+        assert card.shown.endswith("validation error 25 %")
+    assert "parameters" in card.text()
+
+
+def test_every_control_of_bar_and_browser_has_a_name_and_a_tip(
+    controller: Controller, browser: PresetBrowser
+) -> None:
+    for part in (browser, controller.window.presets):
+        for kind in (QAbstractButton, QComboBox, QLineEdit, QTreeWidget):
+            for control in part.findChildren(kind):
+                if control.focusPolicy() != Qt.FocusPolicy.NoFocus:
+                    assert control.accessibleName(), control
+                    assert control.toolTip(), control.accessibleName()
+
+
+def test_presets_put_into_the_folder_appear_when_it_is_opened(
+    controller: Controller, small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    (tmp_path / "own").mkdir()
+    shutil.copy(small_preset, tmp_path / "own" / "mine.safetensors")
+    (tmp_path / "own" / "bad.safetensors").write_bytes(b"?")
+    controller.presets.toggle()
+    assert listed(controller.presets.browser) == ["first", "mine", "second"]
+    assert "bad.safetensors" in controller.window.notices.text
+    assert str(tmp_path / "own") in controller.presets.browser._state.text()
+
+
+def drop(controller: Controller, *files: Path) -> None:
+    """As from a file manager that proposes to move them."""
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
+    actions, button = Qt.DropAction.CopyAction | Qt.DropAction.MoveAction, Qt.MouseButton.LeftButton
+    over = QDragEnterEvent(QPoint(50, 50), actions, data, button, Qt.KeyboardModifier.NoModifier)
+    dropped = QDropEvent(QPointF(50, 50), actions, data, button, Qt.KeyboardModifier.NoModifier)
+    for event, take in ((over, controller.window.dragEnterEvent), (dropped, controller.window.dropEvent)):
+        event.setDropAction(Qt.DropAction.MoveAction)
+        take(event)
+        assert event.isAccepted()
+        assert event.dropAction() == Qt.DropAction.CopyAction
+
+
+def test_a_file_over_any_view_reaches_the_window(controller: Controller) -> None:
+    window = controller.window
+    for view in (panel.view for panel in controller.panels):
+        under = view.childAt(view.rect().center()) or view
+        while under is not window:
+            assert not under.acceptDrops(), under
+            under = under.parentWidget()
+    assert window.acceptDrops()
+
+
+def test_dropped_files_are_taken_in(
+    controller: Controller, preset_folder: Path, small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    new = tmp_path / "new.safetensors"
+    new.write_bytes(small_preset.read_bytes().replace(b"A small string", b"Another string"))
+    drop(controller, new)
+    assert controller.session.choices.preset == "new"
+    assert controller.window.presets.name.text().startswith("Another string")
+    assert (tmp_path / "own" / "new.safetensors").is_file()
+    request = SoundRequest(load_preset(preset_folder / "first.safetensors"), Pluck(0.5, 2.0), 0.3, 0.6, "truth")
+    export_sound(request, tmp_path / "a.wav")
+    drop(controller, tmp_path / "a.wav")
+    choices = controller.session.choices
+    assert (choices.pluck, choices.listen, choices.seconds) == (Pluck(0.5, 2.0), 0.3, 0.6)
+    assert (choices.preset, choices.source_heard) == ("first", "truth")
+    monkeypatch.setattr("app.window.dropped_files.restored_choices", lambda recipe: {"listen": 3})
+    drop(controller, tmp_path / "a.wav")
+    assert "its choices cannot be restored here (listen: " in controller.window.notices.text
+    drop(controller, tmp_path / "foreign.txt")
+    assert "neither a preset" in controller.window.notices.text
+    assert controller.session.choices == choices
