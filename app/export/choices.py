@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from app.shared.vocabulary import Source
+from app.shared.vocabulary import Bits, Source
 
 
 class BatchChoices(BaseModel):
@@ -29,7 +29,7 @@ class ExportChoices(BaseModel):
     folder: str = ""
     source: Literal["model", "truth", "difference", "both", "files"] = "model"
     rate_hz: int = 48_000
-    bits: Literal["16", "24", "32f"] = "24"
+    bits: Bits = "24"
     until_decayed: bool = True
     decay_db: float = 60.0
     longest_s: float = 30.0

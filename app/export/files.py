@@ -26,8 +26,9 @@ from app.export.sound import (
     render_sound,
     render_voices,
 )
-from app.export.wav import BITS, RATE_RANGE_HZ, Bits, EncodedWav, WavSettings, encode_wav
+from app.export.wav import RATE_RANGE_HZ, EncodedWav, WavSettings, encode_wav
 from app.shared.version import PROGRAM, program_version
+from app.shared.vocabulary import BITS, Bits
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine.pluck import Pluck
 from engine.preset import PresetError

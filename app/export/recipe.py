@@ -10,10 +10,10 @@ import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from app.export.sound import LONGEST_S, SoundRequest
-from app.export.wav import RATE_RANGE_HZ, Bits, WavSettings
+from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.presets.digest import preset_digest
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import Pickup, Source
+from app.shared.vocabulary import Bits, Pickup, Source
 from engine.pluck import Pluck
 from engine.preset import Preset, PresetError
 from engine.sources import FULL_SCALE_M

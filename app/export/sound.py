@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from app.shared.vocabulary import PICKUPS, Pickup, Source
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from engine.pluck import Pluck
 from engine.preset import Preset
 from engine.sources import ModelSource, Runaway
@@ -24,7 +24,6 @@ VOICES: tuple[Voice, ...] = get_args(Voice)
 SOURCES: tuple[Source, ...] = get_args(Source)
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
-DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)
 DECAYED_FOR_SURE_DB = 30.0  # below the wanted decay, by all of the string: no point on it is louder
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level is no matter of phase
 

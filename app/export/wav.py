@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 import soundfile
@@ -16,9 +15,8 @@ import soxr
 from numpy.typing import NDArray
 
 from app.export.wav_chunks import Marker, with_markers, without_time_stamp
+from app.shared.vocabulary import BITS, Bits
 
-Bits = Literal["16", "24", "32f"]
-BITS: tuple[Bits, ...] = get_args(Bits)
 RATE_RANGE_HZ = (1_000, 384_000)
 LONGEST_TAG_BYTES = 2_000  # libsndfile reads back no INFO text of 2048 bytes or more
 NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves room for the peaks between samples

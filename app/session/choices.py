@@ -10,6 +10,7 @@ from typing import Any, Literal
 from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
 Slot = Literal["a", "b"]  # two sources to compare; each holds "model", "truth", "difference" or "preset:NAME"
@@ -17,7 +18,6 @@ SLOT_PATTERN = r"^(model|truth|difference|preset:.+)$"
 
 SECONDS_RANGE = (0.5, 12.0)
 VOLUME_RANGE_DB = (-60.0, 12.0)
-DIFFERENCE_GAIN_RANGE_DB = (0.0, 60.0)
 HIGHEST_MODE = 9_999  # of any grid that a preset may have
 SPEED_RANGE = (0.001, 1.0)  # 1 is real time; a thousandth shows one period of a low string in seconds
 

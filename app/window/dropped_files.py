@@ -10,7 +10,8 @@ from app.export.recipe import Recipe, RecipeError, changed_preset_notice, preset
 from app.presets.folders import user_folder
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
-from app.session.choices import DIFFERENCE_GAIN_RANGE_DB, SECONDS_RANGE
+from app.session.choices import SECONDS_RANGE
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 
 
 @dataclass(frozen=True)

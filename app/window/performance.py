@@ -28,7 +28,7 @@ from app.session.ears import heard_ear
 from app.session.silence import why_ran_away
 from app.window.main_window import MainWindow
 from app.window.panels import Panel
-from app.window.render_signals import RenderMail
+from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 
@@ -67,7 +67,7 @@ class Performance(QObject):
         self._latest: Note | None = None  # struck last
         self._next_turn: Note | None = None  # of the loop, handed over and waiting for its frame
         self._waiting_words = self._error_words = ""
-        mail = self._mail = RenderMail()
+        mail = self._mail = RenderSignals()
         mail.started.connect(self._take_started)
         mail.finished.connect(self._take_finished)
         mail.other_refused.connect(self._other_refused)

@@ -8,7 +8,7 @@ from app.rendering import Take
 from engine.metrics import ErrorSums
 
 
-class RenderMail(QObject):
+class RenderSignals(QObject):
     """Its methods are called in other threads; see `RenderListener`."""
 
     started = Signal(object)  # take

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
-from app.session.choices import DIFFERENCE_GAIN_RANGE_DB, SPEED_RANGE, Choices
+from app.session.choices import SPEED_RANGE, Choices
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
 
 SECONDS_RANGE = (0.5, 4.0)

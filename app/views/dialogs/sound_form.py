@@ -6,8 +6,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QFormLayout, QHBoxLayout, QLabel, QWidget
 
 from app.export.choices import ExportChoices
-from app.export.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB, LONGEST_S
-from app.export.wav import Bits, WavSettings
+from app.export.sound import DECAY_RANGE_DB, LONGEST_S
+from app.export.wav import WavSettings
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits
 from app.views.controls.parts import combo_box, faint
 
 RATES_HZ = (0, 44_100, 48_000, 96_000)  # 0: the model's own

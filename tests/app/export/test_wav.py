@@ -11,13 +11,13 @@ import soundfile
 from app.export.wav import (
     LONGEST_TAG_BYTES,
     NORMALISED_PEAK,
-    Bits,
     EncodedWav,
     WavSettings,
     encode_wav,
     faded_out,
     quantised,
 )
+from app.shared.vocabulary import Bits
 
 RATE_HZ = 8000
 PLAIN = WavSettings(bits="32f", fade_out_s=0)
