@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor
 
-from engine.sine_transform import grid_positions
+from engine.resonators.sine_transform import grid_positions
 
 CENTRE_RANGE = (0.3, 0.7)  # of a random Gaussian, in lengths
 WIDTH_RANGE = (0.02, 0.1)  # of a random Gaussian, in lengths

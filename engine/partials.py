@@ -23,7 +23,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from engine.string import StringParameters
+from engine.resonators.base import Resonator
 
 SEGMENT_S = 0.005  # or a period of the lowest mode, if that is longer
 FLOOR_DB = -60.0  # a mode so far below the loudest one of the segment is absent
@@ -35,24 +35,21 @@ MOST_SIMILAR = 0.5  # |Σz²|/Σ|z|²: 0 where both quadratures are seen alike, 
 Array = NDArray[np.float64]
 
 
-def phasors(
-    before: Tensor, now: Tensor, after: Tensor, spacing_s: float, string: StringParameters, tension_modulated: bool
-) -> Tensor:
+def phasors(before: Tensor, now: Tensor, after: Tensor, spacing_s: float, resonator: Resonator) -> Tensor:
     """z with Re z = q(t), complex128 (..., modes), for modal amplitudes q at t - d, t and t + d, d = `spacing_s`.
 
-    z = q + i(exp(-σd) q(t - d) - exp(σd) q(t + d)) / 2 sin ωd, which for the linear string is A exp(-σt + iωt + iφ).
+    z = q + i(exp(-σd) q(t - d) - exp(σd) q(t + d)) / 2 sin ωd, which without coupling is A exp(-σt + iωt + iφ).
     With tension modulation ω is that of the present energies, to first order: ω² + k_μ Σ_m ½η_m²|z_m|² (1 + ½δ_μm)
     (Eq. 3-5, averaged over a period). ωd must stay below π: sample the truth more often than the prediction.
     """
-    modes = now.shape[-1]
-    eigenvalues = string.eigenvalues(modes)
+    eigenvalues = resonator.eigenvalues()
     fading, omega = torch.exp(eigenvalues.real * spacing_s), eigenvalues.imag
     now = now.double()
     difference = (before.double() * fading - after.double() / fading) / 2
     quadrature = difference / torch.sin(omega * spacing_s)
-    if tension_modulated:
-        stretch = string.wavenumbers(modes).square() * (now.square() + quadrature.square()) / 2
-        rise = string.tension_coupling(modes) * (stretch.sum(-1, keepdim=True) + stretch / 2)
+    if resonator.tension_modulated:
+        stretch = resonator.stretch * (now.square() + quadrature.square()) / 2
+        rise = resonator.coupling * (stretch.sum(-1, keepdim=True) + stretch / 2)
         quadrature = difference / torch.sin((omega.square() + rise).sqrt() * spacing_s)
     return torch.complex(now, quadrature)
 

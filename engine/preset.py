@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,9 +21,9 @@ from torch import Tensor
 
 from engine.models import MODELS, StringModel, build_model, count_parameters
 from engine.pluck import Pluck
+from engine.resonators.base import Resonator
+from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, write
-from engine.sine_transform import to_modes
-from engine.string import StringParameters
 from engine.whole_file import whole_file
 
 FORMAT_VERSION = 1
@@ -99,6 +100,13 @@ class PresetInfo:
     @property
     def horizon_s(self) -> float:
         return self.horizon_steps / self.rate_hz
+
+    @cached_property
+    def resonator(self) -> Resonator:
+        """What its model learned, at rest and with the tension that it knows."""
+        return self.string.resonator(
+            self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
+        )
 
     @property
     def string_kind(self) -> str:
@@ -206,7 +214,7 @@ def _too_tense(info: PresetInfo, pluck: Pluck) -> list[str]:
     limit = info.trained_range.tension_rise
     if limit is None:
         return []
-    rise = float(info.string.relative_tension_rise(to_modes(pluck.displacement(info.grid_points), info.modes)))
+    rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(pluck.displacement(info.grid_points))))
     if rise <= limit:
         return []
     return [f"the pluck raises the tension by {rise:.0%}, beyond the trained {limit:.0%}: pull less, or wider"]

@@ -16,7 +16,7 @@ from torch import Tensor
 from engine.pluck import FULL_SCALE_M
 from engine.preset import Preset, PresetInfo
 from engine.reference import ModalState, SplittingSolver
-from engine.sine_transform import synthesis_matrix, to_grid, to_modes
+from engine.resonators.sine_transform import to_grid, to_modes
 
 SILENCE = 1e-9  # of a mode, of all: what the truth leaves out is 180 dB down
 RUNAWAY_FACTOR = 20.0  # a string let go never exceeds about its initial peak
@@ -100,24 +100,17 @@ class TruthSource(StringSource):
     def __init__(self, info: PresetInfo, substeps: int | None = None) -> None:
         self.rate_hz = info.rate_hz
         self.grid_points = info.grid_points
-        self._modes = info.modes
-        self._synthesis = synthesis_matrix(info.grid_points, info.modes)
-        self._solver = SplittingSolver(
-            info.string,
-            info.modes,
-            info.rate_hz,
-            tension_modulated=info.tension_modulated,
-            substeps=substeps,
-            silence=SILENCE,
-        )
+        self._resonator = info.resonator
+        self._solver = SplittingSolver(self._resonator, info.rate_hz, substeps=substeps, silence=SILENCE)
 
     def start(self, displacement_m: Tensor) -> SourceState:
         _check_grid(displacement_m, self.grid_points)
-        return SourceState(ModalState.at_rest(to_modes(displacement_m.double(), self._modes)), 0, float("inf"))
+        return SourceState(ModalState.at_rest(self._resonator.to_modes(displacement_m.double())), 0, float("inf"))
 
     def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
         amplitudes, inner = self._solver.advance(state.inner, steps)
-        to_points = self._synthesis if readout is None else self._synthesis @ readout.double()
+        shapes = self._resonator.shapes
+        to_points = shapes if readout is None else shapes @ readout.double()
         return amplitudes @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
 
 

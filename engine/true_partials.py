@@ -9,19 +9,18 @@ from torch import Tensor
 
 from engine.partials import phasors
 from engine.reference import ModalState, SplittingSolver
-from engine.string import StringParameters
+from engine.resonators.base import Resonator
 
 OVERSAMPLING = 4  # of the truth whose phasors are wanted
 
 
 def true_phasors(
-    string: StringParameters,
+    resonator: Resonator,
     initial: Tensor,
     rate_hz: float,
     steps: int,
     block: int,
     *,
-    tension_modulated: bool,
     substeps: int | None = None,
 ) -> Iterator[Tensor]:
     """Phasors of frames 1 … steps in m, complex128 (batch, up to `block`, modes).
@@ -30,9 +29,9 @@ def true_phasors(
         initial: modal amplitudes at rest in m, (batch, modes).
         substeps: of the solver in a frame; None is its default.
     """
-    modes, sample_hz = initial.shape[1], OVERSAMPLING * rate_hz
+    sample_hz = OVERSAMPLING * rate_hz
     fewer = None if substeps is None else -(-substeps // OVERSAMPLING)
-    solver = SplittingSolver(string, modes, sample_hz, tension_modulated=tension_modulated, substeps=fewer)
+    solver = SplittingSolver(resonator, sample_hz, substeps=fewer)
     state = ModalState.at_rest(initial)
     for first in range(0, steps, block):
         samples, state = solver.advance(state, OVERSAMPLING * min(block, steps - first))
@@ -41,4 +40,4 @@ def true_phasors(
             torch.cat([samples, beyond], dim=1)[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1)
         )
         count = now.shape[1]
-        yield phasors(before[:, :count], now, after, 1 / sample_hz, string, tension_modulated)
+        yield phasors(before[:, :count], now, after, 1 / sample_hz, resonator)

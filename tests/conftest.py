@@ -10,8 +10,8 @@ import torch
 from engine.models import KoopmanVar, KoopmanVarConfiguration
 from engine.models.base import Physics
 from engine.preset import PresetInfo, TrainedRange, save_preset
+from engine.resonators.string import StringParameters
 from engine.schema import write
-from engine.string import StringParameters
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +20,7 @@ def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     configuration = KoopmanVarConfiguration(state_size=16, multiplier_widths=(8,))
     model = KoopmanVar(configuration)
     string = StringParameters()
-    model.initialise("physics", Physics(string, 10, 4000), torch.Generator().manual_seed(0))
+    model.initialise("physics", Physics(string.resonator(10), 4000), torch.Generator().manual_seed(0))
     info = PresetInfo(
         title="A small string",
         model="koopman_var",

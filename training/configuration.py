@@ -6,12 +6,14 @@ import hashlib
 import json
 import tomllib
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 from engine.models import MODELS
+from engine.resonators.base import Resonator
+from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, write
-from engine.string import StringParameters
 
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
@@ -44,6 +46,13 @@ class DatasetConfiguration:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if self.steps % self.stride:
             raise ValueError(f"steps must be a multiple of stride, {self.stride}, not {self.steps}")
+
+    @cached_property
+    def resonator(self) -> Resonator:
+        """What moves."""
+        return self.string.resonator(
+            self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
+        )
 
 
 @dataclass(frozen=True)

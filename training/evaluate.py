@@ -25,7 +25,7 @@ from engine.partials import (
 )
 from engine.pluck import DEFAULT_LISTEN
 from engine.reference import ModalState, SplittingSolver
-from engine.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
+from engine.resonators.sine_transform import listening_weights
 from engine.spectra import spectral_distances
 from engine.true_partials import true_phasors
 from training.configuration import DatasetConfiguration
@@ -48,7 +48,7 @@ def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps:
     c = dataset.configuration
     kept = (steps or c.steps) // c.stride
     device = next(model.parameters()).device
-    synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float().to(device)
+    synthesis = (c.resonator.shapes / dataset.scale_m).float().to(device)
     sums = ErrorSums(kept)
     with _in_evaluation(model):
         for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
@@ -115,7 +115,7 @@ def evaluate_past_horizon(
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
-    synthesis = synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m
+    synthesis = c.resonator.shapes / dataset.scale_m
     ear = listening_weights(torch.tensor([DEFAULT_LISTEN]), c.grid_points).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
@@ -159,9 +159,9 @@ def evaluate_partials(
         raise ValueError("windows_s must hold at least one window")
     c = dataset.configuration
     device = next(model.parameters()).device
-    synthesis = synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m
-    analysis = analysis_matrix(c.grid_points, c.modes).float().to(device)
-    linear_hz = (c.string.eigenvalues(c.modes).imag / (2 * math.pi)).tolist()
+    synthesis = c.resonator.shapes / dataset.scale_m
+    analysis = c.resonator.analysis.float().to(device)
+    linear_hz = (c.resonator.eigenvalues().imag / (2 * math.pi)).tolist()
     length = segment_frames(c.rate_hz, linear_hz[0])
     block = max(1, frames_at_once // length) * length
     steps = max(round(stop_s * c.rate_hz) for _, stop_s in windows_s)
@@ -171,12 +171,11 @@ def evaluate_partials(
         for part, rows in enumerate(parts):
             state, tracks = model.release((initial[rows] @ synthesis).float().to(device)), []
             true = true_phasors(
-                c.string,
+                c.resonator,
                 initial[rows],
                 c.rate_hz,
                 steps,
                 block,
-                tension_modulated=c.tension_modulated,
                 substeps=c.substeps,
             )
             for first, truth in zip(range(0, steps, block), true, strict=True):
@@ -223,7 +222,7 @@ def _simulated(solver: SplittingSolver, initial: Tensor, steps: int, block: int)
 
 
 def _solver(c: DatasetConfiguration) -> SplittingSolver:
-    return SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated, substeps=c.substeps)
+    return SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
 
 
 def _mean_distance(of_parts: Sequence[tuple[Tensor, Tensor]]) -> SpectralDistance:

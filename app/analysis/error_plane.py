@@ -120,7 +120,7 @@ class ErrorPlane:
 def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
     """What computes relative MAEs (plucks,) over the preset's horizon, infinite where the output is not finite."""
     info, model = preset.info, preset.model
-    truth = TruthSource(info, -(-default_substeps(info.string, info.modes, info.rate_hz) // COARSER))
+    truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // COARSER))
 
     @torch.inference_mode()
     def errors(plucks: list[Pluck], job: Job) -> Array:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.models.learned_eigenvalues import VANISHED, model_log_eigenvalues
+from engine.models.eigenvalues import VANISHED
 from engine.preset import Preset, PresetInfo
 
 NEPERS_OF_60_DB = math.log(1000)
@@ -72,8 +72,8 @@ class PoleFigure:
 def pole_figure(preset: Preset) -> PoleFigure:
     """The eigenvalues of a preset's model, and those of its string when it is quiet."""
     info = preset.info
-    own = (info.string.eigenvalues(info.modes) / info.rate_hz).numpy().astype(np.complex128)
-    found = [log.numpy() for log in model_log_eigenvalues(preset.model)]
+    own = (info.resonator.eigenvalues() / info.rate_hz).numpy().astype(np.complex128)
+    found = [log.numpy() for log in preset.model.log_eigenvalues()]
     note = _NOTES.get(info.model, "")
     if not found:
         note = f"a {info.model} has no eigenvalues: its whole field goes through a network at every sample"
@@ -88,8 +88,8 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
     folded_hz = angle * info.rate_hz / (2 * math.pi)
     with np.errstate(divide="ignore"):
         t60_s = np.where(log.real < 0, NEPERS_OF_60_DB / (-log.real * info.rate_hz), math.inf)
-    modes_hz = info.string.eigenvalues(info.modes).imag.numpy() / (2 * math.pi)
-    modes_s = NEPERS_OF_60_DB / info.string.decay_rates(info.modes).numpy()
+    modes_hz = info.resonator.eigenvalues().imag.numpy() / (2 * math.pi)
+    modes_s = NEPERS_OF_60_DB / info.resonator.sigma.numpy()
     mode, mode_hz = _nearest(folded_hz, modes_hz, info.rate_hz, _octaves(t60_s)[:, None] - _octaves(modes_s))
     with np.errstate(divide="ignore"):
         cents = 1200 * np.log2(np.maximum(mode_hz, 0) / modes_hz[mode])

@@ -20,7 +20,7 @@ from engine.partials import (
     track_partials,
 )
 from engine.pluck import Pluck
-from engine.sine_transform import to_modes
+from engine.resonators.sine_transform import to_modes
 from engine.sources import project
 from engine.true_partials import true_phasors
 
@@ -54,7 +54,7 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     """
     info = take.info
     last = take.frames - 1 if take.model_ends_s is None else round(take.model_ends_s * info.rate_hz)
-    modes_hz = info.string.eigenvalues(info.modes).imag.numpy() / (2 * math.pi)
+    modes_hz = info.resonator.eigenvalues().imag.numpy() / (2 * math.pi)
     length = segment_frames(info.rate_hz, modes_hz[0])
     if last < length:
         return {}
@@ -62,12 +62,11 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     block = max(1, FRAMES_AT_ONCE // length) * length
     tracks, first = [], 0
     true = true_phasors(
-        info.string,
+        info.resonator,
         _initial(take.pluck, info.grid_points, info.modes),
         info.rate_hz,
         last,
         block,
-        tension_modulated=info.tension_modulated,
     )
     for truth in true:
         frames = model[None, first + 1 : first + 1 + truth.shape[1]].double()

@@ -184,43 +184,33 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 def _fast(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
     from app.commands.arrays import blocks_of
     from engine.reference import ModalState, SplittingSolver
-    from engine.sine_transform import to_grid, to_modes
-    from engine.string import StringParameters
-
-    solver = SplittingSolver(
-        StringParameters(), modes, rate_hz, tension_modulated=tension_modulated, substeps=substeps
-    )
+    from engine.resonators import StringParameters
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
-        points = initial.shape[1]
-        state = ModalState.at_rest(to_modes(initial, modes))
-        yield to_grid(state.amplitude[:, None], points)
+        string = StringParameters().resonator(
+            modes, tension_modulated=tension_modulated, grid_points=initial.shape[1]
+        )
+        solver, state = (
+            SplittingSolver(string, rate_hz, substeps=substeps),
+            ModalState.at_rest(string.to_modes(initial)),
+        )
+        yield string.to_grid(state.amplitude[:, None])
         for count in blocks_of(steps):
             amplitudes, state = solver.advance(state, count)
-            yield to_grid(amplitudes, points)
+            yield string.to_grid(amplitudes)
 
     return motion
 
 
 def _dop853(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
-    import torch
-
     from engine.reference import ModalState, solve_dop853
-    from engine.sine_transform import to_grid, to_modes
-    from engine.string import StringParameters
+    from engine.resonators import StringParameters
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
-        solved = [
-            solve_dop853(
-                StringParameters(),
-                ModalState.at_rest(to_modes(one[None], modes)),
-                rate_hz,
-                steps,
-                tension_modulated=tension_modulated,
-            )
-            for one in initial
-        ]
-        yield to_grid(torch.cat(solved), initial.shape[1])
+        string = StringParameters().resonator(
+            modes, tension_modulated=tension_modulated, grid_points=initial.shape[1]
+        )
+        yield string.to_grid(solve_dop853(string, ModalState.at_rest(string.to_modes(initial)), rate_hz, steps))
 
     return motion
 

@@ -32,7 +32,7 @@ def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> N
 
     configuration = load(config).data
     made = load_data(configuration, cache)
-    rise = configuration.string.relative_tension_rise(draw_initial(configuration)).sort().values
+    rise = configuration.resonator.relative_tension_rise(draw_initial(configuration)).sort().values
     facts: dict[str, Any] = {
         "folder": str(dataset_folder(configuration, cache)),
         "key": dataset_key(configuration),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from engine.pluck import Pluck
 from engine.preset import PresetInfo
-from engine.sine_transform import listening_weights
+from engine.resonators.sine_transform import listening_weights
 
 SOURCES = ("model", "truth")
 
@@ -65,7 +65,7 @@ class Take:
         self._motions = {name: Motion(info.rate_hz, info.grid_points, seconds) for name in SOURCES}
         self.frames = self._motions["truth"].frames
         self.others: dict[str, Motion] = {}
-        self.fundamental_hz = float(info.string.undamped_frequencies(1)) / (2 * np.pi)
+        self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
 
     @property
     def ready_frames(self) -> int:

@@ -12,7 +12,7 @@ from app.session.choices import VOLUME_RANGE_DB, Choices
 from app.session.ears import heard_ear
 from app.session.slots import other_preset
 from engine.preset import outside_training
-from engine.sine_transform import to_modes
+from engine.resonators.sine_transform import to_modes
 
 FAINT_DB = -70.0  # below full scale nobody hears a thing
 AT_ONCE_S = 0.01  # a model that runs away before this was never a string

@@ -15,9 +15,9 @@ from engine.models import StringModel, build_model
 from engine.models.base import Physics
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
-from engine.sine_transform import listening_weights
+from engine.resonators.sine_transform import listening_weights
+from engine.resonators.string import StringParameters
 from engine.sources import TruthSource, project
-from engine.string import StringParameters
 from engine.voices import Ear, Mixer, Program, Voice, bank_program, plain_program, truth_program
 
 RATE_HZ = 48_000
@@ -99,7 +99,7 @@ def _sound(voice: Voice) -> None:
 
 def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
     model = build_model(name, sizes)
-    physics = Physics(INFO.string, INFO.modes, INFO.rate_hz)
+    physics = Physics(INFO.resonator, INFO.rate_hz)
     model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
     return model.eval()
 

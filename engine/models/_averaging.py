@@ -45,10 +45,10 @@ def adiabatic_change(squares: Tensor, weight: Tensor) -> Tensor:
 
 def averaged_coupling(physics: Physics) -> Tensor:
     """Im K of `initialise`, float64 (modes, modes): rad/sample for squared amplitudes in normalised units."""
-    string, modes = physics.string, physics.modes
-    share = string.tension_coupling(modes) / (4 * string.undamped_frequencies(modes))
-    squares = string.wavenumbers(modes).square() * physics.scale_m**2
-    return share[:, None] * squares * (1 + 0.5 * torch.eye(modes, dtype=torch.float64)) / physics.rate_hz
+    resonator = physics.resonator
+    share = resonator.coupling / (4 * resonator.omega)
+    squares = resonator.stretch * physics.scale_m**2
+    return share[:, None] * squares * (1 + 0.5 * torch.eye(resonator.modes, dtype=torch.float64)) / physics.rate_hz
 
 
 def averaged_amplitude(physics: Physics) -> Tensor:
@@ -56,7 +56,7 @@ def averaged_amplitude(physics: Physics) -> Tensor:
 
     The action ω q² / 2 stays while ω changes slowly, so that √ω q does.
     """
-    frequencies = physics.string.undamped_frequencies(physics.modes) / physics.rate_hz
+    frequencies = physics.resonator.omega / physics.rate_hz
     return averaged_coupling(physics) / (2 * frequencies[:, None])
 
 
@@ -69,10 +69,10 @@ def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
     Returns:
         α + β, nepers for Re z_m², and α - β, radians for Im z_m², of amplitudes in normalised units.
     """
-    string, modes = physics.string, physics.modes
-    omega = string.undamped_frequencies(modes)
-    squares = string.wavenumbers(modes).square() * physics.scale_m**2
-    share = string.tension_coupling(modes)[:, None] * squares / (16 * omega)
+    resonator = physics.resonator
+    omega = resonator.omega
+    squares = resonator.stretch * physics.scale_m**2
+    share = resonator.coupling[:, None] * squares / (16 * omega)
     difference = omega[:, None] - omega
     alpha = share / (omega[:, None] + omega)
     beta = torch.where(difference == 0, 0.0, -share / torch.where(difference == 0, 1.0, difference))

@@ -115,7 +115,7 @@ def linear_string_eigenvalues(
     modes = physics.modes
     if size < modes:
         raise ValueError(f"initialisation 'physics' needs a state_size of at least the {modes} modes, not {size}")
-    linear = physics.string.eigenvalues(modes)[torch.arange(size) % modes] / physics.rate_hz
+    linear = physics.log_eigenvalues[torch.arange(size) % modes]
     stretch = 3.0 ** (2 * torch.rand(size, generator=generator, dtype=torch.float64) - 1)
     stretch[:modes] = 1
     repetition = torch.arange(size) // modes

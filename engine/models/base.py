@@ -19,25 +19,31 @@ import torch
 from torch import Tensor, nn
 
 from engine.models.inputs import second_at_rest
-from engine.string import StringParameters
+from engine.resonators.base import Resonator
 
 State = TypeVar("State")
 
 
 @dataclass(frozen=True)
 class Physics:
-    """What an initialisation may know of the string that a model shall learn.
+    """What an initialisation may know of the resonator whose motion a model shall learn.
 
     Attributes:
         scale_m: the model's unit of displacement.
-        tension_modulated: whether the string is the non-linear one.
     """
 
-    string: StringParameters
-    modes: int
+    resonator: Resonator
     rate_hz: float
     scale_m: float = 1.0
-    tension_modulated: bool = True
+
+    @property
+    def modes(self) -> int:
+        return self.resonator.modes
+
+    @property
+    def log_eigenvalues(self) -> Tensor:
+        """log λ = (-σ + iω_d) / rate at rest, complex128 (modes,)."""
+        return self.resonator.eigenvalues() / self.rate_hz
 
 
 class StringModel(nn.Module, ABC, Generic[State]):
@@ -46,6 +52,9 @@ class StringModel(nn.Module, ABC, Generic[State]):
     grid_points: int
     configuration: Any  # the frozen dataclass that it was built from
     initialisations: ClassVar[tuple[str, ...]]  # the first is the source's own
+    # names of parameters, or of their last parts, that a recipe gives a rate of their own
+    eigenvalue_parameters: ClassVar[frozenset[str]] = frozenset()
+    coupling_parameters: ClassVar[frozenset[str]] = frozenset()
 
     @abstractmethod
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
@@ -70,6 +79,14 @@ class StringModel(nn.Module, ABC, Generic[State]):
         Returns:
             displacement (batch, steps, points or grid_points) in normalised units, and the last state.
         """
+
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        """What it learned of frequency and decay: log λ a sample, complex128, a tensor each layer.
+
+        Both of a conjugate pair where a layer has them. Empty where nothing of a model moves by itself.
+        """
+        return []
 
     def release(self, displacement: Tensor) -> State:
         """The state at frame 0 of strings that are released at rest from displacements (batch, grid_points).

@@ -22,7 +22,6 @@ from torch import Tensor, nn
 from engine.models._diagonal import DiagonalModel, KoopmanState, dense
 from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
-from engine.sine_transform import synthesis_matrix
 
 _ROWS_AT_ONCE = 16_384  # of the Hankel matrix: bounds the memory of a fit
 _VANISHED = -700.0  # log |λ| of a mode that is not there: finite in a file, and λ¹ is as good as 0
@@ -126,6 +125,10 @@ class DMD(DiagonalModel):
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         return self.decode(self.successive_latents(origin, first, count), readout)
 
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        return [torch.complex(self.magnitude_log.double(), self.angle.double())]
+
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """physics: the linear string itself, which is what a fit finds in linear motion. The source has no other."""
         check_initialisation(self, how)
@@ -134,9 +137,9 @@ class DMD(DiagonalModel):
             raise ValueError(
                 f"initialisation 'physics' needs a rank of at least {2 * modes}, two a mode, not {c.rank}"
             )
-        half = torch.exp(physics.string.eigenvalues(modes) / physics.rate_hz)
+        half = torch.exp(physics.log_eigenvalues)
         eigenvalues = torch.cat([half, half.conj()])
-        frame = synthesis_matrix(self.grid_points, modes).T.repeat(1, 2)  # (grid_points, 2 modes)
+        frame = physics.resonator.shapes.T.repeat(1, 2)  # (grid_points, 2 modes)
         self._store(eigenvalues, torch.cat([frame * eigenvalues**-lag for lag in range(c.lags)]))
 
     def _store(self, eigenvalues: Tensor, modes: Tensor) -> None:

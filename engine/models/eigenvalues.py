@@ -12,6 +12,14 @@ import math
 import torch
 from torch import Tensor
 
+VANISHED = 1e-12  # |λ| of a state that is gone after a sample: an unused mode of a fit
+STORED = frozenset({"nu_log", "theta_log"})  # the names of parameters that hold ν_log and θ_log
+
+
+def log_eigenvalues(nu_log: Tensor, theta_log: Tensor) -> Tensor:
+    """log λ = -exp(ν_log) + i exp(θ_log), complex128 (n,)."""
+    return torch.complex(-nu_log.double().exp(), theta_log.double().exp())
+
 
 def powers(nu_log: Tensor, theta_log: Tensor, steps: Tensor) -> Tensor:
     """λᵏ, complex128 (steps, n), for k in `steps` (steps,), which may be any real times in samples."""

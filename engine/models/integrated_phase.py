@@ -48,6 +48,7 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor, nn
 
+from engine.models import eigenvalues
 from engine.models._averaging import (
     adiabatic_change,
     averaged_amplitude,
@@ -67,7 +68,6 @@ from engine.models._diagonal import (
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
-from engine.sine_transform import analysis_matrix, synthesis_matrix
 
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
 SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
@@ -178,6 +178,8 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     """See the module."""
 
     initialisations: ClassVar = ("random", "physics", "averaging")
+    eigenvalue_parameters: ClassVar = eigenvalues.STORED
+    coupling_parameters: ClassVar = frozenset({"K"})
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
         super().__init__()
@@ -491,6 +493,11 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             return self.K.new_full((2 * self.configuration.state_size,), MODULATION_UNIT)
         return self.energy_units.to(self.K.dtype).repeat(2)
 
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        """Those of a quiet string: they change with the energy."""
+        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
+
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract. Every network's last layer is zero at first, so f and the corrections start from nothing.
 
@@ -519,7 +526,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
                 store_ring(self.nu_log, self.theta_log, generator)
             else:
                 self._initialise_linear_string(physics, generator)
-            if how == "averaging" and physics.tension_modulated:
+            if how == "averaging" and physics.resonator.tension_modulated:
                 self._initialise_averaging(physics)
 
     @torch.no_grad()
@@ -582,9 +589,9 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         mode = torch.arange(n) % modes
         if self.energy_units is not None and self.rate_units is not None:
             unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
-            self.energy_units.copy_(physics.string.relative_tension_rise(unit_m))
-            self.rate_units.copy_(physics.string.undamped_frequencies(modes)[mode] / physics.rate_hz)
-        analysis = analysis_matrix(points, modes).T[mode]
+            self.energy_units.copy_(physics.resonator.relative_tension_rise(unit_m))
+            self.rate_units.copy_(physics.resonator.omega[mode] / physics.rate_hz)
+        analysis = physics.resonator.analysis.T[mode]
         first, second = _imaginary_parts(self.configuration.input, log_eigenvalues)
         self.encoder.weight.zero_()
         self.encoder.weight[:n, :points] = analysis.to(self.encoder.weight)
@@ -592,7 +599,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         if second is not None:
             self.encoder.weight[n:, points:] = (second[:, None] * analysis).to(self.encoder.weight)
         self.decoder.weight.zero_()
-        self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T.to(self.decoder.weight)
+        self.decoder.weight[:, :modes] = physics.resonator.shapes.T.to(self.decoder.weight)
 
 
 def _imaginary_parts(kind: InputKind, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor | None]:

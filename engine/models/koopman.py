@@ -33,7 +33,6 @@ from engine.models._diagonal import (
 from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
-from engine.sine_transform import analysis_matrix, synthesis_matrix
 
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
 STRAIGHT = 4.0  # in the data's deviations: where "physics" holds the units, so that most plucks leave them straight
@@ -69,6 +68,7 @@ class Koopman(DiagonalModel):
     """See the module."""
 
     initialisations: ClassVar = ("paper", "physics")
+    eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: KoopmanConfiguration) -> None:
         super().__init__()
@@ -100,6 +100,10 @@ class Koopman(DiagonalModel):
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         return self.decode(self.successive_latents(origin, first, count), readout)
+
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
@@ -133,16 +137,16 @@ class Koopman(DiagonalModel):
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         c, modes = self.configuration, physics.modes
-        sharpest = SHARPEST if physics.tension_modulated else 0.0
+        sharpest = SHARPEST if physics.resonator.tension_modulated else 0.0
         log_eigenvalues = linear_string_eigenvalues(c.state_size, physics, generator, sharpest)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = analysis_matrix(c.grid_points, modes).T[torch.arange(c.state_size) % modes]
+        analysis = physics.resonator.analysis.T[torch.arange(c.state_size) % modes]
         encoder = dense_layers(self.encoder)
         if c.mixing_layer:
             nn.init.eye_(encoder.pop().weight)
         _store_linear_map(encoder, torch.cat(linear_string_encoder(c.input, analysis, log_eigenvalues)), generator)
         synthesis = torch.zeros(c.grid_points, 2 * c.state_size)
-        synthesis[:, :modes] = synthesis_matrix(c.grid_points, modes).T
+        synthesis[:, :modes] = physics.resonator.shapes.T
         _store_linear_map(dense_layers(self.decoder), synthesis, generator, UNHEARD)
 
 

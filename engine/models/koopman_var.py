@@ -39,7 +39,6 @@ from engine.models._diagonal import (
 from engine.models.base import Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
-from engine.sine_transform import analysis_matrix, synthesis_matrix
 
 LONG = 4 * FRAMES_AT_ONCE  # frames, times the batch, of a block with interpolated multipliers: they hold few latents
 SHORT = 512  # frames of a block of which every multiplier is computed: to look for fewer takes as long
@@ -74,6 +73,7 @@ class KoopmanVar(DiagonalModel):
     """
 
     initialisations: ClassVar = ("paper", "physics")
+    eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: KoopmanVarConfiguration) -> None:
         super().__init__()
@@ -158,6 +158,10 @@ class KoopmanVar(DiagonalModel):
         fill(left, width, z, m_left, m_right)
         return out
 
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
+
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
@@ -180,16 +184,16 @@ class KoopmanVar(DiagonalModel):
                 self._initialise_linear_string(physics, generator)
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
-        n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
+        n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = analysis_matrix(points, modes).T[torch.arange(n) % modes]
+        analysis = physics.resonator.analysis.T[torch.arange(n) % modes]
         self.encoder.weight.copy_(
             torch.cat(linear_string_encoder(self.configuration.input, analysis, log_eigenvalues))
         )
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
-        self.decoder.weight[:, :modes] = synthesis_matrix(points, modes).T
+        self.decoder.weight[:, :modes] = physics.resonator.shapes.T
         last = dense_layers(self.multiplier)[-1]
         last.weight.mul_(0.01)
         last.bias[:n] = 1

@@ -50,7 +50,7 @@ class LRULayer(DiagonalSSM):
         self.gamma_log = nn.Parameter(torch.zeros(states))
 
     def log_eigenvalues(self) -> Tensor:
-        return torch.complex(-self.nu_log.double().exp(), self.theta_log.double().exp())
+        return eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)
 
     def input_matrix(self) -> Tensor:
         return self.B * self.gamma_log.exp()[:, None, None]
@@ -75,6 +75,8 @@ class LRULayer(DiagonalSSM):
 
 class LRU(SSMString):
     """See the module."""
+
+    eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: LRUConfiguration) -> None:
         points, states = configuration.grid_points, configuration.state_size

@@ -109,6 +109,8 @@ class S5Layer(DiagonalSSM):
 class S5(SSMString):
     """See the module."""
 
+    eigenvalue_parameters: ClassVar = frozenset({"Lambda_re", "Lambda_im", "log_step"})
+
     def __init__(self, configuration: S5Configuration) -> None:
         points, states, blocks = configuration.grid_points, configuration.state_size // 2, configuration.hippo_blocks
         super().__init__(

@@ -22,7 +22,6 @@ from torch.nn import functional
 
 from engine.models.base import Physics, StringModel, check_initialisation
 from engine.models.inputs import InputKind, join_input
-from engine.sine_transform import analysis_matrix, synthesis_matrix
 
 CHUNK = 32  # steps between two exact carries; fewer cost more carries, more collect more rounding
 ROWS_AT_ONCE = 1024  # batch × steps that go through the layers together and still fit the cache
@@ -352,6 +351,11 @@ class SSMString(StringModel[SSMState], ABC):
             eigenvalues = torch.cat([ssm.log_eigenvalues() for ssm in self._ssms()])
         return tuple(eigenvalues[eigenvalues.real > 0].exp().tolist())
 
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        stored = [(ssm.log_eigenvalues(), ssm.conjugates) for ssm in self._ssms()]
+        return [torch.cat([log, log.conj()]) if conjugates == 2 else log for log, conjugates in stored]
+
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
@@ -373,20 +377,20 @@ class SSMString(StringModel[SSMState], ABC):
             raise ValueError(
                 f"initialisation 'physics' needs a stored state for each of the {modes} modes, not {first.B.shape[0]}"
             )
-        log_eigenvalues = physics.string.eigenvalues(modes) / physics.rate_hz
+        log_eigenvalues = physics.log_eigenvalues
         # q_k = Re(z λᵏ) with Re z = q₀; Im z is what makes the velocity or the frame before right
         if self.input == "two_frames":
             before = torch.exp(-log_eigenvalues)
             imaginary = (before.real / before.imag, -1 / before.imag)
         else:
             imaginary = (log_eigenvalues.real / log_eigenvalues.imag, -1 / log_eigenvalues.imag)
-        analysis = analysis_matrix(points, modes).T
+        analysis = physics.resonator.analysis.T
         matrix = torch.zeros(modes, 2, 2 * points, dtype=torch.float64)
         matrix[:, 0, :points] = analysis
         matrix[:, 1] = torch.cat([factor[:, None] * analysis for factor in imaginary], dim=1)
         first.set_modes(log_eigenvalues, matrix[:, :, : first.B.shape[2]])
         first.C.zero_()
-        first.C[:, :modes, 0] = (synthesis_matrix(points, modes).T / first.conjugates).to(first.C)
+        first.C[:, :modes, 0] = (physics.resonator.shapes.T / first.conjugates).to(first.C)
         for block in self.layers:
             assert isinstance(block, Block)
             block.gate.weight[:points].zero_()

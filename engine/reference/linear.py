@@ -6,17 +6,20 @@ import torch
 from torch import Tensor
 
 from engine.reference.state import ModalState
-from engine.string import StringParameters
+from engine.resonators.base import Resonator
 
 
-def damped_rotation(string: StringParameters, modes: int, time_s: Tensor) -> Tensor:
+def damped_rotation(eigenvalues: Tensor, time_s: Tensor) -> Tensor:
     """The exact flow of q̈ + 2σq̇ + ω²q = 0 over `time_s` (...): float64 (..., 2, 2, modes).
+
+    `eigenvalues`: -σ + i√(ω² - σ²), complex128 (modes,), or (rows, modes) for times (rows, ...).
 
     Entry [i, j] maps component j of (amplitude, velocity) to component i.
     """
-    eigenvalue = string.eigenvalues(modes)
-    sigma, omega = -eigenvalue.real, eigenvalue.imag
     t = time_s.to(torch.float64)[..., None]
+    if eigenvalues.ndim == 2:
+        eigenvalues = eigenvalues.reshape(len(eigenvalues), *(1,) * (t.ndim - 2), -1)
+    sigma, omega = -eigenvalues.real, eigenvalues.imag
     decay, cos, sin = torch.exp(-sigma * t), torch.cos(omega * t), torch.sin(omega * t) / omega
     rows = [
         torch.stack([decay * (cos + sigma * sin), decay * sin], dim=-2),
@@ -25,7 +28,9 @@ def damped_rotation(string: StringParameters, modes: int, time_s: Tensor) -> Ten
     return torch.stack(rows, dim=-3)
 
 
-def solve_linear(string: StringParameters, state: ModalState, times_s: Tensor) -> Tensor:
-    """Modal amplitudes of the linear string at `times_s` (times,): float64 (batch, times, modes)."""
-    flow = damped_rotation(string, state.modes, times_s)
-    return state.amplitude[:, None] * flow[:, 0, 0] + state.velocity[:, None] * flow[:, 0, 1]
+def solve_linear(resonator: Resonator, state: ModalState, times_s: Tensor) -> Tensor:
+    """Modal amplitudes at `times_s` (times,) without any coupling: float64 (batch, times, modes)."""
+    eigenvalues = resonator.eigenvalues()
+    flow = damped_rotation(eigenvalues, times_s.expand(*eigenvalues.shape[:-1], -1))
+    flow = flow if eigenvalues.ndim == 2 else flow[None]
+    return state.amplitude[:, None] * flow[:, :, 0, 0] + state.velocity[:, None] * flow[:, :, 0, 1]

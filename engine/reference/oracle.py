@@ -8,16 +8,15 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.reference.state import ModalState
-from engine.string import StringParameters
+from engine.resonators.base import Resonator
 
 
 def solve_dop853(
-    string: StringParameters,
+    resonator: Resonator,
     state: ModalState,
     rate_hz: float,
     steps: int,
     *,
-    tension_modulated: bool,
     rtol: float = 1e-12,
     atol: float = 1e-14,
 ) -> Tensor:
@@ -28,11 +27,15 @@ def solve_dop853(
     """
     from scipy.integrate import solve_ivp  # slow to load, and only the oracle needs it
 
-    modes = state.modes
-    stiffness = string.undamped_frequencies(modes).square().numpy()
-    friction = 2 * string.decay_rates(modes).numpy()
-    eta_squared = string.wavenumbers(modes).square().numpy()
-    coupling = string.tension_coupling(modes).numpy() * float(tension_modulated)
+    if resonator.rows:
+        rows = [ModalState(q[None], v[None]) for q, v in zip(state.amplitude, state.velocity, strict=True)]
+        solved = [
+            solve_dop853(resonator.row(i), row, rate_hz, steps, rtol=rtol, atol=atol) for i, row in enumerate(rows)
+        ]
+        return torch.cat(solved)
+    modes = resonator.modes
+    stiffness, friction = resonator.omega.square().numpy(), 2 * resonator.sigma.numpy()
+    eta_squared, coupling = resonator.stretch.numpy(), resonator.coupling.numpy()
 
     def right_side(_time_s: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
         q, v = y[:modes], y[modes:]

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from engine.reference.linear import damped_rotation
 from engine.reference.state import ModalState
-from engine.string import StringParameters
+from engine.resonators.base import Resonator
 
 # Half of the palindromes: A₁ B₁ A₂ B₂ A₃ B₃ A₄ B₄ A₄ B₃ A₃ B₂ A₂ B₁ A₁.
 _A_HALF = (0.0711334264982231178, 0.241153427956640099, 0.521411761772814789, -0.333698616227678006)
@@ -28,7 +28,7 @@ ROTATIONS = (*_A_HALF, *reversed(_A_HALF))
 KICKS = (*_B_HALF, *reversed(_B_HALF[:3]))
 
 
-def default_substeps(string: StringParameters, modes: int, rate_hz: float) -> int:
+def default_substeps(resonator: Resonator, rate_hz: float) -> int:
     """Sub-steps per sample that keep the paper's protocol within 1e-7 relative L2 of the oracle.
 
     At least 36 sub-steps in a period of the highest mode: measured against DOP853 over 4000 samples on the
@@ -36,16 +36,15 @@ def default_substeps(string: StringParameters, modes: int, rate_hz: float) -> in
     with about the fourth power of the sub-step: a quarter of the sub-steps is still near 1e-5. Pass
     `substeps` to choose.
     """
-    highest_hz = float(string.undamped_frequencies(modes)[-1]) / (2 * math.pi)
+    highest_hz = float(resonator.omega.max()) / (2 * math.pi)
     return math.ceil(36 * highest_hz / rate_hz)
 
 
 class SplittingSolver:
-    """A linear or tension-modulated string at a sample rate. The solver is immutable: the state is passed.
+    """A resonator at a sample rate, or a batch of them, one for each row. It is immutable: the state is passed.
 
     Args:
-        modes: number of modes kept.
-        substeps: integration steps per sample; None takes `default_substeps`. The linear string needs one.
+        substeps: integration steps per sample; None takes `default_substeps`. What is linear needs one.
         silence: where above 0, the highest modes are left out from when their amplitudes fall below this share of all
             modes' together (no mode moves another that rests), and the sub-steps follow the highest that is left: a
             string that rings on costs a fraction of one that was just let go. Only on the CPU.
@@ -54,11 +53,9 @@ class SplittingSolver:
 
     def __init__(
         self,
-        string: StringParameters,
-        modes: int,
+        resonator: Resonator,
         rate_hz: float,
         *,
-        tension_modulated: bool,
         substeps: int | None = None,
         silence: float = 0.0,
         device: torch.device | str = "cpu",
@@ -69,13 +66,19 @@ class SplittingSolver:
             raise ValueError(f"substeps must be at least 1, not {substeps}")
         if not 0 <= silence < 1:
             raise ValueError(f"silence must be a share from 0 to below 1, not {silence}")
-        self.modes = modes
+        modes = self.modes = resonator.modes
         self.rate_hz = rate_hz
-        self.tension_modulated = tension_modulated
-        self.substeps = (substeps or default_substeps(string, modes, rate_hz)) if tension_modulated else 1
+        self.tension_modulated = tension_modulated = resonator.tension_modulated
+        self.substeps = (substeps or default_substeps(resonator, rate_hz)) if tension_modulated else 1
         self.device = torch.device(device)
         self._silence = silence
-        omega = string.undamped_frequencies(modes)
+        self._rows = [
+            SplittingSolver(resonator.row(row), rate_hz, substeps=substeps, silence=silence, device=device)
+            for row in range(sum(resonator.rows))
+        ]
+        if self._rows:
+            return
+        omega = resonator.omega
         self._inverse_omega_squared = omega.pow(-2)
         # sub-steps by how many modes move, and what depends on them, once for each number that there is
         wanted = torch.ceil(self.substeps * omega / omega[-1]) if silence else torch.full_like(omega, self.substeps)
@@ -83,12 +86,12 @@ class SplittingSolver:
         steps_s = 1 / (rate_hz * self._substeps.double())[:, None]
         rotations = ROTATIONS if tension_modulated else (1.0,)
         times_s = torch.tensor(rotations, dtype=torch.float64) * steps_s
-        flows = damped_rotation(string, modes, times_s.flatten())
+        flows = damped_rotation(resonator.eigenvalues(), times_s.flatten())
         self._flows = flows.reshape(*times_s.shape, 4, modes).to(self.device)
         kicks = KICKS if tension_modulated else ()
         self._kicks = torch.tensor(kicks, dtype=torch.float64) * steps_s
-        self._coupling = string.tension_coupling(modes).to(self.device)
-        self._eta_squared = string.wavenumbers(modes).square().to(self.device)
+        self._coupling = resonator.coupling.to(self.device)
+        self._eta_squared = resonator.stretch.to(self.device)
 
     @property
     def constants(self) -> tuple[Tensor, ...]:
@@ -100,6 +103,8 @@ class SplittingSolver:
         """Modal amplitudes after 1 … steps samples, float64 (batch, steps, modes), and the last state."""
         if state.modes != self.modes:
             raise ValueError(f"the solver holds {self.modes} modes, the state {state.modes}")
+        if self._rows:
+            return self._advance_rows(state, steps)
         q = state.amplitude.to(self.device, torch.float64).clone().contiguous()
         v = state.velocity.to(self.device, torch.float64).clone().contiguous()
         out = q.new_empty(q.shape[0], steps, self.modes)
@@ -108,6 +113,22 @@ class SplittingSolver:
         else:
             self._advance_tensors(q, v, out)
         return out, ModalState(q, v)
+
+    def _advance_rows(self, state: ModalState, steps: int) -> tuple[Tensor, ModalState]:
+        """Each row by its own solver."""
+        if len(state.amplitude) != len(self._rows):
+            raise ValueError(f"the solver holds {len(self._rows)} resonators, the state {len(state.amplitude)} rows")
+
+        def run(row: int) -> tuple[Tensor, ModalState]:
+            own = ModalState(state.amplitude[row : row + 1], state.velocity[row : row + 1])
+            return self._rows[row].advance(own, steps)
+
+        workers = min(torch.get_num_threads(), os.cpu_count() or 1, len(self._rows))
+        with ThreadPoolExecutor(workers) as pool:
+            done = list(pool.map(run, range(len(self._rows))))
+        ends = [end for _, end in done]
+        end = ModalState(torch.cat([e.amplitude for e in ends]), torch.cat([e.velocity for e in ends]))
+        return torch.cat([frames for frames, _ in done]), end
 
     def solve(self, state: ModalState, steps: int) -> Tensor:
         """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes)."""

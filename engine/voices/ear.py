@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
-from engine.sine_transform import analysis_matrix, listening_weights
+from engine.resonators.sine_transform import analysis_matrix, listening_weights
 
 
 @dataclass(frozen=True)

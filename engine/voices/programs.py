@@ -24,7 +24,6 @@ from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M
 from engine.preset import PresetInfo
 from engine.reference import SplittingSolver, default_substeps
-from engine.sine_transform import synthesis_matrix, to_modes
 from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
@@ -196,15 +195,9 @@ def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) 
         coarser: how many times fewer sub-steps than `default_substeps`.
     """
     n = info.modes
-    substeps = max(1, -(-default_substeps(info.string, n, rate_hz) // coarser))
-    solver = SplittingSolver(
-        info.string,
-        n,
-        rate_hz,
-        tension_modulated=info.tension_modulated,
-        substeps=substeps,
-        silence=HEARD_SILENCE,
-    )
+    resonator = info.resonator
+    substeps = max(1, -(-default_substeps(resonator, rate_hz) // coarser))
+    solver = SplittingSolver(resonator, rate_hz, substeps=substeps, silence=HEARD_SILENCE)
     flows, kicks, coupling, eta, steps, level_of, inverse = (part.numpy() for part in solver.constants)
     levels, stages = flows.shape[:2]
     padded = np.zeros((levels, stages))
@@ -223,13 +216,12 @@ def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) 
             at.T_INVERSE: inverse,
         },
     )
-    synthesis = synthesis_matrix(info.grid_points, n)
 
     def start(displacement_m: Tensor) -> tuple[Array, Array]:
-        return to_modes(displacement_m.double(), n).numpy(), np.zeros(n)
+        return resonator.to_modes(displacement_m.double()).numpy(), np.zeros(n)
 
     def read(weights: Tensor) -> tuple[Array, Array]:
-        found = (weights.T @ synthesis.T / FULL_SCALE_M).numpy()
+        found = (weights.T @ resonator.shapes.T / FULL_SCALE_M).numpy()
         return np.concatenate([found, np.zeros_like(found)], axis=1), np.zeros(len(found))
 
     return Program(at.TRUTH, memory, n, rate_hz, info.grid_points, start, read)

@@ -16,8 +16,8 @@ from engine.kernels import layout as at
 from engine.models import KoopmanVar
 from engine.pluck import Pluck
 from engine.preset import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
+from engine.resonators.string import StringParameters
 from engine.sources import project
-from engine.string import StringParameters
 from engine.voices import Ear, Mixer, Program, Voice, bank_program
 
 PLUCK, EAR = Pluck(0.3), Ear((0.37,))

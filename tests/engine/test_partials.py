@@ -11,7 +11,7 @@ from torch import Tensor
 
 from engine.partials import PartialErrors, PartialTrack, partial_errors, phasors, segment_frames, track_partials
 from engine.reference import ModalState, SplittingSolver
-from engine.string import StringParameters
+from engine.resonators.string import StringParameters
 
 RATE_HZ = 4000.0
 STRING = StringParameters()
@@ -177,19 +177,19 @@ def test_the_phasors_of_the_linear_string_are_exact() -> None:
     spacing_s = 1 / 16_000
     expected = amplitude * torch.exp(eigenvalues * torch.linspace(0, 0.1, 50, dtype=torch.float64)[:, None])
     around = [(expected * torch.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
-    found = phasors(*around, spacing_s, STRING, tension_modulated=False)
+    found = phasors(*around, spacing_s, STRING.resonator(10, tension_modulated=False))
     assert torch.allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_the_phasors_of_a_tense_string_are_circles() -> None:
     """One mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest."""
     state = ModalState.at_rest(torch.tensor([[0.0137]]))
-    assert STRING.relative_tension_rise(state.amplitude) == pytest.approx(0.05, abs=0.01)
-    samples = SplittingSolver(STRING, 1, 16_000, tension_modulated=True).solve(state, 4000)
+    assert STRING.resonator(1).relative_tension_rise(state.amplitude) == pytest.approx(0.05, abs=0.01)
+    samples = SplittingSolver(STRING.resonator(1), 16_000).solve(state, 4000)
     around = (samples[:, :-2], samples[:, 1:-1], samples[:, 2:])
     roundness = []
     for modulated in (True, False):
-        z = phasors(*around, 1 / 16_000, STRING, tension_modulated=modulated)
+        z = phasors(*around, 1 / 16_000, STRING.resonator(1, tension_modulated=modulated))
         roundness.append(float(z.imag.norm() / z.real.norm()))
     assert roundness[0] == pytest.approx(1, abs=0.002)
     assert roundness[1] > 1.01

@@ -9,7 +9,7 @@ from engine.models import KoopmanVar
 from engine.pluck import Pluck
 from engine.preset import Preset, load_preset, read_info
 from engine.reference import ModalState, solve_dop853
-from engine.sine_transform import listening_weights, to_grid, to_modes
+from engine.resonators.sine_transform import listening_weights, to_grid, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
 
 
@@ -37,7 +37,7 @@ def test_truth_is_the_oracle(preset_file: Path) -> None:
     _, truth, initial = both(preset_file)
     info = read_info(preset_file)
     state = ModalState.at_rest(to_modes(initial, info.modes))
-    expected = to_grid(solve_dop853(info.string, state, info.rate_hz, 200, tension_modulated=True), 101)
+    expected = to_grid(solve_dop853(info.string.resonator(state.modes), state, info.rate_hz, 200), 101)
     found, _ = truth.advance(truth.start(initial), 200)
     assert float((found - expected[:, 1:]).norm() / expected.norm()) < 1e-8
 

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.reference import ModalState, SplittingSolver
-from engine.sine_transform import to_grid, to_modes
+from engine.resonators.sine_transform import to_grid, to_modes
 from training.configuration import DatasetConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model, evaluate_partials, evaluate_past_horizon
@@ -37,7 +37,7 @@ class Truth(StringModel[tuple[ModalState, int]]):
         self.configuration = SimpleNamespace(input="displacement")
         self.gain = nn.Parameter(torch.tensor(gain))
         self._broken, self._scale_m = broken, data.scale_m
-        self._solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated)
+        self._solver = SplittingSolver(c.resonator, c.rate_hz)
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         raise NotImplementedError
@@ -148,7 +148,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
     c = replace(DATA, tension_modulated=False)
     data = load_dataset(c, tmp_path)
     model = build_model("koopman_integrated")
-    physics = Physics(c.string, c.modes, c.rate_hz, data.scale_m, tension_modulated=False)
+    physics = Physics(c.string.resonator(c.modes, tension_modulated=False), c.rate_hz, data.scale_m)
     model.initialise("physics", physics, torch.Generator().manual_seed(0))
     found = evaluate_past_horizon(model, data, "validation", 10, windows_s=[(0, HORIZON_S), (9, 10)])
     first, last = found.string.windows(c.rate_hz, [0, HORIZON_S, 9, 10])[::2]
@@ -173,7 +173,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
 @torch.no_grad()
 def test_kept_frames_of_a_stride_are_measured_alone(tmp_path: Path) -> None:
     every, some = (load_dataset(replace(DATA, stride=stride), tmp_path) for stride in (1, 5))
-    physics = Physics(DATA.string, DATA.modes, DATA.rate_hz, every.scale_m)
+    physics = Physics(DATA.string.resonator(DATA.modes), DATA.rate_hz, every.scale_m)
     for name in ("koopman_integrated", "s5"):  # one knows any frame at once, one does not
         model = build_model(name, {"state_size": 16, "layers": 1, "hippo_blocks": 2} if name == "s5" else None)
         model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))

@@ -11,7 +11,6 @@ import torch
 from torch import Tensor
 
 from engine.models.inputs import InputKind
-from engine.sine_transform import synthesis_matrix
 from training.configuration import Recipe
 from training.data.dataset import START_EVERY, Dataset
 
@@ -55,8 +54,9 @@ class TrainingData:
         count = len(self._amplitudes)
         # displacement a sample, as an encoder wants it; the training split comes first
         self._velocities = dataset.velocities[:count].to(device) / c.rate_hz
-        self._synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float().to(device)
-        self._mirror = torch.tensor([(-1.0) ** n for n in range(c.modes)], device=device)  # x -> ℓ - x
+        self._synthesis = (c.resonator.shapes / dataset.scale_m).float().to(device)
+        mirror = c.resonator.mirror
+        self._mirror = (torch.ones(c.modes) if mirror is None else mirror.float()).to(device)
         self.count = count
 
     def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> Batch:

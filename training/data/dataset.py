@@ -25,7 +25,6 @@ from torch import Tensor
 from engine.excitation import DRAWS
 from engine.reference import ModalState, SplittingSolver
 from engine.schema import write
-from engine.sine_transform import synthesis_matrix, to_modes
 from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
 
 CHUNK = 50  # trajectories a step of the progress
@@ -84,9 +83,9 @@ def draw_initial(configuration: DatasetConfiguration) -> Tensor:
     """Initial modal amplitudes of all trajectories, float64 (count, modes)."""
     generator = torch.Generator().manual_seed(configuration.seed)
     draw = DRAWS[configuration.initial]
-    initial = to_modes(draw(configuration.count, configuration.grid_points, generator), configuration.modes)
+    initial = configuration.resonator.to_modes(draw(configuration.count, configuration.grid_points, generator))
     if configuration.largest_tension_rise is not None:
-        rise = configuration.string.relative_tension_rise(initial)
+        rise = configuration.resonator.relative_tension_rise(initial)
         initial = initial * (configuration.largest_tension_rise / rise).sqrt().clamp(max=1)[:, None]
     return initial
 
@@ -171,7 +170,7 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
         for name, checksum in _simulate(configuration, unfinished, progress).items():
             facts[f"{name}_crc32"] = checksum
         values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
-        facts["scale_m"] = displacement_deviation(values, configuration.grid_points)
+        facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
         del values  # an open mapping would hold the folder on Windows
         (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
         unfinished.rename(folder)
@@ -182,7 +181,7 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
 
 def _simulate(c: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> dict[str, int]:
     """Writes both arrays; their checksums by name."""
-    solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=c.tension_modulated, substeps=c.substeps)
+    solver = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
     initial = draw_initial(c)
     with (
         closing(_ArrayFile(folder / "amplitudes.npy", _amplitudes_shape(c))) as amplitudes,
@@ -201,10 +200,9 @@ def _simulate(c: DatasetConfiguration, folder: Path, progress: Callable[[int, in
         return {"amplitudes": amplitudes.checksum, "velocities": velocities.checksum}
 
 
-def displacement_deviation(amplitudes: np.ndarray[Any, Any], grid_points: int) -> float:
+def displacement_deviation(amplitudes: np.ndarray[Any, Any], shapes: Tensor) -> float:
     """The standard deviation of displacement over trajectories, frames and grid points, for (…, modes)."""
-    synthesis = synthesis_matrix(grid_points, amplitudes.shape[-1])
-    gram, column = synthesis @ synthesis.T / grid_points, synthesis.mean(1)
+    gram, column = shapes @ shapes.T / shapes.shape[1], shapes.mean(1)
     total = squared = 0.0
     frames = amplitudes.reshape(-1, amplitudes.shape[-1])
     for first in range(0, len(frames), 100_000):

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engine.models.learned_eigenvalues import VANISHED, model_log_eigenvalues
+from engine.models.eigenvalues import VANISHED
 from engine.preset import Preset, PresetError
 from training.figures import motions, style
 
@@ -25,7 +25,7 @@ def eigenvalues(presets: Sequence[Preset]) -> Figure:
         raise PresetError("no preset was given; a figure needs at least one")
     found = []
     for preset in presets:
-        layers = [log[log.real > np.log(VANISHED)].numpy() for log in model_log_eigenvalues(preset.model)]
+        layers = [log[log.real > np.log(VANISHED)].numpy() for log in preset.model.log_eigenvalues()]
         if not layers:
             raise PresetError(
                 f"{preset.path}: a {preset.info.model} has no eigenvalues; its field goes through a network"
@@ -36,7 +36,7 @@ def eigenvalues(presets: Sequence[Preset]) -> Figure:
         axes = figure.subplots(2, len(presets), squeeze=False, sharey="row", height_ratios=(1.25, 1))
         for place, (preset, layers) in enumerate(zip(presets, found, strict=True)):
             info, drawn = preset.info, style.colour(place)["color"]
-            linear = info.string.eigenvalues(info.modes).numpy() / info.rate_hz
+            linear = info.resonator.eigenvalues().numpy() / info.rate_hz
             _draw_circle(axes[0, place], layers, linear, drawn)
             _draw_decay(axes[1, place], layers, linear, info.rate_hz, drawn)
             kind = "tension-modulated" if info.tension_modulated else "linear"

@@ -78,7 +78,7 @@ def extrapolation(
             style.mark_horizon(below, 1000 * horizon_s)
             if place == 0:
                 below.set_ylabel(f"u at {100 * listen * data.string.length_m:.0f} cm in mm")
-        highest_hz = 1.1 * float(data.string.undamped_frequencies(data.modes)[-1]) / (2 * np.pi)
+        highest_hz = 1.1 * float(data.resonator.omega[-1]) / (2 * np.pi)
         for place, from_s in enumerate((0.0, min(horizon_s, seconds / 2))):
             below = figure.add_subplot(grid[2, 3 * place : 3 * place + 3])
             _draw_spectra(below, signals, data.rate_hz, from_s, min(from_s + SPECTRUM_S, seconds), highest_hz)

@@ -13,8 +13,8 @@ from torch import Tensor
 
 from engine.metrics import ErrorSums
 from engine.preset import Preset, PresetError
+from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.schema import SchemaError, read
-from engine.sine_transform import listening_weights, to_grid
 from engine.sources import ModelSource, Runaway, SourceState, StringSource, TruthSource
 from training.cell import MODEL_NAMES
 from training.configuration import DatasetConfiguration, TrainingConfiguration

@@ -23,7 +23,6 @@ from engine.metrics import RelativeError
 from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
 from engine.schema import SchemaError, read, write
-from engine.sine_transform import synthesis_matrix
 from training.configuration import Recipe, TrainingConfiguration
 from training.data.batches import TrainingData, batches
 from training.data.dataset import Dataset
@@ -39,8 +38,6 @@ PURSUIT = "matching pursuit"  # see `pursuit`
 BLIND_PURSUIT = "blind matching pursuit"
 PHASES = "phases of the displacement"  # see `phases`
 TELL_EVERY_S = 5.0  # within an epoch
-EIGENVALUES = ("nu_log", "theta_log", "Lambda_re", "Lambda_im", "log_step")  # parameters with a rate of their own
-COUPLING = "K"  # of an integrated phase: too
 
 
 class Diverged(RuntimeError):
@@ -148,9 +145,11 @@ def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringMod
     """The untrained model of a run, initialised from its seed; `scale_m` is its data set's."""
     data = configuration.data
     model = build_model(configuration.model, configuration.model_configuration)
+    if model.grid_points != data.grid_points:
+        raise ValueError(f"model_configuration.grid_points is {model.grid_points}, the data's are {data.grid_points}")
     model.initialise(
         _start(configuration),
-        Physics(data.string, data.modes, data.rate_hz, scale_m, data.tension_modulated),
+        Physics(data.resonator, data.rate_hz, scale_m),
         torch.Generator().manual_seed(configuration.recipe.seed),
     )
     return model
@@ -344,7 +343,7 @@ def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Cal
     started = time.monotonic()
     c = dataset.configuration
     sizes: Any = read(MODELS["dmd"][1], configuration.model_configuration, "model_configuration")
-    synthesis = (synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m).float()
+    synthesis = (c.resonator.shapes / dataset.scale_m).float()
     truth = dataset.split("train")[:, : configuration.steps + 1] @ synthesis
     model = DMD.fit(truth, sizes)
     error = evaluate_model(model, dataset, "validation", configuration.steps).total()
@@ -357,13 +356,19 @@ def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Cal
     return FitResult(model.eval(), error, 1, 1, seconds)
 
 
-def _optimiser(model: torch.nn.Module, recipe: Recipe) -> torch.optim.Optimizer:
-    named = list(model.named_parameters())
+def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer:
+    eigenvalues: list[torch.nn.Parameter] = []
+    coupling: list[torch.nn.Parameter] = []
+    others: list[torch.nn.Parameter] = []
+    for name, parameter in model.named_parameters():
+        last = name.rpartition(".")[2]
+        declared = (model.eigenvalue_parameters, eigenvalues), (model.coupling_parameters, coupling)
+        next((group for names, group in declared if last in names), others).append(parameter)
     groups = [
-        {"params": [p for n, p in named if not _is_eigenvalue(n) and n != COUPLING], "share": 1.0},
-        {"params": [p for n, p in named if n == COUPLING], "share": recipe.coupling_rate},
+        {"params": others, "share": 1.0},
+        {"params": coupling, "share": recipe.coupling_rate},
         {
-            "params": [p for n, p in named if _is_eigenvalue(n)],
+            "params": eigenvalues,
             "share": recipe.eigenvalue_rate,
             "weight_decay": recipe.weight_decay if recipe.eigenvalue_decay else 0.0,
         },
@@ -376,10 +381,6 @@ def _keep_statistics(model: torch.nn.Module) -> None:
     for module in model.modules():
         if isinstance(module, BatchNorm1d):
             module.eval()
-
-
-def _is_eigenvalue(name: str) -> bool:
-    return name.rpartition(".")[2] in EIGENVALUES
 
 
 def _is_finite(error: RelativeError) -> bool:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from engine.sine_transform import synthesis_matrix
 from training.data.dataset import Dataset
 
 FREQUENCIES = 80  # of a mode's grid, between the lowest and the highest
@@ -48,18 +47,18 @@ def known_modes(dataset: Dataset, steps: int) -> Modes:
     """Those of the string: prior knowledge that the paper's models do not have."""
     c = dataset.configuration
     amplitudes = dataset.split("train")[:, : steps + 1].double() / dataset.scale_m
-    linear = c.string.eigenvalues(c.modes) / c.rate_hz
+    linear = c.resonator.eigenvalues() / c.rate_hz
     rise = 0.0
     if c.tension_modulated:  # at most half of the tension's, at the start of the strongest motion
-        rise = 0.5 * float(c.string.relative_tension_rise(amplitudes[:, 0] * dataset.scale_m).max())
+        rise = 0.5 * float(c.resonator.relative_tension_rise(amplitudes[:, 0] * dataset.scale_m).max())
     grids = []
     for eigenvalue in linear:
         own = float(eigenvalue.imag)
         reach = own - 4 * math.pi / steps, own * (1 + rise) + math.pi / steps
         spacing = max(math.pi / 2 / steps, own * rise / FREQUENCIES)
         grids.append(_grid(own, reach, spacing, -float(eigenvalue.real), steps))
-    mirror = tuple((-1.0) ** mode for mode in range(c.modes))
-    return Modes(synthesis_matrix(c.grid_points, c.modes), amplitudes, tuple(grids), mirror)
+    mirror = (torch.ones(c.modes) if c.resonator.mirror is None else c.resonator.mirror).tolist()
+    return Modes(c.resonator.shapes, amplitudes, tuple(grids), tuple(mirror))
 
 
 def found_modes(dataset: Dataset, steps: int) -> Modes:
@@ -94,7 +93,7 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
 def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
     """The training split on the grid, float64 (AT_ONCE, steps + 1, grid_points) at a time."""
     c = dataset.configuration
-    synthesis = synthesis_matrix(c.grid_points, c.modes) / dataset.scale_m
+    synthesis = c.resonator.shapes / dataset.scale_m
     for part in dataset.split("train")[:, : steps + 1].split(AT_ONCE):
         yield part.double() @ synthesis
 

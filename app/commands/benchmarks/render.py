@@ -20,8 +20,8 @@ from app.commands.benchmarks.machine import Machine, median_s, one_thread, times
 from engine.models import StringModel, build_model
 from engine.models.base import Physics
 from engine.pluck import DEFAULT_LISTEN, Pluck
-from engine.sine_transform import listening_weights
-from engine.string import StringParameters
+from engine.resonators.sine_transform import listening_weights
+from engine.resonators.string import StringParameters
 
 FIRST_BLOCK = 256
 AUDIO_S = 2.0
@@ -129,7 +129,7 @@ def _measure(case: Case, products_per_s: float, written_per_s: float) -> RenderT
 
 def _untrained(case: Case) -> StringModel[Any]:
     model = build_model(case.model, dict(case.sizes))
-    physics = Physics(StringParameters(), case.modes, case.rate_hz)
+    physics = Physics(StringParameters().resonator(case.modes), case.rate_hz)
     # a string's modes fall silent one by one, which the integrated phase makes use of; a random ring would at once
     how = "averaging" if "averaging" in model.initialisations else model.initialisations[0]
     model.initialise(how, physics, torch.Generator().manual_seed(0))

@@ -12,9 +12,8 @@ from torch import Tensor
 from app.commands.benchmarks.machine import Machine, median_s, one_thread
 from engine.pluck import Pluck
 from engine.reference import ModalState, SplittingSolver, solve_dop853
-from engine.sine_transform import to_modes
+from engine.resonators.string import StringParameters
 from engine.sources import SILENCE
-from engine.string import StringParameters
 from training.configuration import DatasetConfiguration
 from training.data.dataset import draw_initial
 
@@ -95,10 +94,10 @@ def measure(batch: int, steps: int, report: Callable[[float, str], None]) -> Sol
 
 def _measure_protocol(data: DatasetConfiguration, batch: int) -> SolverTiming:
     initial = draw_initial(data)
-    rise = data.string.relative_tension_rise(initial)
+    rise = data.resonator.relative_tension_rise(initial)
     worst = ModalState.at_rest(initial[rise.argmax()][None])
     started = time.perf_counter()
-    truth = solve_dop853(data.string, worst, data.rate_hz, data.steps, tension_modulated=True)
+    truth = solve_dop853(data.resonator, worst, data.rate_hz, data.steps)
     dop853_s = time.perf_counter() - started
 
     def error(substeps: int) -> float:
@@ -136,17 +135,17 @@ def relative_l2(found: Tensor, truth: Tensor) -> float:
 
 
 def _solver(data: DatasetConfiguration, substeps: int | None) -> SplittingSolver:
-    return SplittingSolver(data.string, data.modes, data.rate_hz, tension_modulated=True, substeps=substeps)
+    return SplittingSolver(data.resonator, data.rate_hz, substeps=substeps)
 
 
 def _measure_audio(substeps: int | None, silence: float = 0.0) -> AudioTiming:
     string = StringParameters()
     modes = string.modes_below(HIGHEST_AUDIBLE_HZ)
-    state = ModalState.at_rest(to_modes(Pluck().displacement(modes + 2)[None], modes))
+    resonator = string.resonator(modes, grid_points=modes + 2)
+    state = ModalState.at_rest(resonator.to_modes(Pluck().displacement(modes + 2)[None]))
     samples = math.ceil(AUDIO_S * AUDIO_RATE_HZ)
     whole, solver = (
-        SplittingSolver(string, modes, AUDIO_RATE_HZ, tension_modulated=True, substeps=substeps, silence=share)
-        for share in (0.0, silence)
+        SplittingSolver(resonator, AUDIO_RATE_HZ, substeps=substeps, silence=share) for share in (0.0, silence)
     )
     error = relative_l2(solver.solve(state, samples), whole.solve(state, samples))
     with one_thread():

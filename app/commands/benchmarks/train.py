@@ -10,7 +10,7 @@ import torch
 from app.commands.benchmarks.machine import Machine, median_s
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.string import StringParameters
+from engine.resonators.string import StringParameters
 from training.configuration import Recipe
 from training.data.batches import Batch
 from training.fitting.losses import training_loss
@@ -49,7 +49,7 @@ def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
 
 def _step_s(name: str) -> float:
     model = build_model(name)
-    physics = Physics(StringParameters(), 10, 4_000)
+    physics = Physics(StringParameters().resonator(10), 4_000)
     model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
     optimiser = torch.optim.AdamW(model.parameters())
     target = torch.randn(BATCH, FRAMES, model.grid_points, generator=torch.Generator().manual_seed(0))

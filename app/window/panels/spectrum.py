@@ -48,7 +48,7 @@ class SpectrumPanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._shown = self._standing = ()  # holds nothing of the last take
-        self._partials_hz = take.info.string.undamped_frequencies(take.info.modes).numpy() / (2 * np.pi)
+        self._partials_hz = take.info.resonator.omega.numpy() / (2 * np.pi)
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1

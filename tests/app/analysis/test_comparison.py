@@ -15,7 +15,7 @@ from app.analysis.job import Cancelled
 from app.presets.library import PresetEntry, list_presets
 from engine.pluck import Pluck
 from engine.preset import load_preset, save_preset
-from engine.sine_transform import listening_weights
+from engine.resonators.sine_transform import listening_weights
 from engine.sources import ModelSource, TruthSource, project
 
 TRIAL = Trial(Pluck(0.35, 4.0), 0.3, 0.37)

@@ -12,7 +12,7 @@ from app.rendering.velocity import Differentiator
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
-from engine.string import StringParameters
+from engine.resonators.string import StringParameters
 from engine.voices import Ear
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,

@@ -22,7 +22,7 @@ def of_family(path: Path, model: str) -> Preset:
     made = build_model(model, {})
     how = "physics" if "physics" in made.initialisations else made.initialisations[0]
     info = preset.info
-    made.initialise(how, Physics(info.string, info.modes, info.rate_hz), torch.Generator().manual_seed(0))
+    made.initialise(how, Physics(info.string.resonator(info.modes), info.rate_hz), torch.Generator().manual_seed(0))
     return Preset(preset.name, path, replace(info, model=model), made.eval())
 
 

@@ -11,7 +11,7 @@ from app.rendering.take import Motion
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.preset import PresetInfo, TrainedRange
-from engine.string import StringParameters
+from engine.resonators.string import StringParameters
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,
                   TrainedRange(None, None, (1e-3, 1e-2)), "paper", 0)  # fmt: skip

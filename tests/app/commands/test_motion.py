@@ -16,9 +16,9 @@ from engine.metrics import relative_error
 from engine.pluck import Pluck
 from engine.preset import load_preset
 from engine.reference import ModalState, solve_linear
-from engine.sine_transform import to_grid, to_modes
+from engine.resonators.sine_transform import to_grid, to_modes
+from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, TruthSource, project
-from engine.string import StringParameters
 
 
 def simulate(u0: Path, out: Path, string: str = "linear", steps: int = 200, modes: int = 10, *more: Any) -> list[Any]:
@@ -48,7 +48,9 @@ def test_the_linear_string_is_the_closed_form(run, u0: Path, folder: Path) -> No
     motion_m = np.load(folder / "out.npy")
     assert (motion_m.dtype, motion_m.shape) == (np.float64, (3, 201, 101))
     start = ModalState.at_rest(to_modes(torch.from_numpy(np.load(u0)), 10))
-    truth = to_grid(solve_linear(StringParameters(), start, torch.arange(201).double() / 4000), 101).numpy()
+    truth = to_grid(
+        solve_linear(StringParameters().resonator(start.modes), start, torch.arange(201).double() / 4000), 101
+    ).numpy()
     assert relative_l2(motion_m, truth) < 1e-12
     assert list(folder.iterdir()) == [folder / "out.npy"]
 

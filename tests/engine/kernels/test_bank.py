@@ -17,7 +17,7 @@ from engine.models.dmd import DMD, DMDConfiguration
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.preset import Preset, PresetInfo
 from engine.reference import ModalState, SplittingSolver, solve_linear
-from engine.sine_transform import to_grid, to_modes
+from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import ModelSource
 from engine.voices import Ear, Mixer, Voice, bank_program
 
@@ -75,7 +75,7 @@ def test_a_dmd_of_the_linear_string_is_the_linear_string(
 ) -> None:
     info = small_info(False)
     noise_m = 5e-3 * torch.rand(4, info.grid_points, generator=torch.Generator().manual_seed(0)).double()
-    solver = SplittingSolver(info.string, info.modes, info.rate_hz, tension_modulated=False)
+    solver = SplittingSolver(info.string.resonator(info.modes, tension_modulated=False), info.rate_hz)
     start = ModalState.at_rest(to_modes(noise_m, info.modes))
     trajectories = to_grid(solver.solve(start, 400), info.grid_points) / info.scale_m
     model = DMD.fit(trajectories, DMDConfiguration(info.grid_points, 2, 2 * info.modes))
@@ -84,7 +84,7 @@ def test_a_dmd_of_the_linear_string_is_the_linear_string(
     let_go_m = to_grid(start.amplitude[0], info.grid_points)
     found = rung(rate_hz // 2, Voice(program, let_go_m, EAR), attack=False)[:, :1]
     times_s = torch.arange(len(found)).double() / rate_hz
-    exact = solve_linear(info.string, ModalState(start.amplitude[:1], start.velocity[:1]), times_s)
+    exact = solve_linear(info.resonator, ModalState(start.amplitude[:1], start.velocity[:1]), times_s)
     expected = to_grid(exact[0], info.grid_points) @ EAR.weights(info.grid_points) / FULL_SCALE_M
     assert relative(found, expected.numpy()) < 3e-5
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.preset import Preset, PresetInfo
 from engine.reference import ModalState, solve_dop853, solve_linear
-from engine.sine_transform import to_grid, to_modes
+from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource
 from engine.voices import Ear, Voice, truth_program
 
@@ -46,7 +46,7 @@ def test_after_a_second_it_is_the_oracles(small_info: Info, initial_m: Initial, 
     let_go_m = initial_m(info, Pluck(0.3, 8.0, width=0.15))
     found = rung(8000, Voice(truth_program(info, 8000), let_go_m, STEREO), attack=False)
     start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
-    exact = solve_dop853(info.string, start, 8000, 7999, tension_modulated=True, rtol=1e-7, atol=1e-10)
+    exact = solve_dop853(info.resonator, start, 8000, 7999, rtol=1e-7, atol=1e-10)
     expected = (to_grid(exact[0], info.grid_points) @ STEREO.weights(info.grid_points)).numpy() / FULL_SCALE_M
     assert relative(found[7000:], expected[7000:]) < 1e-4
 
@@ -58,6 +58,6 @@ def test_the_linear_string_is_exact(rate_hz: int, small_info: Info, initial_m: I
     let_go_m = initial_m(info, Pluck(0.3, 8.0))
     found = rung(rate_hz // 2, Voice(truth_program(info, rate_hz), let_go_m, STEREO), attack=False)
     start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
-    exact = solve_linear(info.string, start, torch.arange(len(found)).double() / rate_hz)
+    exact = solve_linear(info.resonator, start, torch.arange(len(found)).double() / rate_hz)
     expected = (to_grid(exact[0], info.grid_points) @ STEREO.weights(info.grid_points)).numpy() / FULL_SCALE_M
     assert relative(found, expected) < 1e-7

@@ -13,10 +13,10 @@ from engine.models import MODELS, StringModel, build_model, count_parameters
 from engine.models.base import Physics
 from engine.pluck import Pluck
 from engine.preset import load_preset, read_info, save_preset
+from engine.resonators.sine_transform import listening_weights
+from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, write
-from engine.sine_transform import listening_weights
 from engine.sources import ModelSource, project
-from engine.string import StringParameters
 
 PAPER_COUNTS = {
     "koopman": 191_077,
@@ -26,7 +26,7 @@ PAPER_COUNTS = {
     "fgru": 640_033,
     "frnn": 643_201,
 }
-PHYSICS = Physics(StringParameters(), 10, 4_000)
+PHYSICS = Physics(StringParameters().resonator(10), 4_000)
 
 
 def made(name: str, seed: int = 0) -> StringModel[Any]:

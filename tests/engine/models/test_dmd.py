@@ -12,8 +12,8 @@ from engine.models.base import Physics, count_parameters
 from engine.models.dmd import DMD, DMDConfiguration
 from engine.models.inputs import InputKind
 from engine.reference import ModalState, SplittingSolver
-from engine.sine_transform import listening_weights, to_grid, to_modes
-from engine.string import StringParameters
+from engine.resonators.sine_transform import listening_weights, to_grid, to_modes
+from engine.resonators.string import StringParameters
 
 STRING, MODES, RATE_HZ = StringParameters(), 25, 16_000
 
@@ -25,7 +25,7 @@ as_pydmd_warns = pytest.mark.filterwarnings("ignore:Input data condition number"
 def trajectories(steps: int = 1000, tension_modulated: bool = False) -> torch.Tensor:
     """Two noise-plucked strings at 16 kHz in mm, float64 (2, steps + 1, 101)."""
     noise = torch.rand(2, 101, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-    solver = SplittingSolver(STRING, MODES, RATE_HZ, tension_modulated=tension_modulated)
+    solver = SplittingSolver(STRING.resonator(MODES, tension_modulated=tension_modulated), RATE_HZ)
     return to_grid(solver.solve(ModalState.at_rest(to_modes(noise * 5.5e-3, MODES)), steps), 101) * 1e3
 
 
@@ -98,7 +98,7 @@ def test_linear_motion_is_followed_as_in_the_papers_table() -> None:
 @torch.no_grad()
 def test_velocity_carries_on_the_motion() -> None:
     flowing = ModalState.at_rest(to_modes(trajectories()[:, 0] * 1e-3, MODES))
-    _, state = SplittingSolver(STRING, MODES, RATE_HZ, tension_modulated=False).advance(flowing, 100)
+    _, state = SplittingSolver(STRING.resonator(MODES, tension_modulated=False), RATE_HZ).advance(flowing, 100)
     truth = trajectories()[:, 101:]
     model = fitted("displacement_velocity")
     start, velocity = to_grid(state.amplitude, 101) * 1e3, to_grid(state.velocity, 101) * 1e3 / RATE_HZ
@@ -153,7 +153,7 @@ def test_phases_stay_exact_after_a_million_steps() -> None:
 @pytest.mark.parametrize("kind", ["displacement", "displacement_velocity", "two_frames"])
 def test_physics_initialisation_is_the_linear_string(kind: InputKind) -> None:
     model = DMD(DMDConfiguration(rank=60, input=kind))
-    model.initialise("physics", Physics(STRING, MODES, RATE_HZ), torch.Generator())
+    model.initialise("physics", Physics(STRING.resonator(MODES), RATE_HZ), torch.Generator())
     truth = trajectories()
     start, previous = truth[:, 1].float(), truth[:, 0].float()
     if kind == "two_frames":
@@ -201,7 +201,7 @@ def test_impossible_sizes_are_named() -> None:
     with pytest.raises(ValueError, match="lags must be at least 2 for the input 'two_frames'"):
         DMDConfiguration(lags=1, input="two_frames")
     with pytest.raises(ValueError, match="rank of at least 50, two a mode, not 20"):
-        DMD(DMDConfiguration(rank=20)).initialise("physics", Physics(STRING, 25, 16_000), torch.Generator())
+        DMD(DMDConfiguration(rank=20)).initialise("physics", Physics(STRING.resonator(25), 16_000), torch.Generator())
 
 
 def test_impossible_data_are_told() -> None:

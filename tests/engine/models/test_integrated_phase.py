@@ -13,8 +13,8 @@ from engine.models._averaging import FIXED_POINT_STEPS
 from engine.models._cubics import integrate_parabolas
 from engine.models.base import Physics
 from engine.reference import ModalState, SplittingSolver, solve_linear
-from engine.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
-from engine.string import StringParameters
+from engine.resonators.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
+from engine.resonators.string import StringParameters
 
 SMALL = {"encoder_widths": (12,), "eigenvalue_widths": (12, 12)}
 KINDS: tuple[dict, ...] = (
@@ -29,7 +29,7 @@ KINDS: tuple[dict, ...] = (
 
 def string_model(how: str = "averaging", seed: int = 0, **sizes: object) -> KoopmanIntegrated:
     model = KoopmanIntegrated(IntegratedPhaseConfiguration(**{"state_size": 12, **SMALL, **sizes}))  # type: ignore[arg-type]
-    model.initialise(how, Physics(StringParameters(), 10, 4_000, 1e-3), torch.Generator().manual_seed(seed))
+    model.initialise(how, Physics(StringParameters().resonator(10), 4_000, 1e-3), torch.Generator().manual_seed(seed))
     return model.eval()
 
 
@@ -218,7 +218,9 @@ def test_physics_initialisation_is_the_linear_string(kind: str) -> None:
     state = ModalState(
         torch.randn(1, 10, dtype=torch.float64, generator=generator), velocity * (kind != "displacement")
     )
-    truth = to_grid(solve_linear(string, state, torch.arange(402, dtype=torch.float64) / rate_hz), 101)
+    truth = to_grid(
+        solve_linear(string.resonator(state.modes), state, torch.arange(402, dtype=torch.float64) / rate_hz), 101
+    )
     begin, second = 0, None
     if kind == "displacement_velocity":
         second = to_grid(velocity / rate_hz, 101)
@@ -233,12 +235,12 @@ def test_physics_initialisation_is_the_linear_string(kind: str) -> None:
 def test_averaging_is_nearly_the_tension_modulated_string() -> None:
     string, rate_hz, steps = StringParameters(), 4_000, 4000
     amplitudes = to_modes(draw_gaussians(8, 101, torch.Generator().manual_seed(0)), 10)
-    solver = SplittingSolver(string, 10, rate_hz, tension_modulated=True)
+    solver = SplittingSolver(string.resonator(10), rate_hz)
     truth = solver.solve(ModalState.at_rest(amplitudes), steps) @ (synthesis_matrix(101, 10) / 1e-3)
     errors = {}
     for how in ("physics", "averaging"):
         model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
-        model.initialise(how, Physics(string, 10, rate_hz, 1e-3), torch.Generator().manual_seed(0))
+        model.initialise(how, Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
         difference = model(truth[:, 0].float(), steps) - truth[:, 1:]
         errors[how] = float((difference.square().sum((1, 2)) / truth[:, 1:].square().sum((1, 2))).mean())
     assert errors["averaging"] < 2e-4
@@ -252,7 +254,7 @@ def test_physical_units_change_no_start_but_its_numbers() -> None:
     assert relative(scaled(loud, 3000), model(loud, 3000)) < 1e-4
     assert 0.1 < scaled.K.abs().max() < 2 and scaled.M_out is not None and 0.01 < scaled.M_out.abs().max() < 20
     assert float(scaled.energy_units[0]) == pytest.approx(  # type: ignore[index]
-        float(StringParameters().relative_tension_rise(torch.tensor([1e-3, 0, 0]))), rel=1e-6
+        float(StringParameters().resonator(3).relative_tension_rise(torch.tensor([1e-3, 0, 0]))), rel=1e-6
     )
 
 
@@ -265,13 +267,13 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
     for strength in (1.0, 0.5):
         amplitudes = torch.zeros(1, 10, dtype=torch.float64)
         amplitudes[0, 0], amplitudes[0, high] = 8e-3 * strength, 1e-5
-        truth = SplittingSolver(string, 10, rate_hz, tension_modulated=True).solve(
-            ModalState.at_rest(amplitudes), steps
-        )
+        truth = SplittingSolver(string.resonator(10), rate_hz).solve(ModalState.at_rest(amplitudes), steps)
         for modulation in errors:
             sizes = IntegratedPhaseConfiguration(state_size=10, modulation=modulation)
             model = KoopmanIntegrated(sizes).double()
-            model.initialise("averaging", Physics(string, 10, rate_hz, 1e-3), torch.Generator().manual_seed(0))
+            model.initialise(
+                "averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0)
+            )
             found = to_modes(model(to_grid(amplitudes / 1e-3, 101), steps), 10)[0, :, high] * 1e-3
             errors[modulation].append(relative(found, truth[0, 1:, high]))
     assert errors[True][0] < 0.2 * errors[False][0]
@@ -284,13 +286,11 @@ def test_the_action_keeps_the_phase_long_after_the_start() -> None:
     """Energies that decay from the first amplitudes, not from the actions, mistake the frequency for good."""
     string, rate_hz = StringParameters(), 4_000
     amplitudes = to_modes(draw_noise(8, 101, torch.Generator().manual_seed(0)), 10)
-    truth, _ = SplittingSolver(string, 10, rate_hz, tension_modulated=True).advance(
-        ModalState.at_rest(amplitudes), 5 * rate_hz
-    )
+    truth, _ = SplittingSolver(string.resonator(10), rate_hz).advance(ModalState.at_rest(amplitudes), 5 * rate_hz)
     errors = {}
     for adiabatic in (False, True):
         model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10, modulation=True, adiabatic=adiabatic))
-        model.initialise("averaging", Physics(string, 10, rate_hz, 1e-3), torch.Generator().manual_seed(0))
+        model.initialise("averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
         found, _ = model.advance(model.encode(to_grid(amplitudes / 1e-3, 101).float()), 5 * rate_hz)
         late = to_modes(found[:, -rate_hz:], 10) * 1e-3 - truth[:, -rate_hz:]
         errors[adiabatic] = float(late.square().sum() / truth[:, -rate_hz:].square().sum())
@@ -304,7 +304,7 @@ def test_adiabatic_change_needs_the_modulation() -> None:
 
 def test_averaging_of_the_linear_string_is_the_linear_string() -> None:
     model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
-    physics = Physics(StringParameters(), 10, 4_000, 1e-3, tension_modulated=False)
+    physics = Physics(StringParameters().resonator(10, tension_modulated=False), 4_000, 1e-3)
     model.initialise("averaging", physics, torch.Generator().manual_seed(0))
     assert not model.K.any()
 

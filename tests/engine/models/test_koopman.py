@@ -10,11 +10,11 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.koopman import SHARPEST, Koopman, KoopmanConfiguration
 from engine.reference import ModalState, solve_linear
-from engine.sine_transform import listening_weights, to_grid
-from engine.string import StringParameters
+from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.resonators.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "koopman.npz"
-PHYSICS = Physics(StringParameters(), 10, 4_000)
+PHYSICS = Physics(StringParameters().resonator(10), 4_000)
 
 
 def reference_model() -> tuple[Koopman, torch.Tensor, torch.Tensor]:
@@ -145,7 +145,7 @@ def test_physics_starts_as_the_linear_string() -> None:
     model.initialise("physics", PHYSICS, torch.Generator().manual_seed(0))
     amplitudes = torch.randn(2, 10, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
     times_s = torch.arange(401).double() / PHYSICS.rate_hz
-    truth = solve_linear(PHYSICS.string, ModalState.at_rest(0.3 * amplitudes), times_s)
+    truth = solve_linear(PHYSICS.resonator, ModalState.at_rest(0.3 * amplitudes), times_s)
     found = model(to_grid(0.3 * amplitudes, 101).float(), 400)
     wanted = to_grid(truth[:, 1:], 101)
     assert float((found - wanted).square().sum() / wanted.square().sum()) < 1e-4

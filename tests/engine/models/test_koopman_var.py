@@ -10,8 +10,8 @@ from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters
 from engine.models.base import Physics
 from engine.models.inputs import InputKind
 from engine.reference import ModalState, SplittingSolver, solve_linear
-from engine.sine_transform import listening_weights, to_grid
-from engine.string import StringParameters
+from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.resonators.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "koopman_var.npz"
 
@@ -37,7 +37,7 @@ def reference_model() -> tuple[KoopmanVar, torch.Tensor, torch.Tensor]:
 
 def small_model(seed: int = 0, how: str = "paper") -> KoopmanVar:
     model = KoopmanVar(KoopmanVarConfiguration(101, 32, (16, 16)))
-    model.initialise(how, Physics(StringParameters(), 10, 4_000), torch.Generator().manual_seed(seed))
+    model.initialise(how, Physics(StringParameters().resonator(10), 4_000), torch.Generator().manual_seed(seed))
     return model.eval()
 
 
@@ -96,11 +96,11 @@ def test_physics_initialisation_knows_how_the_string_moves(kind: InputKind) -> N
     """A start in the middle of the linear motion; the multiplier is held at 1."""
     string, modes, rate_hz = StringParameters(), 10, 8_000
     model = KoopmanVar(KoopmanVarConfiguration(101, 12, (4,), kind))
-    model.initialise("physics", Physics(string, modes, rate_hz), torch.Generator().manual_seed(0))
+    model.initialise("physics", Physics(string.resonator(modes), rate_hz), torch.Generator().manual_seed(0))
     model.multiplier[-1].weight.zero_()
     model.decoder.weight[:, modes:] = 0
     amplitudes = torch.randn(1, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
-    solver = SplittingSolver(string, modes, rate_hz, tension_modulated=False)
+    solver = SplittingSolver(string.resonator(modes, tension_modulated=False), rate_hz)
     frames, state = solver.advance(ModalState.at_rest(amplitudes), 30)
     second = state.velocity / rate_hz if kind == "displacement_velocity" else frames[:, -2]
     start = model.encode(to_grid(frames[:, -1], 101).float(), to_grid(second, 101).float())
@@ -147,7 +147,9 @@ def test_physics_initialisation_is_nearly_the_linear_string() -> None:
     model = small_model(how="physics")
     amplitudes = torch.randn(1, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
     times_s = torch.arange(1, 401, dtype=torch.float64) / rate_hz
-    truth = to_grid(solve_linear(string, ModalState.at_rest(amplitudes), times_s), 101).float()
+    truth = to_grid(
+        solve_linear(string.resonator(amplitudes.shape[1]), ModalState.at_rest(amplitudes), times_s), 101
+    ).float()
     found = model(to_grid(amplitudes, 101).float(), 400)
     assert float((found - truth).norm() / truth.norm()) < 0.1
 
@@ -185,6 +187,6 @@ def test_impossible_sizes_are_named(sizes: dict) -> None:
 def test_physics_initialisation_needs_a_state_for_each_mode() -> None:
     model = KoopmanVar(KoopmanVarConfiguration(101, 5, (4,)))
     with pytest.raises(ValueError, match="at least the 10 modes, not 5"):
-        model.initialise("physics", Physics(StringParameters(), 10, 4_000), torch.Generator())
+        model.initialise("physics", Physics(StringParameters().resonator(10), 4_000), torch.Generator())
     with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
-        model.initialise("guess", Physics(StringParameters(), 10, 4_000), torch.Generator())
+        model.initialise("guess", Physics(StringParameters().resonator(10), 4_000), torch.Generator())

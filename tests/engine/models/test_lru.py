@@ -9,7 +9,7 @@ import torch
 from engine.models import LRU, LRUConfiguration, count_parameters
 from engine.models.base import Physics
 from engine.models.lru import LRULayer
-from engine.string import StringParameters
+from engine.resonators.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "lru.npz"
 STORED = ("B_re", "B_im", "C_re", "C_im", "D", "nu_log", "theta_log", "gamma_log")
@@ -93,7 +93,7 @@ def test_agrees_with_a_plain_recurrence() -> None:
 
 def drawn_model() -> LRU:
     model = LRU(LRUConfiguration(21, state_size=24, layers=2))
-    model.initialise("paper", Physics(StringParameters(), 10, 4_000), torch.Generator().manual_seed(0))
+    model.initialise("paper", Physics(StringParameters().resonator(10), 4_000), torch.Generator().manual_seed(0))
     return model.eval()
 
 

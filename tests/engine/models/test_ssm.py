@@ -9,10 +9,10 @@ from engine.models import LRU, S5, LRUConfiguration, S5Configuration
 from engine.models.base import Physics
 from engine.models.ssm import SSMString, evolve, recur
 from engine.reference import ModalState, solve_linear
-from engine.sine_transform import listening_weights, to_grid
-from engine.string import StringParameters
+from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.resonators.string import StringParameters
 
-PHYSICS = Physics(StringParameters(), 10, 4_000)
+PHYSICS = Physics(StringParameters().resonator(10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")
 
 
@@ -163,12 +163,12 @@ def test_physics_initialisation_is_the_linear_string(name: str, kind: str) -> No
     amplitudes = torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
     start = 0 if kind == "displacement" else 7  # later, the string has a velocity
     times_s = (start + torch.arange(-1, 201, dtype=torch.float64)) / PHYSICS.rate_hz
-    moving = solve_linear(PHYSICS.string, ModalState.at_rest(amplitudes), times_s.clamp(min=0))
+    moving = solve_linear(PHYSICS.resonator, ModalState.at_rest(amplitudes), times_s.clamp(min=0))
     truth = to_grid(moving, 21).float()
     second = None
     if kind == "displacement_velocity":
         near_s = (start + torch.tensor([-1e-3, 1e-3], dtype=torch.float64)) / PHYSICS.rate_hz
-        earlier, later = solve_linear(PHYSICS.string, ModalState.at_rest(amplitudes), near_s).unbind(1)
+        earlier, later = solve_linear(PHYSICS.resonator, ModalState.at_rest(amplitudes), near_s).unbind(1)
         second = to_grid((later - earlier) / 2e-3, 21).float()
     elif kind == "two_frames":
         second = truth[:, 0]
@@ -194,6 +194,6 @@ def test_models_can_be_built_without_memory(name: str) -> None:
 def test_physics_initialisation_needs_a_state_for_each_mode(name: str) -> None:
     model = small_model(name)
     with pytest.raises(ValueError, match="each of the 30 modes"):
-        model.initialise("physics", Physics(StringParameters(), 30, 4_000), torch.Generator())
+        model.initialise("physics", Physics(StringParameters().resonator(30), 4_000), torch.Generator())
     with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
         model.initialise("guess", PHYSICS, torch.Generator())

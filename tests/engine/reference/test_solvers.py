@@ -8,8 +8,8 @@ import torch
 from engine.excitation import DRAWS, draw_noise
 from engine.reference import ModalState, SplittingSolver, default_substeps, solve_dop853, solve_linear
 from engine.reference.splitting import KICKS, ROTATIONS
-from engine.sine_transform import to_modes
-from engine.string import StringParameters
+from engine.resonators.sine_transform import to_modes
+from engine.resonators.string import StringParameters
 
 STRING = StringParameters()
 PROTOCOL = [("gaussian", 4_000, 10), ("noise", 4_000, 10), ("gaussian", 16_000, 25), ("noise", 16_000, 25)]
@@ -18,7 +18,7 @@ PROTOCOL = [("gaussian", 4_000, 10), ("noise", 4_000, 10), ("gaussian", 16_000, 
 def worst_of_protocol(initial: str, modes: int, seed: int = 0) -> ModalState:
     """The string with the largest tension rise among a thousand draws: the hardest to integrate."""
     amplitudes = to_modes(DRAWS[initial](1000, 101, torch.Generator().manual_seed(seed)), modes)
-    worst = int(STRING.relative_tension_rise(amplitudes).argmax())
+    worst = int(STRING.resonator(amplitudes.shape[1]).relative_tension_rise(amplitudes).argmax())
     return ModalState.at_rest(amplitudes[worst : worst + 1])
 
 
@@ -38,16 +38,16 @@ def random_state(batch: int, modes: int) -> ModalState:
 def test_default_accuracy_on_the_worst_of_the_protocol(initial: str, rate_hz: int, modes: int) -> None:
     """1e-7 over 4000 samples is the promise; a shorter stretch keeps the suite quick (`bench solver` has it all)."""
     state = worst_of_protocol(initial, modes)
-    truth = solve_dop853(STRING, state, rate_hz, 600, tension_modulated=True)
-    found = SplittingSolver(STRING, modes, rate_hz, tension_modulated=True).solve(state, 600)
+    truth = solve_dop853(STRING.resonator(state.modes), state, rate_hz, 600)
+    found = SplittingSolver(STRING.resonator(modes), rate_hz).solve(state, 600)
     assert relative_l2(found, truth) < 1e-7
 
 
 @pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
 def test_modes_that_have_died_away_may_be_left_out(initial: str, rate_hz: int, modes: int) -> None:
     state = worst_of_protocol(initial, modes)
-    full, ended = SplittingSolver(STRING, modes, rate_hz, tension_modulated=True).advance(state, 2 * rate_hz)
-    solver = SplittingSolver(STRING, modes, rate_hz, tension_modulated=True, silence=1e-9)
+    full, ended = SplittingSolver(STRING.resonator(modes), rate_hz).advance(state, 2 * rate_hz)
+    solver = SplittingSolver(STRING.resonator(modes), rate_hz, silence=1e-9)
     found, rests = solver.advance(state, 2 * rate_hz)
     assert relative_l2(found, full) < 1e-7
     moving = rests.amplitude != 0
@@ -57,7 +57,7 @@ def test_modes_that_have_died_away_may_be_left_out(initial: str, rate_hz: int, m
 
 
 def test_what_is_left_out_does_not_depend_on_the_blocks() -> None:
-    solver = SplittingSolver(STRING, 25, 16_000, tension_modulated=True, silence=1e-9)
+    solver = SplittingSolver(STRING.resonator(25), 16_000, silence=1e-9)
     state = worst_of_protocol("gaussian", 25)
     whole, _ = solver.advance(state, 4000)
     blocks = []
@@ -68,7 +68,7 @@ def test_what_is_left_out_does_not_depend_on_the_blocks() -> None:
 
 
 def test_a_string_at_rest_or_beyond_numbers_stays_so() -> None:
-    solver = SplittingSolver(STRING, 5, 16_000, tension_modulated=True, silence=1e-9)
+    solver = SplittingSolver(STRING.resonator(5), 16_000, silence=1e-9)
     state = ModalState.at_rest(torch.stack([torch.zeros(5), torch.full((5,), torch.nan)]).double())
     rest, nan = solver.advance(state, 10)[0]
     assert (rest == 0).all()
@@ -78,9 +78,9 @@ def test_a_string_at_rest_or_beyond_numbers_stays_so() -> None:
 def test_order_of_convergence() -> None:
     """Order 4 in the perturbation at least: halving the step divides the error by 16 or more."""
     state = worst_of_protocol("noise", 25)
-    truth = SplittingSolver(STRING, 25, 16_000, tension_modulated=True, substeps=96).solve(state, 100)
+    truth = SplittingSolver(STRING.resonator(25), 16_000, substeps=96).solve(state, 100)
     errors = [
-        relative_l2(SplittingSolver(STRING, 25, 16_000, tension_modulated=True, substeps=n).solve(state, 100), truth)
+        relative_l2(SplittingSolver(STRING.resonator(25), 16_000, substeps=n).solve(state, 100), truth)
         for n in (12, 24)
     ]
     assert errors[0] / errors[1] > 14
@@ -95,29 +95,29 @@ def test_the_scheme_is_consistent_and_symmetric() -> None:
 
 def test_the_linear_string_is_exact() -> None:
     state = random_state(3, 25)
-    found = SplittingSolver(STRING, 25, 16_000, tension_modulated=False).solve(state, 2000)
+    found = SplittingSolver(STRING.resonator(25, tension_modulated=False), 16_000).solve(state, 2000)
     times_s = torch.arange(2001, dtype=torch.float64) / 16_000
-    assert relative_l2(found, solve_linear(STRING, state, times_s)) < 1e-11
+    assert relative_l2(found, solve_linear(STRING.resonator(state.modes), state, times_s)) < 1e-11
 
 
 def test_the_linear_solution_agrees_with_the_oracle() -> None:
     state = random_state(1, 10)
-    truth = solve_dop853(STRING, state, 4_000, 200, tension_modulated=False)
-    found = solve_linear(STRING, state, torch.arange(201, dtype=torch.float64) / 4_000)
+    truth = solve_dop853(STRING.resonator(state.modes, tension_modulated=False), state, 4_000, 200)
+    found = solve_linear(STRING.resonator(state.modes), state, torch.arange(201, dtype=torch.float64) / 4_000)
     assert relative_l2(found, truth) < 1e-9
 
 
 def test_a_small_nonlinear_string_is_a_linear_one() -> None:
     state = ModalState.at_rest(torch.tensor([[1e-8, 0, 1e-8]]))
     linear, modulated = (
-        SplittingSolver(STRING, 3, 16_000, tension_modulated=on).solve(state, 500) for on in (False, True)
+        SplittingSolver(STRING.resonator(3, tension_modulated=on), 16_000).solve(state, 500) for on in (False, True)
     )
     assert relative_l2(modulated, linear) < 1e-6
 
 
 @pytest.mark.parametrize("tension_modulated", [False, True])
 def test_both_kernels_agree(tension_modulated: bool) -> None:
-    solver = SplittingSolver(STRING, 25, 16_000, tension_modulated=tension_modulated, substeps=2)
+    solver = SplittingSolver(STRING.resonator(25, tension_modulated=tension_modulated), 16_000, substeps=2)
     state = random_state(4, 25)
     compiled, last = solver.advance(state, 20)
     q, v, tensors = state.amplitude.clone(), state.velocity.clone(), torch.empty_like(compiled)
@@ -127,7 +127,7 @@ def test_both_kernels_agree(tension_modulated: bool) -> None:
 
 
 def test_going_on_from_a_state_is_the_same_motion() -> None:
-    solver = SplittingSolver(STRING, 25, 16_000, tension_modulated=True, substeps=3)
+    solver = SplittingSolver(STRING.resonator(25), 16_000, substeps=3)
     state = random_state(3, 25)
     before = state.amplitude.clone()
     whole, _ = solver.advance(state, 257)
@@ -142,7 +142,7 @@ def test_going_on_from_a_state_is_the_same_motion() -> None:
 def test_the_callers_state_is_not_touched() -> None:
     state = random_state(2, 5)
     kept = (state.amplitude.clone(), state.velocity.clone())
-    SplittingSolver(STRING, 5, 8_000, tension_modulated=True).advance(state, 10)
+    SplittingSolver(STRING.resonator(5), 8_000).advance(state, 10)
     assert torch.equal(state.amplitude, kept[0])
     assert torch.equal(state.velocity, kept[1])
 
@@ -162,23 +162,23 @@ def test_energy_decays_as_the_damping_says() -> None:
     for string, low, high in ((free, 1 - 1e-7, 1 + 1e-7), (STRING, 0.0, 0.9)):
         state = ModalState.at_rest(amplitudes)
         before = energy(string, state)
-        _, state = SplittingSolver(string, 10, 16_000, tension_modulated=True).advance(state, 4000)
+        _, state = SplittingSolver(string.resonator(10), 16_000).advance(state, 4000)
         assert low < energy(string, state) / before < high
 
 
 def test_default_substeps_follow_the_highest_mode() -> None:
-    assert default_substeps(STRING, 25, 16_000) == 4 * default_substeps(STRING, 25, 64_000)
-    assert default_substeps(STRING, 50, 16_000) > default_substeps(STRING, 25, 16_000)
+    assert default_substeps(STRING.resonator(25), 16_000) == 4 * default_substeps(STRING.resonator(25), 64_000)
+    assert default_substeps(STRING.resonator(50), 16_000) > default_substeps(STRING.resonator(25), 16_000)
 
 
 def test_bad_requests_are_named() -> None:
     with pytest.raises(ValueError, match="sample rate must be above 0"):
-        SplittingSolver(STRING, 5, 0, tension_modulated=True)
+        SplittingSolver(STRING.resonator(5), 0)
     with pytest.raises(ValueError, match="silence"):
-        SplittingSolver(STRING, 5, 16_000, tension_modulated=True, silence=1.0)
+        SplittingSolver(STRING.resonator(5), 16_000, silence=1.0)
     with pytest.raises(ValueError, match="substeps must be at least 1"):
-        SplittingSolver(STRING, 5, 4_000, tension_modulated=True, substeps=0)
-    solver = SplittingSolver(STRING, 5, 4_000, tension_modulated=True)
+        SplittingSolver(STRING.resonator(5), 4_000, substeps=0)
+    solver = SplittingSolver(STRING.resonator(5), 4_000)
     with pytest.raises(ValueError, match="holds 5 modes, the state 4"):
         solver.advance(random_state(1, 4), 3)
     with pytest.raises(ValueError, match="one shape"):

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
-from engine.sine_transform import listening_weights, to_grid
+from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.voices import Ear
 
 POINTS = 101

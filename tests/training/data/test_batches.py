@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from engine.reference import ModalState, SplittingSolver
-from engine.sine_transform import analysis_matrix
+from engine.resonators.sine_transform import analysis_matrix
 from training.configuration import DatasetConfiguration, Recipe
 from training.data.batches import Batch, TrainingData, batches
 from training.data.dataset import START_EVERY, Dataset, load_dataset
@@ -27,7 +27,7 @@ def assert_is_a_motion(dataset: Dataset, batch: Batch) -> None:
     c = dataset.configuration
     assert batch.second is not None
     state = ModalState(modal(dataset, batch.initial), modal(dataset, batch.second) * c.rate_hz)
-    truth = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=True).solve(state, int(batch.frames[-1]))
+    truth = SplittingSolver(c.resonator, c.rate_hz).solve(state, int(batch.frames[-1]))
     torch.testing.assert_close(modal(dataset, batch.target), truth[:, batch.frames], rtol=1e-4, atol=2e-8)
 
 

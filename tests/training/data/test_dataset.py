@@ -20,7 +20,7 @@ TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
 
 def test_amplitudes_and_velocities_are_the_solvers(small_dataset: Dataset) -> None:
     c = small_dataset.configuration
-    solver = SplittingSolver(c.string, c.modes, c.rate_hz, tension_modulated=True)
+    solver = SplittingSolver(c.resonator, c.rate_hz)
     state = ModalState.at_rest(draw_initial(c))
     assert torch.equal(small_dataset.amplitudes, solver.solve(state, c.steps).float())
     for start in range(small_dataset.velocities.shape[1]):
@@ -33,9 +33,9 @@ def test_amplitudes_and_velocities_are_the_solvers(small_dataset: Dataset) -> No
 def test_a_draw_that_would_break_the_string_is_softened() -> None:
     free = DatasetConfiguration("pluck", 48_000, 40, count=60)
     capped = draw_initial(replace(free, largest_tension_rise=0.02))
-    drawn, rise = draw_initial(free), free.string.relative_tension_rise(draw_initial(free))
+    drawn, rise = draw_initial(free), free.resonator.relative_tension_rise(draw_initial(free))
     assert bool((rise > 0.02).any()) and bool((rise < 0.02).any())
-    torch.testing.assert_close(free.string.relative_tension_rise(capped), rise.clamp(max=0.02))
+    torch.testing.assert_close(free.resonator.relative_tension_rise(capped), rise.clamp(max=0.02))
     assert torch.equal(capped[rise <= 0.02], drawn[rise <= 0.02])
     with pytest.raises(ValueError, match="largest_tension_rise must be above 0"):
         replace(free, largest_tension_rise=0.0)

@@ -16,11 +16,10 @@ from matplotlib.image import imread
 from engine.metrics import ErrorSums
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.models.learned_eigenvalues import model_log_eigenvalues
 from engine.preset import Preset, PresetError, PresetInfo, TrainedRange
 from engine.reference import ModalState, SplittingSolver
+from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.schema import write
-from engine.sine_transform import listening_weights, to_grid
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import draw_initial
 from training.figures import evolution, extrapolation, motions, spectrum, style
@@ -46,7 +45,7 @@ def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, *
     c = DatasetConfiguration(**fields)
     built = build_model(model, SIZES[model])
     how = "physics" if "physics" in built.initialisations else built.initialisations[0]
-    built.initialise(how, Physics(c.string, c.modes, c.rate_hz, 1e-3), torch.Generator().manual_seed(0))
+    built.initialise(how, Physics(c.string.resonator(c.modes), c.rate_hz, 1e-3), torch.Generator().manual_seed(0))
     training = TrainingConfiguration("Tiny", model, c, Recipe(1), model_configuration=SIZES[model])
     info = PresetInfo(
         title="Tiny",
@@ -71,7 +70,7 @@ def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, *
 def truth_and_model(one: Preset, rows: slice, steps: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Frames 0 … steps in m, by the solver and the model themselves."""
     data = motions.data_of([one])
-    solver = SplittingSolver(data.string, data.modes, data.rate_hz, tension_modulated=data.tension_modulated)
+    solver = SplittingSolver(data.resonator, data.rate_hz)
     truth = to_grid(solver.solve(ModalState.at_rest(draw_initial(data)[rows]), steps), data.grid_points)
     with torch.no_grad():
         model = one.model((truth[:, 0] / 1e-3).float(), steps).double() * 1e-3
@@ -277,7 +276,7 @@ def test_eigenvalues_are_those_of_the_parameters() -> None:
 )
 def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: int) -> None:
     one = preset(model)
-    found = model_log_eigenvalues(one.model)
+    found = one.model.log_eigenvalues()
     assert [log.dtype for log in found] == [torch.complex128] * layers
     linear = one.info.string.eigenvalues(5) / 4000
     nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from engine.models import Koopman, KoopmanConfiguration, KoopmanVar, KoopmanVarConfiguration
-from engine.sine_transform import synthesis_matrix
+from engine.resonators.sine_transform import synthesis_matrix
 from training.configuration import Recipe
 from training.data.dataset import Dataset
 from training.fitting.modes import found_modes, known_modes

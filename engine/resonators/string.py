@@ -12,6 +12,9 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
+from engine.resonators.base import Resonator
+from engine.resonators.sine_transform import analysis_matrix, synthesis_matrix
+
 
 @dataclass(frozen=True)
 class StringParameters:
@@ -58,17 +61,8 @@ class StringParameters:
         return ((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m).sqrt()
 
     def eigenvalues(self, modes: int) -> Tensor:
-        """Continuous-time eigenvalues -σ + i√(ω² - σ²) of the linear string, complex128 (modes,).
-
-        Raises:
-            ValueError: a mode is damped so strongly that it no longer oscillates.
-        """
-        sigma = self.decay_rates(modes)
-        squared = self.undamped_frequencies(modes) ** 2 - sigma**2
-        if bool((squared <= 0).any()):
-            first = int((squared <= 0).nonzero()[0]) + 1
-            raise ValueError(f"mode {first} is overdamped: lower damping_d1/damping_d3 or keep fewer modes")
-        return torch.complex(-sigma, squared.sqrt())
+        """Continuous-time eigenvalues of the linear string, complex128 (modes,); see `Resonator.eigenvalues`."""
+        return self.resonator(modes, tension_modulated=False, grid_points=modes + 2).eigenvalues()
 
     def tension_coupling(self, modes: int) -> Tensor:
         """k_μ = EAη_μ² / 4ρA in 1/(m² s²)·m², float64 (modes,).
@@ -77,10 +71,26 @@ class StringParameters:
         """
         return self.youngs_modulus_pa * self.area_m2 * self.wavenumbers(modes) ** 2 / (4 * self.mass_per_length_kg_m)
 
-    def relative_tension_rise(self, amplitudes: Tensor) -> Tensor:
-        """ΔT/T₀ for modal amplitudes (..., modes) in m; result (...)."""
-        stretch = (self.wavenumbers(amplitudes.shape[-1]) * amplitudes).square().sum(-1)
-        return self.youngs_modulus_pa * self.area_m2 / 4 * stretch / self.tension_n
+    def resonator(self, modes: int, *, tension_modulated: bool = True, grid_points: int = 101) -> Resonator:
+        """Its first modes, on a grid of so many points with both ends; linear, or with the tension that stretch adds.
+
+        Raises:
+            ValueError: the grid does not hold so many modes.
+        """
+        coupling = self.tension_coupling(modes)
+        signs = 1.0 - 2.0 * (torch.arange(modes, dtype=torch.float64) % 2)
+        return Resonator(
+            omega=self.undamped_frequencies(modes),
+            sigma=self.decay_rates(modes),
+            coupling=coupling if tension_modulated else torch.zeros_like(coupling),
+            stretch=self.wavenumbers(modes).square(),
+            tension_rise=torch.tensor(
+                self.youngs_modulus_pa * self.area_m2 / (4 * self.tension_n), dtype=torch.float64
+            ),
+            shapes=synthesis_matrix(grid_points, modes),
+            analysis=analysis_matrix(grid_points, modes),
+            mirror=signs,
+        )
 
     def modes_below(self, frequency_hz: float) -> int:
         """The number of modes whose undamped frequency lies below `frequency_hz`."""

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from engine.sine_transform import listening_weights, mode_shapes, to_grid, to_modes
+from engine.resonators.sine_transform import listening_weights, mode_shapes, to_grid, to_modes
 
 
 @pytest.mark.parametrize("modes", [1, 10, 25, 99])

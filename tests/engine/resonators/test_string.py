@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from engine.string import StringParameters
+from engine.resonators.string import StringParameters
 
 
 def test_default_is_the_papers_b3() -> None:
@@ -35,7 +35,7 @@ def test_relative_tension_rise_is_the_stretch_of_the_shape() -> None:
     slope = (amplitudes * eta * torch.cos(eta * x[:, None])).sum(1)
     stretch = float(torch.trapezoid(slope**2, x))
     expected = string.youngs_modulus_pa * string.area_m2 / (2 * string.length_m) * stretch / string.tension_n
-    assert float(string.relative_tension_rise(amplitudes)) == pytest.approx(expected, rel=1e-6)
+    assert float(string.resonator(3).relative_tension_rise(amplitudes)) == pytest.approx(expected, rel=1e-6)
 
 
 def test_modes_below() -> None:

@@ -1,0 +1,125 @@
+"""What rings: modes with their frequencies, decays, shapes, and how they share one tension.
+
+The seam between physics and everything that learns from it or solves it: models, truth, data sets and presets take
+these numbers and know no string. A mode n of amplitude q_n moves as
+
+    q̈_n + 2 σ_n q̇_n + ω_n² q_n = -k_n q_n Σ_m η_m² q_m²,
+
+where the sum is the stretch, whose tension acts on all alike (the paper's Eq. 3-5 for a string); k = 0 is linear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Resonator:
+    """One resonator, or a batch of them: then each tensor but the shapes has an axis (rows,) in front.
+
+    Attributes:
+        omega: undamped angular frequencies ω in rad/s, ascending, float64 (modes,).
+        sigma: decay rates σ in 1/s, (modes,): a free mode falls as exp(-σt).
+        coupling: k, in 1/s² for a stretch of 1, (modes,); zeros: linear.
+        stretch: η² in 1/m², (modes,): the stretch is Σ η² q².
+        tension_rise: ΔT/T₀ of a stretch of 1, ().
+        shapes: displacement of each mode at amplitude 1 on the points of a grid, (modes, points).
+        analysis: (points, modes), its inverse for what lies in its modes: displacement @ analysis = amplitudes.
+        mirror: the sign that each mode takes where the resonator is turned end to end, (modes,); None: it is not
+            symmetrical. That -q solves what q does needs no attribute: the tension does not know signs.
+
+    Raises:
+        ValueError: shapes that do not go together, or numbers that are not finite.
+    """
+
+    omega: Tensor
+    sigma: Tensor
+    coupling: Tensor
+    stretch: Tensor
+    tension_rise: Tensor
+    shapes: Tensor
+    analysis: Tensor
+    mirror: Tensor | None = None
+
+    def __post_init__(self) -> None:
+        modes, points = self.shapes.shape
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            expected = {"shapes": (modes, points), "analysis": (points, modes), "mirror": (modes,)}.get(
+                field.name, self.tension_rise.shape if field.name == "tension_rise" else (*self.rows, modes)
+            )
+            if tuple(value.shape) != tuple(expected):
+                raise ValueError(f"resonator: {field.name} has the shape {tuple(value.shape)}, not {tuple(expected)}")
+            if not bool(torch.isfinite(value).all()):
+                raise ValueError(f"resonator: {field.name} holds a number that is not finite")
+        if tuple(self.tension_rise.shape) != self.rows:
+            raise ValueError(f"resonator: tension_rise has {self.tension_rise.ndim} axes, not {len(self.rows)}")
+        if bool((self.omega.diff(dim=-1) < 0).any()):
+            raise ValueError("resonator: omega must not fall from one mode to the next")
+
+    @property
+    def modes(self) -> int:
+        return self.shapes.shape[0]
+
+    @property
+    def points(self) -> int:
+        """Of the grid."""
+        return self.shapes.shape[1]
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """(rows,) of a batch, () of one."""
+        return tuple(self.omega.shape[:-1])
+
+    @property
+    def tension_modulated(self) -> bool:
+        """Whether any amplitude moves another mode's frequency."""
+        return bool(self.coupling.any())
+
+    def row(self, index: int) -> Resonator:
+        """One of a batch."""
+        shared = ("shapes", "analysis", "mirror")
+        own = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared}
+        return replace(self, **own)
+
+    @classmethod
+    def stacked(cls, resonators: list[Resonator]) -> Resonator:
+        """A batch of single ones whose shapes are the same.
+
+        Raises:
+            ValueError: they are not.
+        """
+        first = resonators[0]
+        if any(not torch.equal(first.shapes, each.shapes) for each in resonators):
+            raise ValueError("resonators of one batch must have the same modes on the same grid")
+        own = ("omega", "sigma", "coupling", "stretch", "tension_rise")
+        return replace(first, **{name: torch.stack([getattr(each, name) for each in resonators]) for name in own})
+
+    def eigenvalues(self) -> Tensor:
+        """Continuous-time eigenvalues -σ + i√(ω² - σ²) at rest, complex128 (modes,).
+
+        Raises:
+            ValueError: a mode is damped so strongly that it no longer oscillates.
+        """
+        squared = self.omega**2 - self.sigma**2
+        if bool((squared <= 0).any()):
+            first = int((squared <= 0).nonzero()[0, -1]) + 1
+            raise ValueError(f"mode {first} is overdamped: lower damping_d1/damping_d3 or keep fewer modes")
+        return torch.complex(-self.sigma, squared.sqrt())
+
+    def relative_tension_rise(self, amplitudes: Tensor) -> Tensor:
+        """ΔT/T₀ of modal amplitudes (..., modes) in m; result (...)."""
+        return (self.stretch * amplitudes.square()).sum(-1) * self.tension_rise
+
+    def to_modes(self, displacement: Tensor) -> Tensor:
+        """Displacement (..., points) to modal amplitudes (..., modes), same dtype and unit."""
+        return displacement @ self.analysis.to(displacement)
+
+    def to_grid(self, amplitudes: Tensor) -> Tensor:
+        """Modal amplitudes (..., modes) to displacement (..., points), same dtype and unit."""
+        return amplitudes @ self.shapes.to(amplitudes)

@@ -1,0 +1,144 @@
+"""The seam: batches of resonators, and one that is no string.
+
+A rectangular membrane whose tension is the same everywhere (Berger's assumption) is a third kind of resonator: its
+modes are products of sines, and its stretch acts on all of them as a string's does. Truth and models take it so.
+"""
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+
+from engine.models import build_model
+from engine.models.base import Physics
+from engine.reference import ModalState, SplittingSolver, solve_dop853, solve_linear
+from engine.resonators import Resonator, StringParameters
+
+SIDES_M = (0.30, 0.22)
+POINTS = (9, 7)  # of the grid, edges included
+ORDERS = [(m, n) for m in range(1, 4) for n in range(1, 4)]
+RATE_HZ = 8_000
+
+
+def membrane(stiffening: float = 0.0) -> Resonator:
+    """Waves of 60 m/s on a rectangle that is held at its edges, all of it damped alike."""
+    eta = [math.pi * math.hypot(m / SIDES_M[0], n / SIDES_M[1]) for m, n in ORDERS]
+    order = sorted(range(len(eta)), key=eta.__getitem__)
+    stretch = torch.tensor([eta[i] ** 2 for i in order], dtype=torch.float64)
+    x, y = (torch.linspace(0, 1, points, dtype=torch.float64) for points in POINTS)
+    shapes = torch.stack(
+        [
+            (torch.sin(math.pi * m * x)[:, None] * torch.sin(math.pi * n * y)).flatten()
+            for m, n in (ORDERS[i] for i in order)
+        ]
+    )
+    return Resonator(
+        omega=60.0 * stretch.sqrt(),
+        sigma=torch.full_like(stretch, 8.0),
+        coupling=stiffening * stretch,
+        stretch=stretch,
+        tension_rise=torch.tensor(stiffening / 60.0**2, dtype=torch.float64),
+        shapes=shapes,
+        analysis=shapes.T * (4 / ((POINTS[0] - 1) * (POINTS[1] - 1))),
+    )
+
+
+def struck(drum: Resonator) -> ModalState:
+    """Pulled off its middle, a millimetre high, and let go."""
+    x, y = (torch.linspace(0, 1, points, dtype=torch.float64) for points in POINTS)
+    bump = torch.exp(-40 * ((x - 0.4)[:, None] ** 2 + (y - 0.3) ** 2)).flatten()
+    return ModalState.at_rest(1e-3 * drum.to_modes(bump)[None])
+
+
+def relative(found: torch.Tensor, truth: torch.Tensor) -> float:
+    return float((found - truth).norm() / truth.norm())
+
+
+def test_a_membranes_grid_holds_its_modes() -> None:
+    drum = membrane()
+    amplitudes = torch.randn(4, drum.modes, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    torch.testing.assert_close(drum.to_modes(drum.to_grid(amplitudes)), amplitudes)
+
+
+def test_the_truth_of_a_linear_membrane_is_its_closed_form() -> None:
+    drum = membrane()
+    state = struck(drum)
+    found = SplittingSolver(drum, RATE_HZ).solve(state, 4000)
+    times_s = torch.arange(4001, dtype=torch.float64)[:, None] / RATE_HZ
+    turning = (drum.omega.square() - drum.sigma.square()).sqrt()
+    fading = torch.exp(-drum.sigma * times_s)
+    swing = torch.cos(turning * times_s) + drum.sigma / turning * torch.sin(turning * times_s)
+    assert relative(found, state.amplitude[:, None] * fading * swing) < 1e-12
+    assert relative(solve_linear(drum, state, times_s[:, 0]), found) < 1e-12
+
+
+def test_the_truth_of_a_membrane_that_stiffens_is_the_oracles() -> None:
+    drum = membrane(stiffening=3e7)
+    state = struck(drum)
+    assert 0.05 < float(drum.relative_tension_rise(state.amplitude)) < 2
+    found = SplittingSolver(drum, RATE_HZ).solve(state, 400)
+    assert relative(found, solve_dop853(drum, state, RATE_HZ, 400)) < 1e-6
+    assert relative(SplittingSolver(membrane(), RATE_HZ).solve(state, 400), found) > 0.01  # it does stiffen
+
+
+@pytest.mark.parametrize("name", ["koopman_integrated", "lru", "dmd"])
+def test_a_model_starts_as_a_linear_membrane(name: str) -> None:
+    drum = membrane()
+    sizes = {"dmd": {"rank": 18}, "lru": {"state_size": 16, "layers": 1}, "koopman_integrated": {"state_size": 9}}[
+        name
+    ]
+    model = build_model(name, {"grid_points": drum.points, **sizes}).double().eval()
+    how = "averaging" if name == "koopman_integrated" else "physics"
+    model.initialise(how, Physics(drum, RATE_HZ, 1e-3), torch.Generator().manual_seed(0))
+    state = struck(drum)
+    with torch.no_grad():
+        found = model(drum.to_grid(state.amplitude) / 1e-3, 800) * 1e-3
+    truth = drum.to_grid(SplittingSolver(drum, RATE_HZ).solve(state, 800)[:, 1:])
+    assert relative(found.to(truth), truth) < 0.05  # a release from rest, to about σ/ω
+
+
+def test_averaging_follows_the_stiffening_of_a_membrane() -> None:
+    drum = membrane(stiffening=3e7)
+    state = struck(drum)
+    truth = drum.to_grid(SplittingSolver(drum, RATE_HZ).solve(state, 1600)[:, 1:])
+    errors = {}
+    for how in ("physics", "averaging"):
+        model = build_model("koopman_integrated", {"grid_points": drum.points, "state_size": 9}).double().eval()
+        model.initialise(how, Physics(drum, RATE_HZ, 1e-3), torch.Generator().manual_seed(0))
+        with torch.no_grad():
+            errors[how] = relative(model(drum.to_grid(state.amplitude) / 1e-3, 1600) * 1e-3, truth)
+    assert errors["averaging"] < 0.5 * errors["physics"]
+
+
+def test_each_row_of_a_batch_is_a_resonator_of_its_own() -> None:
+    strings = [StringParameters(tension_n=tension_n) for tension_n in (50.0, 60.97, 72.0)]
+    batch = Resonator.stacked([string.resonator(10) for string in strings])
+    amplitudes = 2e-3 * torch.rand(3, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    state = ModalState.at_rest(amplitudes / torch.arange(1, 11) ** 2)
+    for solve in (
+        lambda r, s: SplittingSolver(r, RATE_HZ).solve(s, 300),
+        lambda r, s: solve_linear(r, s, torch.arange(301, dtype=torch.float64) / RATE_HZ),
+        lambda r, s: solve_dop853(r, s, RATE_HZ, 20),
+    ):
+        together = solve(batch, state)
+        for row, string in enumerate(strings):
+            own = ModalState(state.amplitude[row : row + 1], state.velocity[row : row + 1])
+            torch.testing.assert_close(together[row : row + 1], solve(string.resonator(10), own), rtol=1e-12, atol=0)
+    rises = torch.stack([string.resonator(10).relative_tension_rise(amplitudes) for string in strings])
+    torch.testing.assert_close(batch.row(1).relative_tension_rise(amplitudes), rises[1])
+
+
+def test_what_does_not_go_together_is_refused() -> None:
+    string = StringParameters().resonator(5, grid_points=9)
+    with pytest.raises(ValueError, match="coupling has the shape"):
+        replace(string, coupling=torch.zeros(4, dtype=torch.float64))
+    with pytest.raises(ValueError, match="sigma holds a number that is not finite"):
+        replace(string, sigma=torch.full((5,), math.nan, dtype=torch.float64))
+    with pytest.raises(ValueError, match="omega must not fall"):
+        replace(string, omega=string.omega.flip(0))
+    with pytest.raises(ValueError, match="same modes on the same grid"):
+        Resonator.stacked([string, StringParameters().resonator(5, grid_points=11)])
+    with pytest.raises(ValueError, match="3 resonators, the state 2 rows"):
+        solver = SplittingSolver(Resonator.stacked([string] * 3), RATE_HZ)
+        solver.advance(ModalState.at_rest(torch.zeros(2, 5)), 1)

@@ -1,0 +1,47 @@
+"""What `pip install .` gives: an installed package, away from its sources, has all that it needs."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(*command: object, folder: Path, **variables: str) -> str:
+    environment = {**os.environ, **variables}
+    words = [str(part) for part in command]
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_wheel_has_presets_recipes_and_pictures(tmp_path: Path) -> None:
+    source, installed, elsewhere = (tmp_path / name for name in ("source", "installed", "elsewhere"))
+    for name in ("engine", "training", "app", "presets"):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    elsewhere.mkdir()
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "-q")
+    run(*pip, "wheel", "--no-build-isolation", "--no-deps", "-w", tmp_path, source, folder=elsewhere)
+    run(*pip, "install", "--no-deps", "--target", installed, *tmp_path.glob("*.whl"), folder=elsewhere)
+    # the installed package alone: without the development install's paths
+    start = f"import sys; sys.path.insert(0, {str(installed)!r}); "
+    command = (sys.executable, "-W", "ignore", "-c")
+    listed = json.loads(
+        run(
+            *command,
+            start + "from app.commands import cli; assert cli.__file__.startswith(sys.path[0]); "
+            "sys.exit(cli.main(['presets', '--json']))",
+            folder=elsewhere,
+        )
+    )
+    shipped = sorted(path.stem for path in (ROOT / "presets").glob("*.safetensors"))
+    assert sorted(each["name"] for each in listed) == shipped
+    looked_up = start + "from training.by_name import load; from app.views.theme import SIGNS; "
+    looked_up += "print(load('studio_nylon_b3').model, load('nylon_linear_noise_4k_lru').model, SIGNS.is_dir())"
+    assert run(*command, looked_up, folder=elsewhere).split() == ["koopman_integrated", "lru", "True"]
+    assert list(elsewhere.iterdir()) == []
