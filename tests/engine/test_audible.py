@@ -57,7 +57,7 @@ def test_a_level_that_changes_is_told_against_the_truths(change_db: float) -> No
     assert found.level_db == pytest.approx(change_db, abs=0.01)
     assert found.pitch_cents == pytest.approx(0, abs=0.05)
     assert found.rise_db == 0  # the string's own decay is faster
-    assert abs(change_db) / 2 < found.distance_db < abs(change_db)
+    assert 0.4 < found.distance_db / abs(change_db) < 0.6
 
 
 def test_a_model_that_is_louder_throughout_does_not_grow() -> None:
