@@ -7,6 +7,8 @@ each tensor's name, type and shape, then that every number is finite.
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -189,6 +191,25 @@ def described_parameters(path: Path, info: PresetInfo) -> int:
         PresetError: the description is of an impossible model; `path` names it in the message.
     """
     return count_parameters(_empty_model(path, info))
+
+
+def preset_digest(path: Path) -> str:
+    """SHA-256 of a preset's file, in hexadecimal; remembered for as long as the file is the same one.
+
+    Raises:
+        PresetError: it cannot be read.
+    """
+    try:
+        state = path.stat()
+        return _digest(path, state.st_mtime_ns, state.st_size)
+    except OSError as error:
+        raise PresetError(f"{path}: the preset cannot be read any more ({error.strerror}); put it back") from error
+
+
+@functools.lru_cache(maxsize=512)
+def _digest(path: Path, changed_ns: int, size_bytes: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from app.commands.arguments import Cache, Json, PresetName, check_range, open_preset
+from app.commands.arguments import Cache, Json, check_range, open_preset
 from app.commands.console import Failure, number, print_json, print_table, progress
 from app.commands.training import load_data
 from engine.pluck import DEFAULT_LISTEN
@@ -33,7 +33,9 @@ CSV_COLUMNS = ("preset", "split", "start_s", "stop_s", "past_horizon", "mode", "
 
 
 def evaluate(
-    preset: PresetName,
+    preset: Annotated[
+        str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
+    ] = None,
     split: Annotated[Split, typer.Option(help="The tables of the paper are of validation.")] = "validation",
     past: Annotated[float, typer.Option(metavar="S", help="Go on so many s past the training horizon.")] = 0.0,
     partials: Annotated[
@@ -45,10 +47,27 @@ def evaluate(
     table: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write every figure to a table, one a row.")
     ] = None,
+    heard: Annotated[
+        bool, typer.Option("--heard", help="Instead: what a listener would notice of a few plucks, by name.")
+    ] = False,
+    everything: Annotated[bool, typer.Option("--all", help="With --heard: all presets.")] = False,
+    write: Annotated[
+        bool, typer.Option("--write", help="With --heard: keep it beside the preset, for cards and browser.")
+    ] = False,
     cache: Cache = None,
     json: Json = False,
 ) -> None:
     """Measure a preset's errors on the data set that it was trained with, beside those stored in it."""
+    of_heard = (("--all", everything), ("--write", write))
+    of_data = (("--past", past), ("--partials", partials), ("--trajectories", trajectories), ("--csv", table))
+    for option, given in of_data if heard else of_heard:
+        if given:
+            raise typer.BadParameter(f"does not go {'with' if heard else 'without'} --heard", param_hint=option)
+    if heard:
+        _evaluate_heard(preset, everything, write, json)
+        return
+    if preset is None:
+        raise typer.BadParameter("is missing: give a preset's name or file", param_hint="PRESET")
     check_range("--past", past, 0, LONGEST_PAST_S, "s")
     loaded = open_preset(preset)
     info = loaded.info
@@ -84,6 +103,17 @@ def evaluate(
         _print_errors(name, errors, info.horizon_s)
         for found in errors.get("partials", [])[: 2 if past else 1]:  # the whole horizon, and all past it
             _print_partials(name, found)
+
+
+def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: bool) -> None:
+    from app.commands.heard import show_heard
+    from app.presets.folders import usable_files
+    from engine.preset import find_preset
+
+    if everything == (preset is not None):
+        raise typer.BadParameter("give a preset, or --all for all of them", param_hint="PRESET")
+    files = usable_files()
+    show_heard(files if preset is None else [find_preset(preset, files)], write, json)
 
 
 class _Shares:

@@ -10,6 +10,8 @@ from app.commands.console import print_json, print_table, say
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from training.heard_file import Heard
+
 PRESET_FIELDS = (
     "name",
     "model",
@@ -20,6 +22,7 @@ PRESET_FIELDS = (
     "parameters",
     "rel_mse",
     "rel_mae",
+    "heard",
     "file",
 )
 
@@ -28,11 +31,19 @@ def presets(json: Json = False) -> None:
     """List the presets, the user's own among them. A broken file is told on standard error and hides no other."""
     from app.presets.folders import usable_files
     from engine.preset import PresetError
+    from training.heard_file import read_heard
 
+    files = usable_files()
+    known: dict[str, Heard] = {}
+    for folder in dict.fromkeys(path.parent for path in files):
+        heard, problems = read_heard(folder)
+        known |= heard
+        for problem in problems:
+            say(problem)
     found = []
-    for path in usable_files():
+    for path in files:
         try:
-            found.append(_facts(path))
+            found.append(_facts(path, known))
         except PresetError as error:
             say(str(error))
     if json:
@@ -57,8 +68,9 @@ def models(json: Json = False) -> None:
         print_table(("name", "parameters"), [list(facts.values()) for facts in found])
 
 
-def _facts(path: Path) -> dict[str, Any]:
-    from engine.preset import described_parameters, read_info
+def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
+    from app.presets.heard_words import heard_word
+    from engine.preset import described_parameters, preset_digest, read_info
 
     info = read_info(path)
     values = (
@@ -71,6 +83,7 @@ def _facts(path: Path) -> dict[str, Any]:
         described_parameters(path, info),
         info.rel_mse,
         info.rel_mae,
+        heard_word(known.get(preset_digest(path))),
         str(path),
     )
     return dict(zip(PRESET_FIELDS, values, strict=True))

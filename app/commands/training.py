@@ -108,6 +108,19 @@ def train(
     ):
         print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
     print(f"trained in  {duration(row.seconds or 0.0)}, best epoch {row.best_epoch}")
+    _tell_heard(file)
+
+
+def _tell_heard(file: Path) -> None:
+    """Listens to the preset that was written; kept beside it, where cards and browser look."""
+    from app.commands.heard import measure
+    from app.presets.heard_words import heard_word
+
+    try:
+        with progress("listen") as report:
+            print(f"heard       {heard_word(measure(file, True, report))}")
+    except ValueError as error:  # a model that cannot be let go from rest
+        say(f"not listened to: {error}")
 
 
 def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Dataset:

@@ -11,11 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from app.export.sound import LONGEST_S, SoundRequest
 from app.export.wav import RATE_RANGE_HZ, WavSettings
-from app.presets.digest import preset_digest
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import Bits, Pickup, Source
 from engine.pluck import Pluck
-from engine.preset import Preset, PresetError
+from engine.preset import Preset, PresetError, preset_digest
 from engine.sources import FULL_SCALE_M
 
 

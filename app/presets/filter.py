@@ -1,13 +1,17 @@
-"""Which presets a browser lists: by words of its search, by string, model and rate, by favour."""
+"""Which presets a browser lists, and in which order: by words of its search, string, model, rate and favour."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from typing import Literal
 
+from app.presets.heard_words import heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import initial_word, model_word, rate_word, string_word
+
+Order = Literal["truest", "name", "error"]
 
 
 @dataclass(frozen=True)
@@ -16,6 +20,7 @@ class PresetFilter:
 
     Attributes:
         words: parts of words, in any order, between blanks or commas; all of them must be found.
+        order: how true they sound, by name, or by their error in validation; what is not known comes last.
         string: as `PresetInfo.string_kind`.
     """
 
@@ -24,11 +29,20 @@ class PresetFilter:
     model: str = ""
     rate_hz: int = 0
     favourites_only: bool = False
+    order: Order = "truest"
 
     def applied(self, entries: Iterable[PresetEntry], favourites: Collection[str]) -> list[PresetEntry]:
-        """Favourites first, else in their order."""
+        """Favourites first, then by `order`; equals stay as they come."""
         found = [entry for entry in entries if self.matches(entry, favourites)]
-        return sorted(found, key=lambda entry: entry.name not in favourites)
+        return sorted(found, key=lambda entry: (entry.name not in favourites, *self._rank(entry)))
+
+    def _rank(self, entry: PresetEntry) -> tuple[bool, float]:
+        if self.order == "name":
+            return False, 0.0
+        known = entry.info.rel_mae
+        if self.order == "truest":
+            known = None if entry.heard is None else entry.heard.distance_db
+        return known is None, known or 0.0
 
     def matches(self, entry: PresetEntry, favourites: Collection[str]) -> bool:
         info = entry.info
@@ -58,5 +72,6 @@ def searched_text(entry: PresetEntry) -> str:
         initial_word(info.initial),
         rate_word(info.rate_hz),
         f"{info.rate_hz}",
+        heard_word(entry.heard),
     )
     return " ".join(parts).casefold()

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from app.presets.digest import preset_digest
 from app.shared.whole_file import WriteError, explain, whole_file
-from engine.preset import PresetError, load_preset
+from engine.preset import PresetError, load_preset, preset_digest
 from engine.sources import ModelSource
 
 SUFFIX = ".safetensors"

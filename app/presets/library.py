@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psygnal import Signal
 
 from app.presets.folders import user_folder
-from engine.preset import SHIPPED, PresetError, PresetInfo, described_parameters, preset_files, read_info
+from engine.preset import (
+    SHIPPED,
+    PresetError,
+    PresetInfo,
+    described_parameters,
+    preset_digest,
+    preset_files,
+    read_info,
+)
+from training.heard_file import Heard, read_heard
 
 
 @dataclass(frozen=True)
 class PresetEntry:
-    """A preset that can be chosen, known by its metadata alone."""
+    """A preset that can be chosen, known by its metadata alone, and `heard`: how true it sounds, if that is known."""
 
     name: str
     path: Path
     info: PresetInfo
     parameters: int
     size_bytes: int = 0
+    heard: Heard | None = None
 
     @property
     def own(self) -> bool:
@@ -81,15 +91,19 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     By default those of the shipped and of the user's folder; of two of one name, the one of the first folder.
     """
     entries: dict[str, PresetEntry] = {}
-    problems = []
-    for folder in folders or (SHIPPED, user_folder()):
+    folders = folders or (SHIPPED, user_folder())
+    tables = [read_heard(folder) for folder in folders]
+    heard = {digest: found for known, _ in tables for digest, found in known.items()}
+    problems = [problem for _, found in tables for problem in found]
+    for folder in folders:
         for path in preset_files(folder):
             try:
                 if path.stem in entries:
                     problems.append(f"{path}: there is a preset of this name already; rename the file to use it")
                     continue
                 state = path.stat()
-                entries[path.stem] = _read_entry(path, state.st_mtime_ns, state.st_size)
+                entry = _read_entry(path, state.st_mtime_ns, state.st_size)
+                entries[path.stem] = replace(entry, heard=heard.get(preset_digest(path))) if heard else entry
             except PresetError as error:
                 problems.append(str(error))
             except OSError as error:  # taken away meanwhile

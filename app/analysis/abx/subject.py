@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from app.analysis.abx.record import HeardPluck
 from app.analysis.abx.sound import Candidate
-from app.presets.digest import preset_digest
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
+from engine.preset import preset_digest
 
 
 @dataclass(frozen=True)

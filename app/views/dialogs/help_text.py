@@ -39,8 +39,8 @@ TOUR = (
     ),
     (
         "Choose and judge",
-        "Ctrl+P browses the presets, and a preset file dropped on the window becomes one of yours. Ctrl+T is a blind "
-        "test: can you tell model and truth apart?",
+        "Ctrl+P browses the presets, the truest first, and a preset file dropped on the window becomes one of yours. "
+        "Ctrl+T is a blind test: can you tell model and truth apart?",
     ),
     ("Keep it", "Ctrl+E saves WAVs that carry their recipe. Drop one on the window, and the sound is back."),
 )

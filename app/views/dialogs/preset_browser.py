@@ -10,6 +10,7 @@ Enter, Escape     close
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from html import escape
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent
@@ -29,6 +30,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presets.filter import PresetFilter
+from app.presets.heard_words import heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
 from app.views.controls.parts import combo_box, tool_button
@@ -36,7 +38,7 @@ from app.views.dialogs.preset_card import preset_card
 
 _KEYS = Qt.Key
 _MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
-_STAR, _TITLE, _MODEL, _RATE, _ERROR = range(5)
+_STAR, _TITLE, _RATE, _ERROR, _HEARD = range(5)
 _HINT = "Type to search   ·   ↑ ↓ load   ·   Space plucks   ·   Ctrl+D favourite   ·   Enter closes"
 
 
@@ -69,6 +71,13 @@ class PresetBrowser(QFrame):
         for box in (self._strings, self._models, self._rates):
             box.setToolTip(f"Show only presets of this {box.accessibleName().lower()}")
             box.currentIndexChanged.connect(self._tell_filter)
+        self._order = combo_box(
+            "Order", [("Truest first", "truest"), ("By name", "name"), ("Smallest error", "error")]
+        )
+        self._order.setToolTip(
+            "In which order: how true presets sound, by name or by error; favourites come before all"
+        )
+        self._order.currentIndexChanged.connect(self._tell_filter)
         self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
         self._starred.setCheckable(True)
         self._starred.toggled.connect(self._tell_filter)
@@ -89,7 +98,7 @@ class PresetBrowser(QFrame):
         made = QTreeWidget()
         made.setAccessibleName("Presets")
         made.setToolTip("Arrows load, Space plucks, Enter closes")
-        made.setHeaderLabels(["", "Preset", "Model", "Rate", "Error"])
+        made.setHeaderLabels(["", "Preset", "Rate", "Error", "Heard"])
         made.setRootIsDecorated(False)
         made.setUniformRowHeights(True)
         made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # presets of one string differ at the end
@@ -99,7 +108,7 @@ class PresetBrowser(QFrame):
         header.setStretchLastSection(False)
         header.setSectionsClickable(False)
         header.setMinimumSectionSize(26)
-        for column in (_STAR, _MODEL, _RATE, _ERROR):
+        for column in (_STAR, _RATE, _ERROR, _HEARD):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(_TITLE, QHeaderView.ResizeMode.Stretch)
         made.currentItemChanged.connect(self._row_changed)
@@ -116,7 +125,7 @@ class PresetBrowser(QFrame):
         folder.clicked.connect(self.folder_asked)
         head = QHBoxLayout()
         head.addWidget(self.search, 1)
-        for widget in (self._strings, self._models, self._rates, self._starred, close):
+        for widget in (self._strings, self._models, self._rates, self._order, self._starred, close):
             head.addWidget(widget)
         card = QScrollArea(widgetResizable=True)
         card.setObjectName("card")
@@ -138,8 +147,8 @@ class PresetBrowser(QFrame):
         grid.addWidget(card, 1, 1)
         grid.addLayout(foot, 2, 0, 1, 2)
         grid.addWidget(hint, 3, 0, 1, 2)
-        grid.setColumnStretch(0, 4)
-        grid.setColumnStretch(1, 3)
+        grid.setColumnStretch(0, 7)
+        grid.setColumnStretch(1, 4)
         grid.setRowStretch(1, 1)
 
     # What is shown
@@ -167,9 +176,11 @@ class PresetBrowser(QFrame):
             for entry in entries:
                 info = entry.info
                 star = "★" if entry.name in favourites else "☆"
-                row = [star, entry.title, model_word(info.model), rate_word(info.rate_hz), error_word(info)]
-                item = QTreeWidgetItem(row)
-                item.setToolTip(_TITLE, f"{entry.title}\n{string_word(info.tension_modulated)}\n{entry.path.name}")
+                heard = heard_word(entry.heard)
+                item = QTreeWidgetItem([star, entry.title, rate_word(info.rate_hz), error_word(info), heard])
+                kind = f"{model_word(info.model)}, {string_word(info.tension_modulated)}"
+                item.setToolTip(_TITLE, _tip(entry.title, kind, entry.path.name))
+                item.setToolTip(_HEARD, _tip(heard_sentence(entry.heard, entry.name)))
                 item.setToolTip(_STAR, "Favourite (Ctrl+D)")
                 for column in (_RATE, _ERROR):
                     item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -226,6 +237,7 @@ class PresetBrowser(QFrame):
                 self._models.currentData(),
                 self._rates.currentData(),
                 self._starred.isChecked(),
+                self._order.currentData(),
             )
         )
 
@@ -309,6 +321,11 @@ class PresetBrowser(QFrame):
             top = 52
             width, height = min(1240, parent.width() - 28), min(560, parent.height() - top - 140)
             self.setGeometry(14, top, width, max(300, height))
+
+
+def _tip(*lines: str) -> str:
+    """Of plain text: what a file says is never taken for markup."""
+    return f"<p>{'<br>'.join(map(escape, lines))}</p>"
 
 
 def _empty(any_listed: bool) -> str:

@@ -6,6 +6,7 @@ from html import escape
 
 from PySide6.QtWidgets import QApplication
 
+from app.presets.heard_words import heard_sentence
 from app.presets.library import PresetEntry
 from app.presets.words import (
     error_word,
@@ -68,6 +69,7 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
     if info.rel_mae is not None:
         test = "" if info.test_rel_mae is None else f", on the test set {100 * info.test_rel_mae:.2g} %"
         facts.append(("Error", f"{100 * info.rel_mae:.2g} % of the motion in validation{test}"))
+    facts.append(("Heard", heard_sentence(entry.heard, entry.name)))
     if info.training_seconds is not None:
         facts.append(("Trained in", time_word(info.training_seconds)))
     if _can_be_remade(entry.name):

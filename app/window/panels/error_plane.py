@@ -6,7 +6,6 @@ from pathlib import Path
 
 from app.analysis.error_plane import ErrorPlane, PlanePicture
 from app.analysis.job import Job
-from app.presets.digest import preset_digest
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
@@ -14,7 +13,7 @@ from app.views.plots.error_plane_view import ErrorPlaneView
 from app.window.panels._background import Background
 from app.window.panels.base import Moment, Panel
 from engine.pluck import Pluck
-from engine.preset import load_preset
+from engine.preset import load_preset, preset_digest
 
 MM = 1000.0
 SETTLED_S = 0.3  # a width that is still being turned is not computed

@@ -12,11 +12,13 @@ from typing import Any
 import pytest
 import torch
 
+from app.presets.heard_words import heard_word
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.preset import load_preset, save_preset
+from engine.preset import load_preset, preset_digest, save_preset
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.heard_file import read_heard
 
 DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, tension_modulated=False, steps=600, count=20)
 HORIZON = 500  # frames
@@ -200,3 +202,45 @@ def test_a_data_set_that_is_not_the_models_is_told(
     path = folder / "other.safetensors"
     save_preset(path, replace(loaded.info, training=training), loaded.model)
     assert message in run("evaluate", path).failure
+
+
+def test_what_is_heard_is_printed_and_kept_where_it_is_asked(run, preset: Path) -> None:
+    told = run("evaluate", preset, "--heard")
+    assert told.status == 0
+    assert "tiny" in told.out
+    assert "spectra dB" in told.out
+    assert read_heard(preset.parent) == ({}, [])
+    (facts,) = json.loads(run("evaluate", preset, "--heard", "--write", "--json").out)
+    known, _ = read_heard(preset.parent)
+    kept = known[preset_digest(preset)]
+    assert facts["heard"] == heard_word(kept)
+    assert facts["distance_db"] == pytest.approx(kept.distance_db, abs=1e-3)
+    assert kept.level_db == pytest.approx(-1.0, abs=0.3)  # its own decay is a tenth faster than 2.9 dB a second
+
+
+def test_all_presets_are_listened_to_and_a_broken_one_is_told(
+    run, preset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (preset.parent / "broken.safetensors").write_bytes(b"not a preset")
+    monkeypatch.setattr("engine.preset.SHIPPED", preset.parent)
+    told = run("evaluate", "--heard", "--all", "--write", "--json")
+    assert told.status == 0
+    assert [facts["name"] for facts in json.loads(told.out)] == ["tiny"]
+    assert "broken.safetensors: not a whole safetensors file" in told.err
+    assert set(read_heard(preset.parent)[0]) == {preset_digest(preset)}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "PRESET"),
+        (["--heard"], "give a preset, or --all"),
+        (["tiny", "--heard", "--all"], "give a preset, or --all"),
+        (["tiny", "--all"], "--all: does not go without --heard"),
+        (["tiny", "--write"], "--write: does not go without --heard"),
+        (["tiny", "--heard", "--partials"], "--partials: does not go with --heard"),
+        (["tiny", "--heard", "--past", "1"], "--past: does not go with --heard"),
+    ],
+)
+def test_bad_usage_of_heard(run, words: list[str], message: str) -> None:
+    assert message in run("evaluate", *words).usage

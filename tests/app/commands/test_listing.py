@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from engine.preset import preset_digest
+from training.heard_file import NAME, Heard, add_heard
+
 
 @pytest.fixture
 def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -30,6 +33,7 @@ def test_presets_lists_every_field(run, installed: Path) -> None:
         "parameters": 7053,
         "rel_mse": 0.5,
         "rel_mae": 0.25,
+        "heard": "not measured",
         "file": str(installed / "good.safetensors"),
     }
 
@@ -68,3 +72,21 @@ def test_presets_of_the_users_own_folder_are_listed_and_found(
         "mine": str(own / "mine.safetensors"),
     }
     assert run("compare", "mine", "--position", 0.5, "--amplitude-mm", 2, "--seconds", 0.01).status == 0
+
+
+def test_what_was_heard_is_listed_and_a_hostile_table_hides_nothing(run, installed: Path) -> None:
+    good = installed / "good.safetensors"
+    add_heard(installed, [Heard("good", preset_digest(good), 4.0, 9.0, 5.2, 3.0, 13.0)])
+    (preset,) = json.loads(run("presets", "--json").out)
+    assert preset["heard"] == "pitch +13 cents …"
+    with (installed / NAME).open("a") as table:
+        table.write("<script>,1e999,nan\n")
+    told = run("presets", "--json")
+    (again,) = json.loads(told.out)
+    assert (told.status, again) == (0, preset)
+    assert f"{NAME}: line 3: holds 3 values" in told.err
+    (installed / NAME).write_bytes(b"\xff" * 100)
+    told = run("presets", "--json")
+    (unknown,) = json.loads(told.out)
+    assert (told.status, unknown["heard"]) == (0, "not measured")
+    assert "not a text file" in told.err

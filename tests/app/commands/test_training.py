@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 import torch
 
-from engine.preset import load_preset
+from app.presets.heard_words import heard_word
+from engine.preset import load_preset, preset_digest
 from training.fitting.checkpoint import Checkpoint
+from training.heard_file import read_heard
 
 CONFIGURATION = """
 title = "Tiny"
@@ -70,6 +72,9 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
     assert lines[0] == str(path)
     assert f"rel. MSE {info.rel_mse:.4g}, rel. MAE {info.rel_mae:.4g}" in lines[1]
     assert f"rel. MSE {info.test_rel_mse:.4g}, rel. MAE {info.test_rel_mae:.4g}" in lines[2]
+    heard, problems = read_heard(place.folder)
+    assert problems == []
+    assert lines[4] == f"heard       {heard_word(heard[preset_digest(path)])}"
     assert info.trained_range.position == (0.3, 0.7)
     assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
 

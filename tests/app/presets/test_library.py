@@ -17,7 +17,8 @@ from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, list_presets
 from app.window.dropped_files import receive
 from engine.pluck import Pluck
-from engine.preset import load_preset
+from engine.preset import load_preset, preset_digest
+from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
 
 @pytest.fixture
@@ -183,3 +184,50 @@ def test_the_filter_finds_words_in_any_order_and_every_field(preset_folder: Path
         (PresetFilter(favourites_only=True), [high]),
     ):
         assert search.applied(both, {"high"}) == found, search
+
+
+def heard(path: Path, distance_db: float) -> Heard:
+    return Heard(path.stem, preset_digest(path), 4.0, distance_db, 0.0, 0.0)
+
+
+def test_what_was_heard_comes_with_the_preset_and_goes_with_its_change(
+    library: Library, preset_folder: Path, small_preset: Path
+) -> None:
+    first = preset_folder / "first.safetensors"
+    seen: list[None] = []
+    library.changed.connect(lambda: seen.append(None))
+    assert library.entries[0].heard is None
+    add_heard(preset_folder, [heard(first, 0.5)])
+    assert library.refresh() == []
+    assert len(seen) == 1
+    assert [entry.heard.distance_db for entry in library.entries if entry.heard] == [0.5, 0.5]  # of one content
+    other_preset(small_preset, first)
+    library.refresh()
+    assert [entry.heard is None for entry in library.entries] == [True, False]
+
+
+def test_a_hostile_table_is_told_and_every_preset_listed(library: Library, preset_folder: Path) -> None:
+    for content in (b"\x00" * 5000, b"<b>x</b>\n" * 200_000, ",".join(COLUMNS).encode() + b"\n<b>" * 1000):
+        (preset_folder / NAME).write_bytes(content)
+        entries, problems = list_presets()
+        assert [entry.name for entry in entries] == ["first", "second"]
+        assert 1 <= len(problems) <= 4
+
+
+def test_the_truest_come_first_and_what_was_not_measured_last(
+    library: Library, preset_folder: Path, small_preset: Path
+) -> None:
+    for name, word in (("third", b"Another string"), ("fourth", b"Fourth  string")):
+        path = preset_folder / f"{name}.safetensors"
+        path.write_bytes(small_preset.read_bytes().replace(b"A small string", word[:14].ljust(14)))
+        add_heard(preset_folder, [heard(path, {"third": 3.0, "fourth": 0.1}[name])])
+    library.refresh()
+
+    def order(wanted: PresetFilter, favourites: tuple[str, ...] = ()) -> list[str]:
+        return [entry.name for entry in wanted.applied(library.entries, favourites)]
+
+    assert order(PresetFilter()) == ["fourth", "third", "first", "second"]
+    assert order(PresetFilter(), ("second", "third")) == ["third", "second", "fourth", "first"]
+    assert order(PresetFilter(order="name")) == ["first", "fourth", "second", "third"]
+    assert order(PresetFilter(order="error")) == ["first", "fourth", "second", "third"]
+    assert order(PresetFilter("not measured")) == ["first", "second"]

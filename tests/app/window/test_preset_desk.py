@@ -16,7 +16,8 @@ from app.views.dialogs.preset_browser import PresetBrowser
 from app.window.controller import Controller
 from app.window.settings import FIRST_FAVOURITES, load_settings
 from engine.pluck import Pluck
-from engine.preset import load_preset, preset_files
+from engine.preset import load_preset, preset_digest, preset_files
+from training.heard_file import Heard, add_heard
 
 KEY = Qt.Key
 CONTROL = Qt.KeyboardModifier.ControlModifier
@@ -271,3 +272,31 @@ def test_dropped_files_are_taken_in(
     drop(controller, tmp_path / "foreign.txt")
     assert "neither a preset" in controller.window.notices.text
     assert controller.session.choices == choices
+
+
+def test_browser_and_card_say_how_true_a_preset_sounds(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser, preset_folder: Path, small_preset: Path
+) -> None:
+    second = preset_folder / "second.safetensors"
+    second.write_bytes(small_preset.read_bytes().replace(b"A small string", b"<i>sma</i> str"))
+    digest = preset_digest(second)
+    add_heard(preset_folder, [Heard("<b>bold</b>", digest, 4.0, 7.4, 5.2, 3.0, 13.0)])
+    browser.dismiss()
+    controller.presets.toggle()
+    assert listed(browser) == ["second", "first"]  # what was not measured is last
+    heard = [browser.list.topLevelItem(row).text(4) for row in range(2)]
+    assert heard == ["pitch +13 cents …", "not measured"]
+    assert browser.list.topLevelItem(0).toolTip(1).startswith("<p>&lt;i&gt;sma&lt;/i&gt; str")
+    assert "evaluate first --heard --write" in browser._card.text()
+    controller.session.update(preset="second")
+    card = browser._card.text()
+    assert "past training: pitch +13 cents; grows, +5 dB; spectra 7.4 dB apart over 4 s" in card
+    assert "<b>bold</b>" not in card
+    browser._order.setCurrentIndex(browser._order.findData("name"))
+    assert listed(browser) == ["first", "second"]
+    browser.clear_filter()  # the order is no filter
+    assert listed(browser) == ["first", "second"]
+    qtbot.keyClicks(browser.search, "grows")
+    assert listed(browser) == []
+    browser.search.setText("13 cents")
+    assert listed(browser) == ["second"]

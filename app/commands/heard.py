@@ -1,0 +1,79 @@
+"""evaluate --heard: how true presets sound, by name, and the table that the browser reads it from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.commands.console import print_json, print_table, progress, say
+
+if TYPE_CHECKING:
+    from training.heard_file import Heard
+
+COLUMNS = ("preset", "heard", "spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s")
+
+
+def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
+    """Listens to presets and prints what is heard, the truest first; a broken one is told and hides no other.
+
+    Args:
+        write: keep it in the table beside each preset.
+    """
+    from app.presets.heard_words import heard_word
+    from engine.preset import PresetError
+    from engine.schema import write as plain
+
+    found = []
+    files = list(files)
+    with progress("listen") as report:
+        for number, path in enumerate(files):
+            try:
+                found.append(
+                    measure(path, write, lambda share, number=number: report((number + share) / len(files)))  # type: ignore[misc]
+                )
+            except (PresetError, ValueError) as error:
+                say(str(error))
+    found.sort(key=lambda heard: heard.distance_db)
+    if json:
+        print_json([{**plain(heard), "heard": heard_word(heard)} for heard in found])
+        return
+    print_table(
+        COLUMNS,
+        [
+            [
+                heard.name,
+                heard_word(heard),
+                *(None if v is None else round(v, 2) + 0.0 for v in _figures(heard)),
+            ]
+            for heard in found
+        ],
+    )
+
+
+def measure(path: Path, write: bool, report: Callable[[float], None] = lambda share: None) -> Heard:
+    """What is heard of a preset; into the table of its folder, where `write` says so.
+
+    Raises:
+        PresetError, ValueError: it cannot be used, or not be let go from rest.
+        OSError: the table cannot be written.
+    """
+    from engine.preset import load_preset
+    from training.heard import listen_to
+    from training.heard_file import add_heard
+
+    heard = listen_to(load_preset(path), report)
+    if write:
+        add_heard(path.parent, [heard])
+    return heard
+
+
+def _figures(heard: Heard) -> tuple[float | None, ...]:
+    return (
+        heard.distance_db,
+        heard.level_db,
+        heard.rise_db,
+        heard.pitch_cents,
+        heard.split_cents,
+        heard.runs_away_s,
+    )

@@ -1,0 +1,55 @@
+"""How true a preset sounds, in a musician's words.
+
+What is named can be heard: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the next
+(Moore, "An Introduction to the Psychology of Hearing"). Levels have 2 dB: seconds of decay lie between the two.
+"""
+
+from __future__ import annotations
+
+import math
+
+from training.heard_file import Heard
+
+NOTICED_CENTS = 3.0
+NOTICED_CHANGE_DB = 2.0
+NOTICED_DISTANCE_DB = 1.0
+UNMEASURED = "not measured"
+
+
+def heard_word(heard: Heard | None) -> str:
+    """For a list: "true", the worst that is wrong, or how far it is off."""
+    if heard is None:
+        return UNMEASURED
+    if found := faults(heard):
+        return found[0] if len(found) == 1 else f"{found[0]} …"
+    return "true" if heard.distance_db < NOTICED_DISTANCE_DB else f"{heard.distance_db:.1f} dB off"
+
+
+def heard_sentence(heard: Heard | None, name: str) -> str:
+    """For a card: all that a listener finds, and how far model and truth are apart."""
+    if heard is None:
+        return f"{UNMEASURED}; to measure it: learned-strings evaluate {name} --heard --write"
+    apart = f"spectra {heard.distance_db:.2g} dB apart over {heard.seconds:.2g} s"
+    if found := faults(heard):
+        return f"past training: {'; '.join(found)}; {apart}"
+    return f"{'true' if heard.distance_db < NOTICED_DISTANCE_DB else 'not quite true'}: {apart}"
+
+
+def faults(heard: Heard) -> list[str]:
+    """What would mislead a musician, by name: first what exceeds its threshold most."""
+    found = []
+    if heard.runs_away_s is not None:
+        found.append((math.inf, f"runs away after {heard.runs_away_s:.1f} s"))
+    if abs(heard.level_db) >= NOTICED_CHANGE_DB:
+        louder = "grows" if heard.rise_db >= NOTICED_CHANGE_DB else "fades too slowly"
+        what = louder if heard.level_db > 0 else "dies early"
+        found.append((abs(heard.level_db) / NOTICED_CHANGE_DB, f"{what}, {_signed(heard.level_db)} dB"))
+    if heard.split_cents is not None:
+        found.append((heard.split_cents / NOTICED_CENTS, f"two pitches, {heard.split_cents:.0f} cents apart"))
+    if heard.pitch_cents is not None and abs(heard.pitch_cents) >= NOTICED_CENTS:
+        found.append((abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {_signed(heard.pitch_cents)} cents"))
+    return [text for _, text in sorted(found, key=lambda fault: -fault[0])]
+
+
+def _signed(value: float) -> str:
+    return f"{'+' if value > 0 else '−'}{abs(value):.0f}"

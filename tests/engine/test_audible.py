@@ -1,0 +1,110 @@
+"""What an ear finds, on sounds that are known: sums of decaying partials, changed in one way at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.audible import FLOOR_DB, audible_errors
+
+RATE_HZ = 24_000
+PARTIALS_HZ = tuple(247.0 * n for n in range(1, 9))
+SECONDS = 4.0
+TIME_S = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+
+Sound = NDArray[np.float64]
+
+
+def string(cents: float = 0.0, decay_db_s: float = 6.0) -> Sound:
+    """Partials of 6 dB an octave that decay alike."""
+    ratio = 2 ** (cents / 1200)
+    partials = (np.cos(2 * np.pi * hz * ratio * TIME_S + n) / (n + 1) for n, hz in enumerate(PARTIALS_HZ))
+    return 0.1 * sum(partials, np.zeros_like(TIME_S)) * 10 ** (-decay_db_s / 20 * TIME_S)
+
+
+def drifting(change_db: float) -> Sound:
+    """A gain that changes between 1 and 2.5 s."""
+    return 10 ** (change_db / 20 * np.interp(TIME_S, (1, 2.5), (0, 1)))
+
+
+def errors(model: Sound, truth: Sound | None = None):
+    return audible_errors(model, string() if truth is None else truth, RATE_HZ, PARTIALS_HZ, 0.25)
+
+
+def test_the_truth_itself_has_no_errors_whatever_its_phase() -> None:
+    same = errors(string())
+    assert (same.distance_db, same.level_db, same.rise_db, same.split_cents) == (0, 0, 0, None)
+    assert same.pitch_cents == 0
+    turned = errors(-string())
+    assert turned.distance_db == pytest.approx(0, abs=1e-9)
+    assert turned.pitch_cents == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("cents", (-40.0, -13.0, 3.0, 13.0))
+def test_a_detuned_string_is_told_in_cents_and_only_so(cents: float) -> None:
+    found = errors(string(cents))
+    assert found.pitch_cents == pytest.approx(cents, abs=0.1)
+    assert found.split_cents is None
+    assert abs(found.level_db) < 0.05
+    assert found.rise_db == 0
+    assert found.distance_db > 1
+
+
+@pytest.mark.parametrize("change_db", (-8.0, -2.0, 5.0))
+def test_a_level_that_changes_is_told_against_the_truths(change_db: float) -> None:
+    found = errors(drifting(change_db) * string())
+    assert found.level_db == pytest.approx(change_db, abs=0.01)
+    assert found.pitch_cents == pytest.approx(0, abs=0.05)
+    assert found.rise_db == 0  # the string's own decay is faster
+    assert 0.4 < found.distance_db / abs(change_db) < 0.6
+
+
+def test_a_model_that_is_louder_throughout_does_not_grow() -> None:
+    assert errors(2 * string()).level_db == pytest.approx(0, abs=1e-9)
+
+
+def test_a_model_whose_own_level_rises_is_told_by_how_much() -> None:
+    assert errors(drifting(5) * string(decay_db_s=0)).rise_db == pytest.approx(5, abs=0.01)
+    assert errors(drifting(5) * string()).rise_db == 0
+
+
+@pytest.mark.parametrize("cents", (6.0, 22.0, 40.0))
+def test_two_pitches_where_the_truth_has_one_are_told_with_their_distance(cents: float) -> None:
+    found = errors(string() + 0.5 * string(cents))
+    assert found.split_cents == pytest.approx(cents, abs=0.5)
+    assert found.pitch_cents == pytest.approx(0, abs=0.5)
+    assert errors(string() + 0.05 * string(cents)).split_cents is None  # 26 dB below: its level swings by 0.9 dB
+    both = string() + 0.5 * string(cents)
+    assert errors(both, both).split_cents is None
+
+
+def test_what_is_not_heard_does_not_count() -> None:
+    """A string that rests beside its place, and what lies far below the loudest."""
+    found = errors(string() + 0.05)
+    assert found.level_db == pytest.approx(0, abs=0.01)
+    assert found.distance_db < 0.01
+    hiss = 1e-6 * np.random.default_rng(0).standard_normal(len(TIME_S))
+    assert errors(string() + hiss).distance_db < 0.01
+
+
+def test_a_model_that_falls_silent_and_a_silent_truth_are_finite() -> None:
+    silent = np.zeros_like(TIME_S)
+    stopped = np.where(TIME_S < 1, string(), 0)
+    found = errors(stopped)
+    assert found.level_db == -FLOOR_DB
+    assert errors(silent).pitch_cents is None
+    assert errors(silent, silent).distance_db == 0
+    assert np.isfinite(errors(string(), silent).distance_db)
+
+
+def test_a_string_whose_partials_cannot_be_made_has_no_pitch() -> None:
+    found = audible_errors(string(), string(), RATE_HZ, [hz for hz in PARTIALS_HZ if hz > RATE_HZ], 0.25)
+    assert (found.pitch_cents, found.split_cents) == (None, None)
+
+
+def test_sounds_of_two_lengths_and_too_short_ones_are_refused() -> None:
+    with pytest.raises(ValueError, match="differ in shape"):
+        errors(string()[:-1])
+    with pytest.raises(ValueError, match="less than a frame"):
+        audible_errors(string()[:100], string()[:100], RATE_HZ, PARTIALS_HZ, 0.25)

@@ -1,0 +1,206 @@
+"""Listening to a preset, and the table beside presets that keeps what was heard: also a table from strangers."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.preset import Preset, load_preset, preset_digest
+from engine.sources import Runaway
+from training.heard import AMPLITUDES_MM, listen_to, standard_plucks
+from training.heard_file import COLUMNS, LARGEST_BYTES, METHOD, MOST_TOLD, NAME, Heard, add_heard, read_heard
+
+GOOD = Heard("good", "a" * 64, 4.0, 0.25, -0.5, 0.0, 13.0, 22.0, 3.2)
+HEAD = ",".join(COLUMNS)
+
+
+def line(**changes: object) -> str:
+    values = {name: getattr(GOOD, name) for name in COLUMNS} | changes
+    return ",".join("" if v is None else str(v) for v in values.values())
+
+
+def table(folder: Path, *lines: str) -> Path:
+    (folder / NAME).write_text("\n".join([HEAD, *lines, ""]), encoding="utf-8")
+    return folder
+
+
+def test_a_model_that_is_nearly_the_string_is_heard_so(small_preset: Path) -> None:
+    """Its multiplier is untrained: the fundamental is right, the glide of a hard pluck is not."""
+    shares: list[float] = []
+    heard = listen_to(load_preset(small_preset), shares.append)
+    assert (heard.name, heard.sha256) == ("small", preset_digest(small_preset))
+    assert heard.seconds == pytest.approx(4.0)
+    assert heard.runs_away_s is None
+    assert heard.pitch_cents == pytest.approx(0, abs=1)
+    assert heard.distance_db > 0
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+    assert listen_to(load_preset(small_preset)) == heard
+
+
+def _detuned(preset: Preset, cents: float) -> Preset:
+    """All of its frequencies are higher."""
+    with torch.no_grad():
+        preset.model.theta_log.add_(cents / 1200 * float(torch.log(torch.tensor(2.0))))
+    return preset
+
+
+def test_a_detuned_model_is_heard_detuned(small_preset: Path) -> None:
+    right = listen_to(load_preset(small_preset))
+    heard = listen_to(_detuned(load_preset(small_preset), 13.0))
+    assert heard.pitch_cents is not None
+    assert right.pitch_cents is not None
+    assert heard.pitch_cents - right.pitch_cents == pytest.approx(13, abs=0.2)
+    assert heard.distance_db > right.distance_db
+
+
+def test_a_model_that_runs_away_is_heard_with_its_earliest_time(
+    small_preset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import training.heard as module
+
+    render, calls = module.render_voice, []
+
+    def away(program, source, *rest, **options):  # type: ignore[no-untyped-def]
+        if source is not None:
+            calls.append(None)
+            if len(calls) > 1:
+                raise Runaway(4.0 - len(calls))
+        return render(program, source, *rest, **options)
+
+    monkeypatch.setattr(module, "render_voice", away)
+    heard = listen_to(load_preset(small_preset))
+    assert heard.runs_away_s == 1.0
+    assert heard.distance_db > 2 / 3 * 60
+
+
+def test_plucks_stay_within_what_was_trained(small_preset: Path) -> None:
+    info = load_preset(small_preset).info
+    assert [pluck.amplitude_mm for pluck in standard_plucks(info)] == list(AMPLITUDES_MM)
+    narrow = replace(info, trained_range=replace(info.trained_range, peak_m=(2e-3, 5e-3)))
+    assert [pluck.amplitude_mm for pluck in standard_plucks(narrow)] == [2.0, 4.0, 5.0]
+    tense = replace(info, trained_range=replace(info.trained_range, tension_rise=0.001))
+    softened = [pluck.amplitude_mm for pluck in standard_plucks(tense)]
+    assert softened[0] <= softened[1] == pytest.approx(softened[2])
+    absurd = replace(info, trained_range=replace(info.trained_range, peak_m=(1e3, 1e6)))
+    assert standard_plucks(absurd)[0].amplitude_mm == 20.0
+
+
+def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path: Path) -> None:
+    assert read_heard(tmp_path) == ({}, [])
+    other = Heard("other", "b" * 64, 4.0, 1.0, 0.0, 0.0)
+    add_heard(tmp_path, [GOOD])
+    add_heard(tmp_path, [other])
+    assert read_heard(tmp_path) == ({GOOD.sha256: GOOD, other.sha256: other}, [])
+    anew = replace(GOOD, sha256="c" * 64)
+    add_heard(tmp_path, [anew])
+    assert read_heard(tmp_path) == ({anew.sha256: anew, other.sha256: other}, [])
+    text = (tmp_path / NAME).read_text()
+    assert [row.split(",")[0] for row in text.splitlines()] == ["name", "good", "other"]
+    assert "-0.0" not in line_of(tmp_path, replace(GOOD, level_db=-0.0001))
+
+
+def line_of(folder: Path, heard: Heard) -> str:
+    add_heard(folder, [heard])
+    return (folder / NAME).read_text()
+
+
+@pytest.mark.parametrize(
+    ("bad", "told"),
+    [
+        (line(distance_db="nan"), "finite"),
+        (line(distance_db="1e999"), "finite"),
+        (line(distance_db="1e300"), "distance_db must lie in"),
+        (line(distance_db="-1"), "distance_db must lie in"),
+        (line(distance_db=""), "'distance_db' is missing"),
+        (line(pitch_cents="<b>sharp</b>"), "is not a number"),
+        (line(split_cents="-3"), "split_cents must lie in"),
+        (line(method="1.5"), "is not a number"),
+        (line(method="9" * 5000), "is not a number"),
+        (line(sha256="../../etc/passwd"), "64 hexadecimal digits"),
+        (line(name="x" * 5000), "name must be"),
+        (line(name="a\x1b[31m"), "name must be"),
+        (line(name=""), "name must be"),
+        ("a,b", "holds 2 values"),
+        ("x" * 200_000, "field larger"),
+        ("", "holds 0 values"),
+        ("\0" * 10, "values"),
+        ('"' + line(), "values"),
+    ],
+)
+def test_a_bad_line_is_told_and_hides_no_other(tmp_path: Path, bad: str, told: str) -> None:
+    known, (problem,) = read_heard(table(tmp_path, bad, line()))
+    assert known == {GOOD.sha256: GOOD}
+    assert problem.startswith(f"{tmp_path / NAME}: line 2")
+    assert told in problem
+    assert len(problem) < len(str(tmp_path)) + 300
+
+
+def test_markup_in_a_name_stays_text(tmp_path: Path) -> None:
+    known, problems = read_heard(table(tmp_path, line(name="<img src=x>")))
+    assert problems == []
+    assert known[GOOD.sha256].name == "<img src=x>"
+
+
+def test_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
+    assert read_heard(table(tmp_path, line(method=METHOD + 1))) == ({}, [])
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"", "first line must be"),
+        (b"some text\n", "first line must be"),
+        (b"\xff\xfe\x00", "not a text file"),
+        (HEAD.encode() + b"\n" + b"a,b\n" * 1_000_000, "larger than"),
+        (b" " * (LARGEST_BYTES + 1), "larger than"),
+    ],
+)
+def test_a_file_that_is_no_table_is_told_in_one_line(tmp_path: Path, content: bytes, told: str) -> None:
+    (tmp_path / NAME).write_bytes(content)
+    known, (problem,) = read_heard(tmp_path)
+    assert known == {}
+    assert told in problem
+
+
+def test_many_bad_lines_are_told_in_few(tmp_path: Path) -> None:
+    known, problems = read_heard(table(tmp_path, *["a,b"] * 100_000, line()))
+    assert known == {GOOD.sha256: GOOD}
+    assert len(problems) == MOST_TOLD + 1
+    assert "99997 more lines" in problems[-1]
+
+
+def test_a_folder_in_its_place_and_one_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / NAME).mkdir()
+    assert read_heard(tmp_path) == ({}, [])
+    with pytest.raises(OSError, match=NAME):
+        add_heard(tmp_path, [GOOD])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_a_link_to_nowhere_is_no_table(tmp_path: Path) -> None:
+    (tmp_path / NAME).symlink_to(tmp_path / "gone")
+    assert read_heard(tmp_path) == ({}, [])
+
+
+def test_the_shipped_table_knows_every_shipped_preset() -> None:
+    """After a change of a preset: `learned-strings evaluate NAME --heard --write`."""
+    from engine.preset import SHIPPED, preset_files
+
+    known, problems = read_heard(SHIPPED)
+    assert problems == []
+    assert [path.stem for path in preset_files() if preset_digest(path) not in known] == []
+
+
+def test_a_copy_keeps_what_was_heard_and_a_changed_file_does_not(small_preset: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copy(small_preset, tmp_path / "copy.safetensors"))
+    add_heard(tmp_path, [replace(GOOD, sha256=preset_digest(small_preset))])
+    known, _ = read_heard(tmp_path)
+    assert preset_digest(copy) in known
+    copy.write_bytes(copy.read_bytes().replace(b"A small string", b"Another string"))
+    assert preset_digest(copy) not in known

@@ -1,0 +1,96 @@
+"""Listens to a preset: a few plucks as the app plays them, model beside truth, well past the training."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from engine.audible import FLOOR_DB, AudibleErrors, audible_errors
+from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, Pluck
+from engine.preset import Preset, PresetInfo, preset_digest
+from engine.sine_transform import to_modes
+from engine.sources import ModelSource, Runaway
+from engine.voices import Ear, model_program, render_voice, truth_program
+from training.heard_file import Heard
+
+RATE_HZ = 48_000  # of the device: what is above half the preset's rate is heard of the truth
+AMPLITUDES_MM = (1.5, 4.0, 8.0)  # soft, normal, hard
+LEAST_S, MOST_S = 4.0, 12.0
+UNTIL_DB = 60.0  # or the truth has fallen so far
+GLIDE_S = 0.25  # pitch is listened to from here on, and past the training
+
+
+def standard_plucks(info: PresetInfo) -> list[Pluck]:
+    """The app's own pluck, soft, normal and hard, as far as the preset was trained to be pulled."""
+    return [Pluck(amplitude_mm=_bearable(info, amplitude_mm)) for amplitude_mm in AMPLITUDES_MM]
+
+
+def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: None) -> Heard:
+    """What is heard of a preset.
+
+    Args:
+        report: is told the share that is done, 0 … 1.
+
+    Raises:
+        ValueError: its model cannot be let go from rest.
+        PresetError: its file cannot be read any more.
+    """
+    source, digest = ModelSource(preset), preset_digest(preset.path)
+    info = preset.info
+    ear = Ear((DEFAULT_LISTEN,))
+    programs = model_program(preset.model, info, RATE_HZ), truth_program(info, RATE_HZ)
+    partials_hz = (info.string.undamped_frequencies(info.modes) / (2 * math.pi)).tolist()
+    below_hz = [hz for hz in partials_hz if hz < info.rate_hz / 2]
+    wanted_s = min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
+    plucks = standard_plucks(info)
+    errors: list[AudibleErrors] = []
+    runs_away_s: list[float] = []
+    seconds = 0.0
+    for number, pluck in enumerate(plucks):
+        truth = render_voice(programs[1], None, info, pluck, ear, wanted_s, until_db=UNTIL_DB)[:, 0]
+        seconds = max(seconds, len(truth) / RATE_HZ)
+        try:
+            model = render_voice(
+                programs[0],
+                source,
+                info,
+                pluck,
+                ear,
+                len(truth) / RATE_HZ,
+                lambda share, number=number: report((number + share) / len(plucks)),  # type: ignore[misc]
+            )[:, 0]
+        except Runaway as error:
+            runs_away_s.append(error.time_s)
+        else:
+            after_s = max(GLIDE_S, info.horizon_s)
+            errors.append(audible_errors(model, truth, RATE_HZ, below_hz, after_s))
+    splits = [e.split_cents for e in errors if e.split_cents is not None]
+    return Heard(
+        name=preset.name,
+        sha256=digest,
+        seconds=seconds,
+        distance_db=float(np.mean([*(e.distance_db for e in errors), *(FLOOR_DB for _ in runs_away_s)])),
+        level_db=_median([e.level_db for e in errors]) or 0.0,
+        rise_db=_median([e.rise_db for e in errors]) or 0.0,
+        pitch_cents=_median([e.pitch_cents for e in errors if e.pitch_cents is not None]),
+        split_cents=_median(splits) if 2 * len(splits) > len(errors) else None,
+        runs_away_s=min(runs_away_s, default=None),
+    )
+
+
+def _bearable(info: PresetInfo, amplitude_mm: float) -> float:
+    """An amplitude within the trained range; the tension rises as its square."""
+    low_m, high_m = info.trained_range.peak_m
+    amplitude_mm = max(0.0, min(max(amplitude_mm, 1000 * low_m), 1000 * high_m, LARGEST_AMPLITUDE_MM))
+    if (limit := info.trained_range.tension_rise) is not None:
+        shape = to_modes(Pluck(amplitude_mm=amplitude_mm).displacement(info.grid_points), info.modes)
+        rise = float(info.string.relative_tension_rise(shape))
+        amplitude_mm *= min(1.0, math.sqrt(limit / rise)) if rise > 0 else 1.0
+    return amplitude_mm
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return statistics.median(values) if values else None

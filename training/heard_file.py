@@ -1,0 +1,159 @@
+"""What was heard of presets, in a table beside them: one a line, known by the digest of the preset's file.
+
+So a preset that changes carries no old claim, and a copy keeps its own. The table may come from anywhere: whatever is
+wrong in it is told, and skipped.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from filelock import FileLock
+
+from engine.schema import SchemaError, read
+from engine.whole_file import whole_file
+
+NAME = "heard.csv"
+METHOD = 1  # of the measurement: lines of another one say nothing
+LARGEST_BYTES = 2**20
+MOST_TOLD = 3  # bad lines of a file
+LONGEST_NAME = 200
+
+_BOUNDS = {
+    "seconds": (0.0, 600.0),
+    "distance_db": (0.0, 200.0),
+    "level_db": (-200.0, 200.0),
+    "rise_db": (0.0, 200.0),
+    "pitch_cents": (-12_000.0, 12_000.0),
+    "split_cents": (0.0, 12_000.0),
+    "runs_away_s": (0.0, 600.0),
+}
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A preset's sound against the truth's: medians over the plucks, see `engine.audible.AudibleErrors`.
+
+    Attributes:
+        name: of the preset's file, for people; `sha256` is what counts.
+        seconds: how long it was listened to.
+        distance_db: the mean over the plucks; a pluck that runs away counts with all of the floor.
+        split_cents: None: most plucks have one pitch.
+        runs_away_s: the earliest of all plucks; None: none does.
+
+    Raises:
+        ValueError: a value that no measurement gives.
+    """
+
+    name: str
+    sha256: str
+    seconds: float
+    distance_db: float
+    level_db: float
+    rise_db: float
+    pitch_cents: float | None = None
+    split_cents: float | None = None
+    runs_away_s: float | None = None
+    method: int = METHOD
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[0-9a-f]{64}", self.sha256):
+            raise ValueError("sha256 must be 64 hexadecimal digits")
+        if not self.name or len(self.name) > LONGEST_NAME or not self.name.isprintable():
+            raise ValueError(f"name must be printable, of 1 … {LONGEST_NAME} characters")
+        for field, (low, high) in _BOUNDS.items():
+            value = getattr(self, field)
+            if value is not None and not low <= value <= high:
+                raise ValueError(f"{field} must lie in {low:g} … {high:g}, not {value:g}")
+
+
+COLUMNS = tuple(field.name for field in fields(Heard))
+_HINTS = get_type_hints(Heard)
+
+
+def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
+    """What is known of a folder's presets by their digest, and a line for whatever is wrong. Raises nothing."""
+    path = folder / NAME
+    try:
+        if not path.is_file():
+            return {}, []
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_BYTES + 1)
+        text = raw.decode("utf-8")
+    except OSError as error:
+        return {}, [f"{path}: cannot be read ({error.strerror or error}); presets are listed without it"]
+    except UnicodeDecodeError:
+        return {}, [f"{path}: not a text file; remove it, or measure the presets again"]
+    if len(raw) > LARGEST_BYTES:
+        return {}, [f"{path}: larger than the {LARGEST_BYTES // 2**20} MiB that it may have; remove it"]
+    return _parsed(path, text)
+
+
+def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
+    """Adds to a folder's table, or makes it; a preset's new line replaces the one of its name.
+
+    Locked against other processes; whole or not at all. Lines that cannot be used are left out.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    path = folder / NAME
+    with FileLock(path.with_name(f".{NAME}.lock")):
+        known = {heard.name: heard for heard in read_heard(folder)[0].values()}
+        known |= {heard.name: heard for heard in measured}
+        with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(COLUMNS)
+            writer.writerows(_row(known[name]) for name in sorted(known))
+
+
+def _parsed(path: Path, text: str) -> tuple[dict[str, Heard], list[str]]:
+    found: dict[str, Heard] = {}
+    problems: list[str] = []
+    lines = iter(io.StringIO(text, newline="").readlines())
+    if (head := next(lines, "").strip()) != ",".join(COLUMNS):
+        return {}, [f"{path}: not a table of this program's: its first line must be {','.join(COLUMNS)}"]
+    for number, line in enumerate(lines, 2):
+        try:
+            heard = _line(head.split(","), line, f"{path}: line {number}")
+        except SchemaError as error:
+            problems.append(str(error))
+        else:
+            if heard is not None:
+                found[heard.sha256] = heard
+    if (more := len(problems) - MOST_TOLD) > 0:
+        problems = [*problems[:MOST_TOLD], f"{path}: {more} more lines cannot be used"]
+    return found, problems
+
+
+def _line(columns: list[str], line: str, where: str) -> Heard | None:
+    """None for a measurement by another method."""
+    try:
+        (texts,) = csv.reader([line])
+    except (csv.Error, ValueError) as error:
+        raise SchemaError(f"{where}: not a line of values ({error})") from error
+    if len(texts) != len(columns):
+        raise SchemaError(f"{where}: holds {len(texts)} values for {len(columns)} columns")
+    values: dict[str, Any] = {}
+    for name, text in zip(columns, texts, strict=True):
+        if _HINTS[name] is str:
+            values[name] = text
+        elif text:
+            try:
+                values[name] = int(text) if _HINTS[name] is int else float(text)
+            except ValueError:
+                raise SchemaError(f"{where}, column {name}: {text[:40]!r} is not a number") from None
+    heard = read(Heard, values, where)
+    return heard if heard.method == METHOD else None
+
+
+def _row(heard: Heard) -> list[str]:
+    """A thousandth is far less than can be heard; adding nothing makes -0 a 0."""
+    values = (getattr(heard, name) for name in COLUMNS)
+    return ["" if v is None else str(round(v, 3) + 0.0) if isinstance(v, float) else str(v) for v in values]
