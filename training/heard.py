@@ -11,7 +11,6 @@ import numpy as np
 from engine.audible import FLOOR_DB, AudibleErrors, audible_errors
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, Pluck
 from engine.preset import Preset, PresetInfo, preset_digest
-from engine.sine_transform import to_modes
 from engine.sources import ModelSource, Runaway
 from engine.voices import Ear, model_program, render_voice, truth_program
 from training.heard_file import Heard
@@ -42,7 +41,7 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
     info = preset.info
     ear = Ear((DEFAULT_LISTEN,))
     programs = model_program(preset.model, info, RATE_HZ), truth_program(info, RATE_HZ)
-    partials_hz = (info.string.undamped_frequencies(info.modes) / (2 * math.pi)).tolist()
+    partials_hz = (info.resonator.omega / (2 * math.pi)).tolist()
     below_hz = [hz for hz in partials_hz if hz < info.rate_hz / 2]
     wanted_s = min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
     plucks = standard_plucks(info)
@@ -86,8 +85,8 @@ def _bearable(info: PresetInfo, amplitude_mm: float) -> float:
     low_m, high_m = info.trained_range.peak_m
     amplitude_mm = max(0.0, min(max(amplitude_mm, 1000 * low_m), 1000 * high_m, LARGEST_AMPLITUDE_MM))
     if (limit := info.trained_range.tension_rise) is not None:
-        shape = to_modes(Pluck(amplitude_mm=amplitude_mm).displacement(info.grid_points), info.modes)
-        rise = float(info.string.relative_tension_rise(shape))
+        shape = info.resonator.to_modes(Pluck(amplitude_mm=amplitude_mm).displacement(info.grid_points))
+        rise = float(info.resonator.relative_tension_rise(shape))
         amplitude_mm *= min(1.0, math.sqrt(limit / rise)) if rise > 0 else 1.0
     return amplitude_mm
 
