@@ -20,6 +20,8 @@ PRESET_FIELDS = (
     "parameters",
     "rel_mse",
     "rel_mae",
+    "test_rel_mse",
+    "test_rel_mae",
     "file",
 )
 
@@ -71,6 +73,8 @@ def _facts(path: Path) -> dict[str, Any]:
         described_parameters(path, info),
         info.rel_mse,
         info.rel_mae,
+        info.test_rel_mse,
+        info.test_rel_mae,
         str(path),
     )
     return dict(zip(PRESET_FIELDS, values, strict=True))
