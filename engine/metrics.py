@@ -12,6 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+RESAMPLES = 2000  # of a bootstrap: its standard error is known to 1/√(2 · RESAMPLES), 1.6 %
 NULL_FLOOR_DB = -200.0  # of a null depth: what float64 can tell of two equal signals, and finite for a file
 
 
@@ -101,6 +102,31 @@ class ErrorSums:
         """The population's standard deviation of the trajectories' own errors; infinite where one of them is."""
         spreads = [float(torch.from_numpy(own).std(correction=0)) for own in self.per_trajectory()]
         return RelativeError(*(spread if math.isfinite(spread) else math.inf for spread in spreads))
+
+    def standard_error(self, resamples: int = RESAMPLES) -> RelativeError:
+        """How far `total` would deviate with other trajectories of the same draw: the bootstrap's standard deviation.
+
+        As many trajectories as there are, drawn with replacement, and the ratios of their sums (Efron, Tibshirani, An
+        Introduction to the Bootstrap, 1993, ch. 6). The draws are the same every time. Infinite where a trajectory's
+        error is; zero for a single one, which says nothing of others.
+        """
+        count = self._trajectories.shape[1]
+        if not bool(self._trajectories.isfinite().all()):
+            return RelativeError(math.inf, math.inf)
+        drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=resamples)
+        mse, mae = _ratios(self._trajectories @ torch.from_numpy(drawn).double().T)
+        return RelativeError(float(mse.std(ddof=1)), float(mae.std(ddof=1)))
+
+    def of(self, rows: Sequence[int]) -> RelativeError:
+        """The errors of some trajectories over all frames."""
+        mse, mae = _ratios(self._trajectories[:, list(rows)].sum(1, keepdim=True))
+        return RelativeError(float(mse[0]), float(mae[0]))
+
+    def shares(self) -> NDArray[np.float64]:
+        """What part of all squared error is each trajectory's, (trajectories,); zeros where there is no error."""
+        squared = self._trajectories[0]
+        whole = float(squared.sum())
+        return (squared / whole if whole > 0 else squared).numpy()
 
     def _relative(self, frames: slice) -> tuple[float, float]:
         mse, mae = _ratios(self._frames[:, frames].sum(1, keepdim=True))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -196,6 +196,18 @@ def _in_evaluation(model: StringModel[Any]) -> Iterator[None]:
         model.train(was_training)
 
 
+def held_out(configuration: DatasetConfiguration, scale_m: float, count: int, seed: int) -> Dataset:
+    """`count` fresh trajectories of the same draw, the split "all"; simulated when they are asked for.
+
+    Raises:
+        ValueError: the seed is the data set's own, or there are less than 10.
+    """
+    if seed == configuration.seed:
+        raise ValueError(f"seed {seed} is the data set's own: its plucks were trained on; take another")
+    nothing = torch.empty(0)
+    return Dataset(replace(configuration, count=count, seed=seed), nothing, nothing, scale_m)
+
+
 def _parts(c: DatasetConfiguration, split: str, trajectories: int | None) -> list[slice]:
     """The rows of a split's trajectories, some at a time."""
     rows = split_rows(c.count, split)
@@ -207,7 +219,7 @@ def _parts(c: DatasetConfiguration, split: str, trajectories: int | None) -> lis
 def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple[Tensor, Iterator[Tensor]]:
     """Modal amplitudes in m, float64: of frame 0, and of blocks of the frames after it."""
     c = dataset.configuration
-    if steps <= c.steps and c.stride == 1:
+    if len(dataset.amplitudes) and steps <= c.steps and c.stride == 1:
         stored = dataset.amplitudes[rows, : steps + 1]
         return stored[:, 0].double(), (frames.double() for frames in stored[:, 1:].split(block, dim=1))
     initial = draw_initial(c)[rows]

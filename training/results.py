@@ -36,9 +36,13 @@ class Row:
         string: "linear" or "nonlinear".
         horizon: frames that were trained and measured.
         rel_mse, rel_mae: over the validation set and the horizon, as in the paper's tables.
-        rel_mse_spread, rel_mae_spread: standard deviation over the validation trajectories, as the paper's for DMD.
+        rel_mse_spread, rel_mae_spread: standard deviation of the validation trajectories' own errors, as the paper's
+            for DMD.
         rel_mse_q1 …: of the quarters of the horizon.
         rel_mse_400, rel_mae_400: over the first 400 frames, where the horizon reaches so far.
+        test_…: the same of the test set, which chose neither weights nor recipes.
+        …_se: standard error of a figure by which trajectories are in the split; see `ErrorSums.standard_error`. None
+            in rows of before they were measured; `learned-strings results measure` fills them from a kept preset.
         seconds: of training.
         commit: of the code, "" where it is not known.
         finished: UTC, ISO 8601.
@@ -71,6 +75,16 @@ class Row:
     rel_mae_q2: float | None = None
     rel_mae_q3: float | None = None
     rel_mae_q4: float | None = None
+    rel_mse_se: float | None = None
+    rel_mae_se: float | None = None
+    test_rel_mse_se: float | None = None
+    test_rel_mae_se: float | None = None
+    rel_mse_400_se: float | None = None
+    rel_mae_400_se: float | None = None
+    test_rel_mse_400: float | None = None
+    test_rel_mae_400: float | None = None
+    test_rel_mse_400_se: float | None = None
+    test_rel_mae_400_se: float | None = None
     parameters: int | None = None
     epochs: int | None = None
     best_epoch: int | None = None

@@ -34,7 +34,8 @@ from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit, initialisation_of
-from training.results import QUARTERS, SHORT_HORIZON, Row
+from training.results import QUARTERS, Row
+from training.row_errors import row_errors
 
 LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
 REPEAT_TOLERANCE = 1e-5  # relative; a sum in another order moves a float32 error by less
@@ -170,7 +171,7 @@ def run_row(
             )
         except Diverged as error:
             return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
-        row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, configuration.data.stride))
+        row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, dataset))
         with whole_file(file) as unfinished:
             unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
         return row
@@ -190,15 +191,17 @@ def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
         lock.release()
 
 
-def _figures(trained: TrainedPreset, stride: int) -> dict[str, Any]:
-    """The errors of a run and what it took, as a row names them; `stride` is its data's."""
+def _figures(trained: TrainedPreset, dataset: Dataset) -> dict[str, Any]:
+    """The errors of a run and what it took, as a row names them."""
     info, result, sums = trained.preset.info, trained.result, trained.validation
     spread = sums.spread()
     figures: dict[str, Any] = {
-        "rel_mse": info.rel_mse,
-        "rel_mae": info.rel_mae,
-        "test_rel_mse": info.test_rel_mse,
-        "test_rel_mae": info.test_rel_mae,
+        **row_errors(
+            trained.preset.model,
+            dataset,
+            {"validation": trained.validation, "test": trained.test},
+            info.horizon_steps,
+        ),
         "rel_mse_spread": spread.rel_mse,
         "rel_mae_spread": spread.rel_mae,
         "parameters": trained.preset.parameters,
@@ -206,11 +209,8 @@ def _figures(trained: TrainedPreset, stride: int) -> dict[str, Any]:
         "best_epoch": result.best_epoch,
         "seconds": result.seconds,
     }
-    if info.horizon_steps >= SHORT_HORIZON and stride == 1:
-        short = sums.total(SHORT_HORIZON)
-        figures |= {"rel_mse_400": short.rel_mse, "rel_mae_400": short.rel_mae}
     edges_s = [info.horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
-    for number, window in enumerate(sums.windows(info.rate_hz / stride, edges_s), 1):
+    for number, window in enumerate(sums.windows(info.rate_hz / dataset.configuration.stride, edges_s), 1):
         figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
     return figures
 

@@ -29,6 +29,12 @@ Split = Literal["validation", "test", "both"]
 LARGEST_DATASET_BYTES = 16 * 2**30
 WINDOWS = 4  # of the horizon
 LONGEST_PAST_S = 60.0
+HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
+TOLD = {
+    "se": "standard error, by which trajectories are drawn (bootstrap)",
+    "spread": "spread over the trajectories",
+    "400": "first 400 frames",
+}
 CSV_COLUMNS = ("preset", "split", "start_s", "stop_s", "past_horizon", "mode", "quantity", "value")
 
 
@@ -47,6 +53,11 @@ def evaluate(
     table: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write every figure to a table, one a row.")
     ] = None,
+    fresh: Annotated[
+        int | None,
+        typer.Option("--held-out", min=10, max=10_000, metavar="N", help="Fresh plucks of its draw, not a split."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of --held-out.")] = 1,
     heard: Annotated[
         bool, typer.Option("--heard", help="Instead: what a listener would notice of a few plucks, by name.")
     ] = False,
@@ -74,24 +85,33 @@ def evaluate(
     if 0 < past * info.rate_hz < 1:
         raise typer.BadParameter(f"must hold a sample of {info.rate_hz} Hz, not {past:g} s", param_hint="--past")
     configuration = _data_of(loaded)
-    splits = ("validation", "test") if split == "both" else (split,)
+    splits: tuple[str, ...] = ("validation", "test") if split == "both" else (split,)
+    if fresh is not None:
+        splits, configuration = ("all",), replace(configuration, count=fresh)
     _check_trajectories(trajectories, configuration, splits)
     from app.shared.whole_file import whole_file
+    from training.evaluate import held_out
 
     with nullcontext() if table is None else whole_file(table) as file:
-        data = replace(load_data(configuration, cache), scale_m=info.scale_m)
+        if fresh is None:
+            data = replace(load_data(configuration, cache), scale_m=info.scale_m)
+        else:
+            try:
+                data = held_out(configuration, info.scale_m, fresh, seed)
+            except ValueError as error:
+                raise typer.BadParameter(str(error), param_hint="--seed") from error
         with progress("evaluate") as report:
             shares = _Shares(report, len(splits) * (2 if partials else 1))
             measurement = _Measurement(loaded, data, past, partials, trajectories, shares)
-            measured = {name: measurement.of(name) for name in splits}
+            measured = {HELD_OUT if name == "all" else name: measurement.of(name) for name in splits}
         if file is not None:
             file.write(_csv(loaded.name, measured).encode())
     if json:
-        first = measured[splits[0]]
+        first = next(iter(measured.values()))
         facts = {
             "preset": loaded.name,
             "file": str(loaded.path),
-            "split": split,
+            "split": split if fresh is None else HELD_OUT,
             "rate_hz": info.rate_hz,
             "horizon_s": info.horizon_s,
             "past_s": past,
@@ -142,6 +162,7 @@ class _Measurement:
 
     def of(self, split: str) -> dict[str, Any]:
         """Every figure of a split."""
+        from training.by_rise import errors_by_rise
         from training.evaluate import evaluate_past_horizon
         from training.results import SHORT_HORIZON
 
@@ -159,13 +180,11 @@ class _Measurement:
         )
         self.report.next()
         whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
-        validation = split == "validation"
         found: dict[str, Any] = {
             "trajectories": len(motion.string.per_trajectory()[0]),
             "rel_mse": whole.rel_mse,
             "rel_mae": whole.rel_mae,
-            "stored_rel_mse": info.rel_mse if validation else info.test_rel_mse,
-            "stored_rel_mae": info.rel_mae if validation else info.test_rel_mae,
+            **self._stored(split),
             "null_depth_db": sound.null_depth_db,
             "spectral_convergence": motion.spectra[0].convergence,
             "log_spectrum_db": motion.spectra[0].log_db,
@@ -173,6 +192,11 @@ class _Measurement:
         if not self.past_s:  # a trajectory's own error is over all that was measured
             spread = motion.string.spread()
             found |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
+            deviation = motion.string.standard_error()
+            found |= {"rel_mse_se": deviation.rel_mse, "rel_mae_se": deviation.rel_mae}
+            if info.tension_modulated:
+                groups = errors_by_rise(motion.string, self.data.configuration, split)
+                found["by_rise"] = [asdict(group) for group in groups]
         if info.horizon_steps > SHORT_HORIZON:
             short = motion.string.total(SHORT_HORIZON)
             found |= {f"rel_mse_{SHORT_HORIZON}": short.rel_mse, f"rel_mae_{SHORT_HORIZON}": short.rel_mae}
@@ -198,6 +222,13 @@ class _Measurement:
             found["partials"] = self._partials(split, windows)
             self.report.next()
         return found
+
+    def _stored(self, split: str) -> dict[str, float | None]:
+        info = self.preset.info
+        if split == "all":
+            return {}
+        mse, mae = (info.test_rel_mse, info.test_rel_mae) if split == "test" else (info.rel_mse, info.rel_mae)
+        return {"stored_rel_mse": mse, "stored_rel_mae": mae}
 
     def _partials(self, split: str, windows: list[tuple[float, float]]) -> list[dict[str, Any]]:
         """The whole horizon, all past it, then every window."""
@@ -262,9 +293,10 @@ def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: 
 
 
 def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
-    print(f"{split}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
-    print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
-    for key, text in (("spread", "spread over the trajectories"), ("400", "first 400 frames")):
+    print(f"{split.replace('_', ' ')}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
+    if "stored_rel_mse" in errors:
+        print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
+    for key, text in TOLD.items():
         if f"rel_mse_{key}" in errors:
             print(f"{text}: {number(errors[f'rel_mse_{key}'])}, {number(errors[f'rel_mae_{key}'])}")
     print(
@@ -277,6 +309,9 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
         first, last = errors["first_second"]["rel_mse"], errors["last_second"]["rel_mse"]
         times = f", {last / first:.3g} times as much" if first > 0 else ""
         print(f"rel. MSE of the first second {number(first)}, of the last {number(last)}{times}")
+    if "by_rise" in errors:
+        heads = ("plucks", "tension rises %", "to %", "rel. MSE", "rel. MAE", "of squared error %", "one pluck %")
+        print_table(heads, [_by_rise(group) for group in errors["by_rise"]])
     columns = ("from s", "to s", "rel. MSE", "rel. MAE", "null dB", "convergence", "spectra dB", "")
     keys = ("start_s", "stop_s", "rel_mse", "rel_mae", "null_depth_db", "spectral_convergence", "log_spectrum_db")
     print_table(
@@ -286,6 +321,13 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
             for w in errors["windows"]
         ],
     )
+
+
+def _by_rise(group: dict[str, Any]) -> list[object]:
+    rises, shares = (
+        [100 * group[name] for name in names] for names in (("from_rise", "to_rise"), ("share", "largest"))
+    )
+    return [group["trajectories"], *rises, group["rel_mse"], group["rel_mae"], *shares]
 
 
 def _print_partials(split: str, found: dict[str, Any]) -> None:
@@ -306,6 +348,9 @@ def _csv(preset: str, measured: dict[str, dict[str, Any]]) -> str:
     for split, errors in measured.items():
         stop_s = max(w["stop_s"] for w in errors["windows"] if not w["past_horizon"])
         writer.writerows((preset, split, *row) for row in _figures(errors, (0.0, stop_s, False), ""))
+        for place, group in enumerate(errors.get("by_rise", ()), 1):
+            named = {f"rise{place}_{name}": value for name, value in group.items()}
+            writer.writerows((preset, split, *row) for row in _figures(named, (0.0, stop_s, False), ""))
         for window in errors["windows"]:
             writer.writerows((preset, split, *row) for row in _figures(window, _label(window), ""))
         for window in errors.get("partials", ()):

@@ -22,6 +22,8 @@ PRESET_FIELDS = (
     "parameters",
     "rel_mse",
     "rel_mae",
+    "test_rel_mse",
+    "test_rel_mae",
     "heard",
     "file",
 )
@@ -83,6 +85,8 @@ def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
         described_parameters(path, info),
         info.rel_mse,
         info.rel_mae,
+        info.test_rel_mse,
+        info.test_rel_mae,
         heard_word(known.get(preset_digest(path))),
         str(path),
     )

@@ -1,4 +1,4 @@
-"""sweep, results merge: many runs, and the file of their rows."""
+"""sweep, results merge, results measure: many runs, and the file of their rows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -108,6 +108,38 @@ def merge(
     rows = [row for other in others for row in read_results(other)]
     after = len(add_rows(file, rows))
     print(f"{file}: {after} rows, {after - before} of them new")
+
+
+@results.command()
+def measure(
+    presets: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="PRESET...", help="Names or files; default all that have a row."),
+    ] = None,
+    results: Results = None,
+    cache: Cache = None,
+) -> None:
+    """Fill what earlier rows lack, standard errors over the trajectories, by measuring their presets again.
+
+    Nothing is trained, and no figure that a row has is changed.
+    """
+    from engine.preset import find_preset, preset_files, read_info
+    from training.results import RESULTS, add_rows, read_results
+    from training.row_errors import configuration_of, filled
+
+    file = results or RESULTS
+    rows = {row.digest: row for row in read_results(file)}
+    found = [find_preset(name) for name in presets] if presets else preset_files()
+    pairs = [(path, rows.get(configuration_of(read_info(path), str(path)).digest)) for path in found]
+    for path, row in pairs:
+        if row is None:
+            if presets:
+                raise Failure(f"{path}: {file} has no row of its run; train it, or give another preset")
+            continue
+        whole = filled(row, path, cache)
+        add_rows(file, [whole])
+        gained = sum(old is None and new is not None for old, new in zip(astuple(row), astuple(whole), strict=True))
+        print(f"{row.name}: {gained} figures added")
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from app.commands.arguments import check_range, open_preset
-from app.commands.console import progress, say
+from app.commands.console import Failure, progress, say
 from app.shared.whole_file import whole_file
 from engine.pluck import DEFAULT_LISTEN
 
@@ -27,6 +27,7 @@ PresetNames = Annotated[
 Trajectory = Annotated[int, typer.Option(min=0, help="Which one of the validation set.")]
 Listen = Annotated[float, typer.Option(help="Listening point in lengths of the string; 0.37 is the paper's 24 cm.")]
 Output = Annotated[Path | None, typer.Option(help="The file; its suffix is the format. Default: FIGURE.png, here.")]
+MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
 LISTEN_RANGE = (0.01, 0.99)
 
 
@@ -40,10 +41,15 @@ def table(
         bool, typer.Option("--rows", help="List the runs behind the figures, with the command that repeats each.")
     ] = False,
     output: Annotated[Path | None, typer.Option(help="A file in place of standard output.")] = None,
+    into: Annotated[
+        Path | None, typer.Option(metavar="FILE.md", help=f"Put them into a file, in place of all after {MARKER}.")
+    ] = None,
 ) -> None:
     """Print the paper's two tables with our results beside its figures."""
     if rows and format == "csv":
         raise typer.BadParameter("is for markdown; in CSV each line names its runs", param_hint="--rows")
+    if into is not None and (format == "csv" or output is not None):
+        raise typer.BadParameter("takes Markdown, and goes without --output", param_hint="--into")
     from training.results import RESULTS, read_results
     from training.tables.markdown import as_markdown
     from training.tables.tidy_csv import as_csv
@@ -52,12 +58,22 @@ def table(
     if not found:
         say(f"note: {results or RESULTS} has no rows; the tables hold the paper's figures only")
     text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe, listing=rows)
+    if into is not None:
+        text, output = _before(into) + text, into
     if output is None:
         print(text, end="")
         return
     with whole_file(output) as file:
         file.write(text.encode())
     print(output)
+
+
+def _before(document: Path) -> str:
+    """What stands in a document up to its marker, and the marker."""
+    kept, marker, _ = document.read_text(encoding="utf-8").partition(f"{MARKER}\n")
+    if not marker:
+        raise Failure(f"{document}: has no line {MARKER}; put it where the tables shall begin")
+    return f"{kept}{marker}\n"
 
 
 @figure.command()

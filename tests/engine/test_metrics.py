@@ -83,6 +83,47 @@ def test_per_frame_and_per_trajectory() -> None:
     assert sums.spread().rel_mae == pytest.approx(np.std([error.rel_mae for error in alone]))
 
 
+def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSums:
+    """Sums of trajectories of one frame that are wrong by these shares of their amplitude."""
+    truth = torch.tensor(loudness or [1.0] * len(shares), dtype=torch.float64)[:, None, None]
+    sums = ErrorSums(1)
+    sums.add(truth * (1 + torch.tensor(shares, dtype=torch.float64)[:, None, None]), truth)
+    return sums
+
+
+def test_the_standard_error_of_equal_trajectories_is_that_of_a_mean() -> None:
+    """Half of 100 err by 0.1, half by 0.3: what is drawn with replacement is binomial, and its deviation known."""
+    found = spoilt([0.1, 0.3] * 50).standard_error(20_000)
+    assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)  # the population's deviation over √count
+    assert found.rel_mse == pytest.approx((0.09 - 0.01) / 2 / 100**0.5, rel=0.02)
+
+
+def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -> None:
+    """A quarter is ten times as loud and errs more: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
+    shares, loudness = [0.01, 0.01, 0.01, 0.2] * 100, [1.0, 1.0, 1.0, 10.0] * 100
+    sums = spoilt(shares, loudness)
+    truth, wrong = np.array(loudness) ** 2, (np.array(shares) * loudness) ** 2
+    expected = np.sqrt(((wrong - sums.total().rel_mse * truth) ** 2).sum()) / truth.sum()
+    found = sums.standard_error(20_000)
+    assert found.rel_mse == pytest.approx(expected, rel=0.05)
+    assert found.rel_mse < sums.spread().rel_mse / 20 / 5  # what the plain deviation of a mean would tell
+
+
+def test_the_standard_error_where_there_is_nothing_to_draw() -> None:
+    assert spoilt([0.5]).standard_error() == RelativeError(0, 0)
+    assert spoilt([0.5] * 7).standard_error().rel_mae == pytest.approx(0, abs=1e-12)
+    assert spoilt([0.1, math.inf]).standard_error() == RelativeError(math.inf, math.inf)
+    assert spoilt([0.1, 0.2, 0.4]).standard_error() == spoilt([0.1, 0.2, 0.4]).standard_error()
+
+
+def test_parts_of_the_trajectories_and_their_shares() -> None:
+    sums = spoilt([0.1, 0.2, 0.2], [1.0, 1.0, 2.0])
+    assert sums.shares() == pytest.approx(np.array([1, 4, 16]) / 21)
+    assert sums.of([0, 2]).rel_mse == pytest.approx((0.01 + 0.16) / 5)
+    assert sums.of([0, 1, 2]) == sums.total()
+    assert spoilt([0.0, 0.0]).shares().tolist() == [0, 0]
+
+
 def test_trajectories_are_known_again_in_blocks() -> None:
     predicted, truth = motions(5, 30, 3)
     whole, rows_first, frames_first = ErrorSums(30), ErrorSums(30), ErrorSums(30)

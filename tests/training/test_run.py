@@ -1,8 +1,9 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,8 @@ from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Progress
+from training.results import Row
+from training.row_errors import filled
 from training.run import LOG_FIELDS, TrainingLog, run_row, trained_range
 
 
@@ -82,6 +85,15 @@ def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
     )
     test = evaluate_model(preset.model, dataset, "test", 420).total()
     assert (row.test_rel_mse, row.test_rel_mae) == pytest.approx((test.rel_mse, test.rel_mae), rel=1e-4)
+    first_frames = evaluate_model(preset.model, dataset, "test", 400)
+    for found_se, of_sums in (
+        ((row.rel_mse_se, row.rel_mae_se), sums),
+        ((row.test_rel_mse_400_se, row.test_rel_mae_400_se), first_frames),
+    ):
+        expected = of_sums.standard_error()
+        assert found_se == pytest.approx((expected.rel_mse, expected.rel_mae), rel=1e-4)
+        assert expected.rel_mse > 0
+    assert row.test_rel_mse_400 == pytest.approx(first_frames.total().rel_mse, rel=1e-4)
     assert (row.status, row.digest, row.epochs, row.string) == ("done", made.digest, 2, "nonlinear")
     assert (row.initialisation, row.structured, row.horizon, row.parameters) == (
         "physics",
@@ -91,6 +103,23 @@ def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
     )
     assert preset.info.horizon_steps == 420
     assert (tmp_path / "runs" / CELL.name / "log.png").stat().st_size > 10_000
+
+
+def test_what_an_earlier_row_lacks_is_measured_with_its_preset(tmp_path: Path) -> None:
+    row = run_row(CELL.name, "ours", configuration(), tmp_path / "runs", cache=tmp_path / "cache")
+    preset = tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors"
+    newer = [
+        f.name for f in fields(Row) if f.name.endswith("_se") or f.name in ("test_rel_mse_400", "test_rel_mae_400")
+    ]
+    assert len(newer) == 10
+    nothing: dict[str, Any] = dict.fromkeys(newer)
+    earlier = replace(row, rel_mse=(row.rel_mse or 0) * (1 + 1e-5), **nothing)
+    again = filled(earlier, preset, tmp_path / "cache")
+    assert again.rel_mse == earlier.rel_mse  # what it has stays, to the last digit
+    assert replace(again, **nothing) == earlier
+    assert [getattr(again, name) for name in newer] == pytest.approx([getattr(row, name) for name in newer])
+    with pytest.raises(ValueError, match=r"its rel_mae is .* 0\.5; it is of another run"):
+        filled(replace(row, rel_mae=0.5), preset, tmp_path / "cache")
 
 
 def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_de
 CHUNK = 50  # trajectories a step of the progress
 START_EVERY = 100  # kept frames between those of which the velocity is kept, from which a trajectory can be entered
 
-SPLITS = ("train", "validation", "test")
+SPLITS = ("train", "validation", "test", "all")
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ class Dataset:
 
 
 def split_rows(count: int, name: str) -> slice:
-    """The trajectories of a split: 80/10/10 in order."""
+    """The trajectories of a split: 80/10/10 in order, or all."""
     if name not in SPLITS:
         raise ValueError(f"split {name!r} is not one of {', '.join(SPLITS)}")
     train, validation = count * 8 // 10, count // 10
-    first = {"train": 0, "validation": train, "test": train + validation}[name]
-    return slice(first, {"train": train, "validation": train + validation, "test": count}[name])
+    first = {"train": 0, "validation": train, "test": train + validation, "all": 0}[name]
+    return slice(first, {"train": train, "validation": train + validation, "test": count, "all": count}[name])
 
 
 def default_cache() -> Path:

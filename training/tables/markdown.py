@@ -5,26 +5,36 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
+from engine.metrics import RESAMPLES
 from training.cell import MODEL_NAMES
 from training.results import Row
-from training.tables.paper import COLUMNS, HORIZONS, METRICS, PRINTED, Column, factor, mark, paper_errors
-from training.tables.sections import NOT_RUN, Line, RecipeChoice, Section, rows_of, sections
+from training.tables.paper import COLUMNS, HORIZONS, METRICS, PRINTED, Column, Figure, factor, mark, paper_errors
+from training.tables.sections import NO_ERRORS, NOT_RUN, Line, RecipeChoice, Section, rows_of, sections
 
 NONE = "—"
+TEST = "… test split"
 TITLES = {"linear": "Linear string", "nonlinear": "Non-linear (tension-modulated) string"}
 LEGEND = f"""\
-Relative errors on the validation set, sums over all its trajectories divided by sums, as `mean (standard deviation)`:
-over seeds, for DMD over the errors of the single trajectories. Lower is better. **The paper**'s lines are the figures
-of its Table 3 as printed (5 seeds).
+Relative errors, sums over all trajectories of a split divided by sums, as `mean (deviation)`. Lower is better. Lines
+of ours are of the **validation** set, as the paper's; it chose the weights and the recipes. The line **test split**
+below each is of the same models on the test set, which chose nothing. **The paper**'s lines are its Table 3 as
+printed (5 seeds, validation; DMD's deviations are over the errors of single trajectories).
 
-- **better**, **worse**: than the paper's figure of the same model, by more than one standard deviation (the larger of
-  the two; at least {PRINTED:g}, to which the paper's figures are printed). **equal**: within it.
-- **{NOT_RUN}**: there is no run of ours. **{NONE}**: the paper has no figure.
+- **deviation**, of ours: √(s² + b²). s is the standard deviation over seeds, where there is more than one. b is the
+  standard error by which strings are in the split, the bootstrap over its 100 trajectories (as many drawn with
+  replacement, {RESAMPLES} times; of several seeds the root of the mean square). **No brackets**: one seed, and b is
+  not known, because its preset was not kept; the words beside it know the paper's deviation alone.
+- **better**, **worse**: than the paper's figure of the same model, by more than √(our deviation² + the paper's²), at
+  least {PRINTED:g}, to which the paper's figures are printed. **equal**: within it. The paper does not tell its b.
+- **{NOT_RUN}**: there is no run of ours. **{NONE}**: there is no such figure.
 - **diverged (n of m seeds)**: these runs ended without a model; the figure beside it is of the others.
 - **prior knowledge**: training started from what is known of the string (its modes and eigenvalues, or averaged
   equations), which the paper's models do not have. Lines without these words are black boxes as in the paper.
-- **our best**: the lowest error of our learned models (DMD is fitted, not learned) as a multiple of the paper's best
-  in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below {PRINTED:g}."""
+- **§**: these blind runs used that a string may be mirrored and its sign turned, and the integrated phase was told
+  how many modes there are; they will be run again without either.
+- **our best**: the lowest validation error of our learned models (DMD is fitted, not learned) as a multiple of the
+  paper's best in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below
+  {PRINTED:g}."""
 SHORT_LEGEND = """\
 - **trained on 4000 frames** ‡: runs of the table above, measured over their first 400 frames. The others were trained
   on 400 frames, as the paper's."""
@@ -65,6 +75,8 @@ def _table(section: Section) -> tuple[list[str], list[list[str]]]:
             if line.trained != section.horizon:
                 label += f", trained on {line.trained} frames ‡"
             table.append(_line_of(model, label, partial(_cell, section, line)))
+            if any(entry.test != NO_ERRORS for entry in section.lines[line].values()):
+                table.append(_line_of(model, TEST, partial(_test_cell, section, line)))
     table.append(["**paper's best**", "", *_each(partial(_paper_best, section))])
     for structured, words in ((False, "black box"), (True, "prior knowledge")):
         table.append(["**our best**", words, *_each(partial(_best, section, structured))])
@@ -91,16 +103,23 @@ def _cell(section: Section, line: Line, column: Column, metric: str) -> str:
     parts, figure = [], entry.figure(metric)
     if figure is not None:
         paper = section.paper(line.model, column, metric)
-        words = f"{figure.mean:.3g}"
-        if figure.deviation is not None:
-            words += f" ({figure.deviation:.2g})"
-        if paper is not None:
-            words += f" **{mark(figure, paper)}**"
-        parts.append(f"{words}, {_seeds(len(entry.done))}")
+        parts.append(f"{_words(figure, paper)}, {_seeds(len(entry.done))}")
     for rows, words in ((entry.diverged, "diverged"), (entry.failed, "failed")):
         if rows:
             parts.append(f"{words} ({len(rows)} of {_seeds(len(entry.rows))})")
     return "; ".join(parts)
+
+
+def _test_cell(section: Section, line: Line, column: Column, metric: str) -> str:
+    entry = section.lines[line].get(column)
+    figure = entry.test.figure(metric) if entry else None
+    return _words(figure, section.paper(line.model, column, metric)) if figure else NONE
+
+
+def _words(figure: Figure, paper: Figure | None) -> str:
+    deviation = "" if figure.total is None else f" ({figure.total:.2g})"
+    against = "" if paper is None else f" **{mark(figure, paper)}**"
+    return f"{figure.mean:.3g}{deviation}{against}"
 
 
 def _seeds(count: int) -> str:
@@ -122,13 +141,17 @@ def _best(section: Section, structured: bool, column: Column, metric: str) -> st
 
 
 def _listing(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    head = ["run", "seed", "status", "rel. MSE", "rel. MAE", "digest", "commit", "hardware", "seconds", "repeated by"]
+    head = ["run", "seed", "status", "rel. MSE", "rel. MAE", "test MSE", "test MAE"]
+    head += ["digest", "commit", "hardware", "seconds", "repeated by"]
     return head, [
         [
             row.name,
             str(row.seed),
             row.status,
-            *(NONE if value is None else f"{value:.8g}" for value in (row.rel_mse, row.rel_mae)),
+            *(
+                NONE if value is None else f"{value:.8g}"
+                for value in (row.rel_mse, row.rel_mae, row.test_rel_mse, row.test_rel_mae)
+            ),
             row.digest,
             row.commit or NONE,
             row.hardware or NONE,

@@ -8,6 +8,7 @@ validation set, for DMD deviations over its trajectories.
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -40,10 +41,22 @@ COLUMNS = tuple(Column(initial, rate_hz) for initial in ("gaussian", "noise") fo
 
 
 class Figure(NamedTuple):
-    """A mean and its standard deviation, None where a single run has none."""
+    """A mean and what it may be off by.
+
+    Attributes:
+        deviation: standard deviation over seeds, None where a single run has none; of the paper's as printed.
+        split: standard error by which trajectories are in the split, None where it was not measured.
+    """
 
     mean: float
     deviation: float | None = None
+    split: float | None = None
+
+    @property
+    def total(self) -> float | None:
+        """Both together, as the root of the sum of their squares; None where neither is known."""
+        known = [part for part in (self.deviation, self.split) if part is not None]
+        return math.hypot(*known) if known else None
 
 
 @dataclass(frozen=True)
@@ -70,8 +83,8 @@ def paper_errors() -> dict[tuple[str, int, str, Column], Errors]:
 
 
 def mark(ours: Figure, paper: Figure) -> Mark:
-    """Equal: within one standard deviation, the larger of the two, and never finer than the paper prints."""
-    tolerance = max(ours.deviation or 0.0, paper.deviation or 0.0, PRINTED) * (1 + 1e-9)
+    """Equal: within one standard deviation of their difference, and never finer than the paper prints."""
+    tolerance = max(math.hypot(ours.total or 0.0, paper.total or 0.0), PRINTED) * (1 + 1e-9)
     if abs(ours.mean - paper.mean) <= tolerance:
         return "equal"
     return "better" if ours.mean < paper.mean else "worse"

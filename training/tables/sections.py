@@ -26,6 +26,11 @@ from training.tables.paper import (
 )
 
 NOT_RUN = "not run"  # what is said in place of a figure
+NO_ERRORS = Errors(None, None)
+TOLD_OF_THE_STRING = (
+    "blind matching pursuit",
+    "phases of the displacement",
+)  # starts of blind runs before purification
 
 RecipeChoice = Literal["ours", "blind", "paper", "all"]
 
@@ -47,9 +52,16 @@ class Line:
     trained: int
 
     @property
+    def told_of_the_string(self) -> bool:
+        """Whether it is of blind runs that were told of the string's symmetries, and of how many modes it has."""
+        return self.initialisation in TOLD_OF_THE_STRING
+
+    @property
     def label(self) -> str:
         """What is said of it beside the model's name."""
         words = f"{self.recipe} recipe" if self.recipe != "ours" else "our recipe"
+        if self.told_of_the_string:
+            words += " §"
         if self.structured:
             words += f", prior knowledge ({self.initialisation})"
         return words
@@ -57,8 +69,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Entry(Errors):
-    """A cell of ours, with the runs behind its figures."""
+    """A cell of ours, with the runs behind its figures.
 
+    Attributes:
+        test: the same of the test split; the figures themselves are of validation.
+    """
+
+    test: Errors = NO_ERRORS
     done: tuple[Row, ...] = ()
     diverged: tuple[Row, ...] = ()
     failed: tuple[Row, ...] = ()
@@ -169,16 +186,19 @@ def _entry(rows: Sequence[Row], horizon: int) -> Entry:
         tuple(row for row in rows if row.status == status) for status in ("done", "diverged", "failed")
     )
     mse, mae = (_figure(done, metric, horizon) for metric in METRICS)
-    return Entry(mse, mae, done, diverged, failed)
+    test = Errors(*(_figure(done, f"test_{metric}", horizon) for metric in METRICS))
+    return Entry(mse, mae, test, done, diverged, failed)
 
 
 def _figure(rows: Sequence[Row], metric: str, horizon: int) -> Figure | None:
     name = metric if all(row.horizon == horizon for row in rows) else f"{metric}_{SHORT_HORIZON}"
-    values: list[float] = [value for row in rows if (value := getattr(row, name)) is not None]
+    values, errors = _known(rows, name), _known(rows, f"{name}_se")
     if not values:
         return None
-    if len(values) > 1:
-        return Figure(fmean(values), stdev(values) if all(map(math.isfinite, values)) else None)
-    # as the paper's for DMD, which knows no seeds
-    spread = getattr(rows[0], f"{metric}_spread") if name == metric and rows[0].model == "dmd" else None
-    return Figure(values[0], spread)
+    # of the seeds' mean: they are measured on the same trajectories, whose draw moves them all alike
+    split = math.sqrt(fmean(error**2 for error in errors)) if errors else None
+    return Figure(fmean(values), stdev(values) if len(values) > 1 else None, split)
+
+
+def _known(rows: Sequence[Row], name: str) -> list[float]:
+    return [value for row in rows if (value := getattr(row, name)) is not None]

@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
+from typing import Any
 
 from training.results import Row
 from training.tables.paper import COLUMNS, METRICS, Column, mark
@@ -19,6 +20,8 @@ class Record:
     Attributes:
         trained: see `Line`.
         seeds: runs behind the figures; 0 where nothing was run.
+        mse_mark …: of the validation figure against the paper's; test_… of the test split's.
+        rel_mse_std …: over seeds; rel_mse_se …: by which trajectories are in the split; see `Figure`.
         runs: their names, separated by spaces, with those that diverged or failed.
     """
 
@@ -36,11 +39,21 @@ class Record:
     failed: int
     mse_mark: str
     mae_mark: str
+    test_mse_mark: str
+    test_mae_mark: str
     runs: str
     rel_mse: float | None = None
     rel_mse_std: float | None = None
+    rel_mse_se: float | None = None
     rel_mae: float | None = None
     rel_mae_std: float | None = None
+    rel_mae_se: float | None = None
+    test_rel_mse: float | None = None
+    test_rel_mse_std: float | None = None
+    test_rel_mse_se: float | None = None
+    test_rel_mae: float | None = None
+    test_rel_mae_std: float | None = None
+    test_rel_mae_se: float | None = None
     paper_rel_mse: float | None = None
     paper_rel_mse_std: float | None = None
     paper_rel_mae: float | None = None
@@ -65,13 +78,16 @@ def as_csv(rows: Sequence[Row], recipe: RecipeChoice = "all") -> str:
 def _record(section: Section, model: str, line: Line | None, column: Column) -> Record:
     entry = section.lines[line].get(column) if line else None
     found = entry or Entry(None, None)
-    figures: dict[str, float | None] = {}
-    marks = []
+    figures: dict[str, Any] = {}
     for metric in METRICS:
-        ours, paper = found.figure(metric), section.paper(model, column, metric)
-        for name, figure in ((metric, ours), (f"paper_{metric}", paper)):
-            figures |= {name: figure.mean, f"{name}_std": figure.deviation} if figure else {}
-        marks.append(mark(ours, paper) if ours and paper else "" if found.rows else NOT_RUN)
+        paper = section.paper(model, column, metric)
+        figures |= {f"paper_{metric}": paper.mean, f"paper_{metric}_std": paper.deviation} if paper else {}
+        for prefix, errors in (("", found), ("test_", found.test)):
+            ours, name = errors.figure(metric), f"{prefix}{metric}"
+            if ours:
+                figures |= {name: ours.mean, f"{name}_std": ours.deviation, f"{name}_se": ours.split}
+            against = mark(ours, paper) if ours and paper else "" if found.rows else NOT_RUN
+            figures[name.replace("rel_", "") + "_mark"] = against
     return Record(
         string=section.string,
         horizon=section.horizon,
@@ -85,8 +101,6 @@ def _record(section: Section, model: str, line: Line | None, column: Column) -> 
         seeds=len(found.done),
         diverged=len(found.diverged),
         failed=len(found.failed),
-        mse_mark=marks[0],
-        mae_mark=marks[1],
         runs=" ".join(row.name for row in found.rows),
         **figures,
     )

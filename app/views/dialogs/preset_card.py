@@ -13,6 +13,7 @@ from app.presets.words import (
     initial_word,
     model_meaning,
     model_word,
+    percent,
     rate_word,
     size_word,
     string_word,
@@ -43,6 +44,8 @@ def preset_summary(entry: PresetEntry) -> list[str]:
     string = "tension-modulated string" if info.tension_modulated else "linear string"
     trained, parameters = f"trained on {info.horizon_s:g} s", f"{entry.parameters:,} parameters"
     error = [f"validation error {error_word(info)}"] if info.rel_mae is not None else []
+    if error and info.test_rel_mae is not None:
+        error = [f"{error[0]}, test {percent(info.test_rel_mae)}"]
     wordings = (
         (model, parameters, string, f"{rate}, {info.modes} modes", trained),
         (model, string, f"{rate}, {info.modes} modes", trained),

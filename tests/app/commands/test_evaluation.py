@@ -76,6 +76,47 @@ def test_the_horizon_and_what_is_stored(run, preset: Path, cache: list[Any]) -> 
     assert test["spectral_convergence"] > 0
 
 
+def test_fresh_plucks_that_nobody_trained_on(run, preset: Path, cache: list[Any]) -> None:
+    words = ["evaluate", preset, "--held-out", "12", *cache]
+    told = run(*words)
+    assert (told.status, told.err) == (0, "")
+    assert told.out.startswith("held out: rel. MSE")
+    assert "stored in the preset" not in told.out
+    assert "12 trajectories, trained to 0.125 s" in told.out
+    found = json.loads(run(*words, "--json").out)
+    assert (found["split"], found["held_out"]["trajectories"]) == ("held_out", 12)
+    assert 0 < found["held_out"]["rel_mse_se"] < found["rel_mse"]
+    # of the same draw, and of the linear string, whose every pluck loses a tenth too much
+    split = json.loads(run("evaluate", preset, "--json", *cache).out)
+    assert found["rel_mse"] == pytest.approx(split["rel_mse"], rel=0.5)
+    other = json.loads(run(*words, "--seed", "2", "--json").out)["rel_mse"]
+    assert other not in (found["rel_mse"], split["rel_mse"])
+    assert json.loads(run(*words, "--json").out)["rel_mse"] == found["rel_mse"]
+    assert "past the training horizon" in run(*words, "--past", "0.5", "--partials").out
+    assert "its plucks were trained on; take another" in run(*words, "--seed", "0").usage
+    assert "--held-out" in run("evaluate", preset, "--held-out", "3", *cache).usage
+
+
+def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, preset: Path, folder: Path) -> None:
+    """Played on the tension-modulated string, a linear model errs most where it is plucked hardest."""
+    loaded = load_preset(preset)
+    data = {**loaded.info.training["data"], "tension_modulated": True}
+    info = replace(loaded.info, tension_modulated=True, training={**loaded.info.training, "data": data})
+    path = folder / "hard.safetensors"
+    save_preset(path, info, loaded.model)
+    words = ["evaluate", path, "--held-out", "40", "--csv", folder / "errors.csv"]
+    told = run(*words)
+    assert "tension rises %" in told.out
+    groups = json.loads(run(*words, "--json").out)["held_out"]["by_rise"]
+    assert [group["trajectories"] for group in groups] == [20, 10, 6, 2, 2]
+    rises = [rise for group in groups for rise in (group["from_rise"], group["to_rise"])]
+    assert rises == sorted(rises)
+    assert sum(group["share"] for group in groups) == pytest.approx(1)
+    assert all(0 < group["largest"] <= group["share"] for group in groups)
+    assert groups[0]["rel_mse"] < 0.5 * groups[3]["rel_mse"]  # at half the rate soon out of step, too
+    assert "rise1_share," in (folder / "errors.csv").read_text(encoding="utf-8")
+
+
 def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) -> None:
     words = ["evaluate", preset, "--past", "2.5", *cache]
     told = run(*words)

@@ -33,6 +33,8 @@ def test_presets_lists_every_field(run, installed: Path) -> None:
         "parameters": 7053,
         "rel_mse": 0.5,
         "rel_mae": 0.25,
+        "test_rel_mse": None,
+        "test_rel_mae": None,
         "heard": "not measured",
         "file": str(installed / "good.safetensors"),
     }

@@ -14,8 +14,10 @@ import pytest
 from app.commands import sweep as command
 from app.commands.sweep import Board
 from engine.metrics import RelativeError
+from training.cell import Cell, configuration_of
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
+from training.run import run_row
 from training.sweeping.plan import load_plan
 from training.sweeping.workers import Layout
 from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
@@ -198,6 +200,22 @@ def test_files_of_other_machines_are_merged(run, tmp_path: Path) -> None:
     assert f"{there}: not a results file" in run("results", "merge", elsewhere, there, "--results", here).failure
     assert "does not exist" in run("results", "merge", tmp_path / "no.csv", "--results", here).usage
     assert here.read_bytes() == before
+
+
+def test_rows_are_filled_from_presets(run, tmp_path: Path) -> None:
+    """The sweep's own rows of today lack nothing; those of yesterday get what they lack, and keep the rest."""
+    name, places = NAMES[1], {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
+    made = configuration_of(Cell.parse(name) or pytest.fail(), {"count": 10, "steps": 60}, {"epochs": 1})
+    row = run_row(name, "ours", made, **places)
+    preset, file = tmp_path / "runs" / name / f"{name}.safetensors", tmp_path / "results.csv"
+    add_rows(file, [replace(row, rel_mse_se=None, test_rel_mae_se=None), row_of("other")])
+    words = ["results", "measure", preset, "--results", file, "--cache", tmp_path / "cache"]
+    assert run(*words).out == f"{name}: 2 figures added\n"
+    assert read_results(file) == sorted([row, row_of("other")], key=lambda r: r.name)
+    add_rows(file, [replace(row, finished="2999")])
+    assert run(*words).out == f"{name}: 0 figures added\n"
+    file.unlink()
+    assert f"{preset}: {file} has no row of its run" in run(*words).failure
 
 
 def test_the_time_left_follows_what_is_known() -> None:

@@ -67,6 +67,21 @@ def test_the_tables_are_printed_or_written(run, results: Path, folder: Path) -> 
     assert list(folder.iterdir()) == [path]
 
 
+def test_the_tables_of_a_document_are_made_anew_in_place(run, results: Path, folder: Path) -> None:
+    document = folder / "RESULTS.md"
+    document.write_text("# Results\n\nWords.\n\n<!-- tables -->\nan older table\n", encoding="utf-8")
+    words = ["table", "--results", results, "--rows"]
+    assert run(*words, "--into", document).out == f"{document}\n"
+    made = document.read_text(encoding="utf-8")
+    assert made == f"# Results\n\nWords.\n\n<!-- tables -->\n\n{run(*words).out}"
+    assert run(*words, "--into", document).status == 0
+    assert document.read_text(encoding="utf-8") == made
+    document.write_text("# Results\n", encoding="utf-8")
+    assert "has no line <!-- tables -->; put it where" in run(*words, "--into", document).failure
+    assert document.read_text(encoding="utf-8") == "# Results\n"
+    assert "--into" in run(*words, "--into", document, "--output", folder / "other.md").usage
+
+
 def test_rows_are_listed_and_recipes_chosen(run, results: Path) -> None:
     assert "| nylon_linear_noise_4k_s5_paper_seed1 " in run("table", "--results", results, "--rows").out
     assert (

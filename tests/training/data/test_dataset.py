@@ -47,8 +47,9 @@ def test_splits_are_in_order_and_whole() -> None:
         slice(800, 900),
         slice(900, 1000),
     ]
-    with pytest.raises(ValueError, match="split 'all' is not one of train, validation, test"):
-        split_rows(10, "all")
+    assert split_rows(1000, "all") == slice(0, 1000)
+    with pytest.raises(ValueError, match="split 'half' is not one of train, validation, test, all"):
+        split_rows(10, "half")
 
 
 def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from training.tables.paper import METRICS, MODEL_ORDER, PRINTED, Column, Figure,
 def test_the_papers_figures_are_all_there() -> None:
     figures = paper_errors()
     assert len(figures) == 2 * 12 * 4  # strings, rows, data sets
-    assert sum(len(entry.figure(metric) or ()) for entry in figures.values() for metric in METRICS) == 384
+    found = [entry.figure(metric) for entry in figures.values() for metric in METRICS]
+    assert sum(figure is not None and figure.deviation is not None for figure in found) == 192
     for string in ("linear", "nonlinear"):
         for horizon, models in ((4000, MODEL_ORDER[:5]), (400, MODEL_ORDER[:7])):
             assert {key[2] for key in figures if key[:2] == (string, horizon)} == set(models)
@@ -31,7 +32,7 @@ def test_the_papers_figures_are_all_there() -> None:
 )
 def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any, mse: Any, mae: Any) -> None:
     entry = paper_errors()[string, horizon, model, Column(*column)]
-    assert (entry.rel_mse, entry.rel_mae) == (mse, mae)
+    assert (entry.rel_mse, entry.rel_mae) == (Figure(*mse), Figure(*mae))
 
 
 @pytest.mark.parametrize(
@@ -42,6 +43,11 @@ def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any
         ((0.0799, None), (0.1, 0.02), "better"),
         ((0.1201, None), (0.1, 0.02), "worse"),
         ((0.05, 0.06), (0.1, 0.02), "equal"),  # ours is the larger deviation
+        ((0.05, 0.03), (0.1, 0.04), "equal"),  # 3, 4, 5: both count, as variances of a difference do
+        ((0.0499, 0.03), (0.1, 0.04), "better"),
+        ((0.05, None, 0.03), (0.1, 0.04), "equal"),  # which strings are in the split counts as the seeds do
+        ((0.04, 0.03, 0.04), (0.1, 0.02), "better"),
+        ((0.04, 0.03, 0.04), (0.1, 0.034), "equal"),
         ((5e-6, 1e-7), (0.0, 0.0), "equal"),  # the paper's may be anything below its last decimal
         ((PRINTED, None), (0.0, 0.0), "equal"),
         ((6e-5, None), (0.0, 0.0), "worse"),
@@ -51,6 +57,12 @@ def test_figures_of_the_paper(string: str, horizon: int, model: str, column: Any
 )
 def test_marks(ours: Any, paper: Any, expected: str) -> None:
     assert mark(Figure(*ours), Figure(*paper)) == expected
+
+
+def test_what_a_figure_may_be_off_by() -> None:
+    assert Figure(1.0).total is None
+    assert Figure(1.0, 0.3).total == Figure(1.0, None, 0.3).total == 0.3
+    assert Figure(1.0, 0.3, 0.4).total == pytest.approx(0.5)
 
 
 def test_factors() -> None:

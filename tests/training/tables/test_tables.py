@@ -79,6 +79,43 @@ def test_one_seed_has_no_deviation_and_small_errors_keep_their_digits() -> None:
     assert line(cells, "LRU", "our recipe")[:2] == ["5.12e-06 **better**, 1 seed", "1.5 **worse**, 1 seed"]
 
 
+def test_which_strings_are_in_the_split_counts_beside_the_seeds() -> None:
+    first, second = seeds(2)
+    alone = line(table(as_markdown([row(first, 0.02, rel_mse_se=0.005)]), "Non-linear", 4000), "LRU", "our recipe")
+    assert alone[0] == "0.02 (0.005) **equal**, 1 seed"
+    assert line(table(as_markdown([row(first, 0.02)]), "Non-linear", 4000), "LRU", "our recipe")[0] == (
+        "0.02 **equal**, 1 seed"
+    )
+    # deviation over seeds 0.003, of the split √((0.003² + 0.005²) / 2): the seeds share their strings
+    rows = [
+        row(first, 0.02 - 0.0015 * 2**0.5, rel_mse_se=0.003),
+        row(second, 0.02 + 0.0015 * 2**0.5, rel_mse_se=0.005),
+    ]
+    both = line(table(as_markdown(rows), "Non-linear", 4000), "LRU", "our recipe")
+    assert both[0] == "0.02 (0.0051) **equal**, 2 seeds"
+    (found,) = records(as_csv(rows), seeds="2")
+    assert float(found["rel_mse_std"]) == pytest.approx(0.003)
+    assert float(found["rel_mse_se"]) == pytest.approx(17e-6**0.5)
+
+
+def test_the_test_split_stands_below_with_words_of_its_own() -> None:
+    figures = {"test_rel_mse": 0.03, "test_rel_mae": 0.2, "test_rel_mse_se": 0.002}
+    cells = table(as_markdown([row(mse=0.005, mae=0.1, **figures)]), "Non-linear", 4000)
+    ours = cells.index(["LRU", "our recipe", "0.005 **better**, 1 seed", "0.1 **better**, 1 seed", *["not run"] * 6])
+    assert cells[ours + 1] == ["LRU", "… test split", "0.03 (0.002) **equal**", "0.2 **worse**", *["—"] * 6]
+    (found,) = records(as_csv([row(mse=0.005, mae=0.1, **figures)]), seeds="1")
+    assert (found["mse_mark"], found["test_mse_mark"], found["test_mae_mark"]) == ("better", "equal", "worse")
+    assert (found["test_rel_mse"], found["test_rel_mse_se"], found["test_rel_mae_se"]) == ("0.03", "0.002", "")
+    assert "… test split" not in as_markdown([row()])  # where nothing was measured
+
+
+def test_blind_runs_that_were_told_of_the_string_are_marked() -> None:
+    cell = Cell("koopman_integrated", True, "gaussian", 4000, recipe="blind")
+    told, pure = (row(cell, initialisation=how) for how in ("phases of the displacement", "phases"))
+    assert line(table(as_markdown([told]), "Non-linear", 4000), "integrated phase", "blind recipe §")
+    assert line(table(as_markdown([pure]), "Non-linear", 4000), "integrated phase", "blind recipe")
+
+
 def test_what_was_not_run_is_said_to_be_so() -> None:
     found = as_markdown([])
     for string, horizon, lines in (("Linear", 4000, 6), ("Non-linear", 400, 8)):
@@ -132,21 +169,22 @@ def test_a_run_that_diverged_stands_with_the_others() -> None:
     assert ours[0] == "0.01 **equal**, 1 seed; diverged (1 of 2 seeds)"
 
 
-def test_dmd_deviates_over_trajectories_and_is_no_prior_knowledge() -> None:
-    cell = Cell("dmd", True, "gaussian", 4000)
-    rows = [row(cell, 1.0, 0.8, initialisation="least squares", rel_mse_spread=0.25, rel_mae_spread=0.07)]
+def test_dmd_is_no_prior_knowledge() -> None:
+    rows = [row(Cell("dmd", True, "gaussian", 4000), 1.0, 0.8, initialisation="least squares")]
     cells = table(as_markdown(rows), "Non-linear", 4000)
-    assert line(cells, "DMD", "our recipe")[:2] == ["1 (0.25) **equal**, 1 seed", "0.8 (0.07) **equal**, 1 seed"]
+    assert line(cells, "DMD", "our recipe")[0] == "1 **equal**, 1 seed"
     assert line(cells, "**our best**", "black box")[0] == "not run"  # fitted, not learned
 
 
 def test_long_runs_measured_over_400_frames_are_told_from_short_ones() -> None:
     long, short = Cell("lru", True, "gaussian", 4000), Cell("lru", True, "gaussian", 4000, 400)
-    rows = [row(long, rel_mse_400=0.0002, rel_mae_400=0.01), row(short, 0.0008, 0.02)]
+    first_frames = {"rel_mse_400": 0.0002, "rel_mae_400": 0.01, "test_rel_mse_400": 0.0003, "rel_mse_400_se": 0.00001}
+    rows = [row(long, test_rel_mse=0.9, **first_frames), row(short, 0.0008, 0.02)]
     cells = table(as_markdown(rows), "Non-linear", 400)
     assert line(cells, "LRU", "our recipe")[0] == "0.0008 **equal**, 1 seed"
     from_long = line(cells, "LRU", "our recipe, trained on 4000 frames ‡")
-    assert from_long[:2] == ["0.0002 **better**, 1 seed", "0.01 **better**, 1 seed"]
+    assert from_long[:2] == ["0.0002 (1e-05) **better**, 1 seed", "0.01 **better**, 1 seed"]
+    assert line(cells, "LRU", "… test split")[:2] == ["0.0003 **better**", "—"]
     unmeasured = table(as_markdown([row(long)]), "Non-linear", 400)
     assert line(unmeasured, "LRU", "not run") == ["not run"] * 8
 
