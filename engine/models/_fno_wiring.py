@@ -198,7 +198,8 @@ def _turns(modes: StringModes) -> Tensor:
     return torch.stack(rows, dim=-2)
 
 
-SMALL = 1e-3  # of a standard deviation of displacement: what tanh does not bend in 400 steps
+SMALL = 2e-3  # of a standard deviation of displacement: what tanh does not bend in 400 steps
+FIELD_SIZE = 5e-3  # what it does not bend in one
 OPEN, SHUT = 15.0, -15.0  # gates' biases
 MARGIN = 0.46  # of a gate around one half. With it the sigmoid bends nearly as cosine and sine do over small angles
 SQUARE_SIZE = 0.01  # what the roots of all squares come to, typically
@@ -240,6 +241,7 @@ def wire_fgru(modes: StringModes, width: int) -> Wiring:
     z.bias[: 3 * count, [channels.root, channels.plus, channels.minus]] = OPEN
     z.bias[: 2 * count, channels.own] = OPEN
     z.bias[points - 1, channels.sum] = OPEN
+    r.bias[z.bias == SHUT] = SHUT  # nor is anything read from there
 
     real, imaginary = channels.states[:3], channels.states[3:]
     for target in real:
@@ -248,13 +250,13 @@ def wire_fgru(modes: StringModes, width: int) -> Wiring:
         _turn(h, imaginary, real, 1, target)
     for mode, (channel, end) in enumerate(at_end):
         _turn(h, real, imaginary, -1, channel, end - mode)
-        h.spread(channel, end, channels.field, 2 * modes.shapes[mode])
+        h.spread(channel, end, channels.field, 2 * FIELD_SIZE / SMALL * modes.shapes[mode])
     _follow_squares(h, r, modes, channels, at_end)
     _release(h, r, modes, channels, at_end)
 
     weight_in, weight_out = torch.zeros(2, width, dtype=torch.float64)
-    weight_in[channels.start :] = SMALL
-    weight_out[channels.field] = 1 / SMALL
+    weight_in[channels.start :] = 1.0  # for a step that has no tanh before it
+    weight_out[channels.field] = 1 / FIELD_SIZE
     return Wiring((z, r, h), weight_in, torch.zeros_like(weight_in), weight_out, 0.0)
 
 
@@ -386,7 +388,7 @@ def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at
     generator = torch.Generator().manual_seed(0)  # any windows do that have nothing in common
     shares = torch.rand(r.bias[:, start].shape, generator=generator, dtype=torch.float64)
     r.bias[:, start] = torch.logit(0.5 + WINDOW * (2 * shares - 1))
-    solve = _LeastKernels(torch.sigmoid(r.bias[:, start]) * SMALL, modes.shapes)
+    solve = _LeastKernels(torch.sigmoid(r.bias[:, start]), modes.shapes)
     turn = modes.log_eigenvalues + 1j * modes.drift
     # two frames on, and the drift of two more steps, in which the squares are not known yet
     ahead = SMALL * torch.diag(modes.starts * torch.exp(2 * turn + 2j * modes.drift))
@@ -396,7 +398,7 @@ def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at
             h.lags[:, start, target] += found
     for mode, (channel, end) in enumerate(at_end):
         h.lags[:, start, channel] += solve(torch.tensor([end]), ahead.real[mode : mode + 1])
-    first = SMALL * (modes.starts * torch.exp(turn)).real
+    first = FIELD_SIZE * (modes.starts * torch.exp(turn)).real
     h.lags[:, start, channels.field] += solve(torch.arange(points), modes.shapes.T * first)
 
 
@@ -417,7 +419,7 @@ class _LeastKernels:
         seen = self.shapes[:, source] * inside  # (modes, places, lags)
         rows = seen[..., None] * self.windows[source]  # (modes, places, lags, channels)
         rows = rows.transpose(0, 1).reshape(len(places) * len(self.shapes), -1)
-        found = torch.linalg.lstsq(rows, wanted.reshape(-1, 1), rcond=1e-9, driver="gelsd").solution
+        found = torch.linalg.lstsq(rows, wanted.reshape(-1, 1), rcond=1e-4, driver="gelsd").solution
         kernels = torch.zeros(2 * points, channels, dtype=torch.float64)
         kernels[lags] = found.view(len(lags), channels)
         return kernels
