@@ -15,6 +15,7 @@ from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, write
 
+FROM_PHASES = ("koopman_integrated", "fgru", "frnn")  # models that start from what the displacement shows (`phases`)
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -122,8 +123,8 @@ class TrainingConfiguration:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
-        if self.recipe.blind and not self.recipe.latent_epochs and self.model != "koopman_integrated":
-            raise ValueError(f"blind needs latent_epochs, or the model 'koopman_integrated', not {self.model!r}")
+        if self.recipe.blind and not self.recipe.latent_epochs and self.model not in FROM_PHASES:
+            raise ValueError(f"blind needs latent_epochs, or one of {', '.join(FROM_PHASES)}, not {self.model!r}")
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:

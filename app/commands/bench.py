@@ -135,7 +135,7 @@ def voices(json: Json = False) -> None:
 
 @bench.command()
 def train(json: Json = False) -> None:
-    """Seconds of a train step of every model: 50 trajectories, 400 frames."""
+    """Seconds of a train step of every model: 50 trajectories, 400 frames (50 for fgru and frnn)."""
     from app.commands.benchmarks.train import measure
 
     with progress("bench train") as report:

@@ -6,9 +6,7 @@ some fifteen calls take ten times that. Nothing is allocated after the start, an
 
 Three things make it fast.
 
-- Small transforms. With the origin in the middle of the string a real part sees only its symmetric and an imaginary
-  part only its antisymmetric half: two real matrix products (BLAS) of half the length. Moving the origin multiplies
-  each frequency by a phase, which commutes with the product and is undone on the way back.
+- Small transforms: two real matrix products (BLAS) of half the length (`_fno_transform`).
 - Contiguous weights. The product reads every weight once a step (2.5 MB at the paper's sizes, more than the nearest
   caches hold), in order; that reading is the floor.
 - A rational tanh that the compiler turns into vector instructions.
@@ -19,30 +17,11 @@ frequencies as points; widths are even.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from engine.kernels.compiled import COMPILED, HALF, ZERO, tanh
-
-Array = NDArray[np.float32]
-Pair = tuple[Array, Array]
-
-
-@cache
-def transform_matrices(points: int) -> Pair:
-    """The folded transform (2, frequencies, half) and its inverse (2, half, frequencies), half = points // 2 + 1.
-
-    For fields of `points` values that are followed by as many zeros. The highest frequency of a real transform of
-    2·points values is not kept.
-    """
-    k = np.arange(points)[:, None]
-    angle = np.pi * k * (np.arange(points // 2 + 1) - points / 2) / points
-    forward = np.stack([np.cos(angle), -np.sin(angle)])
-    inverse = (forward * np.where(k == 0, 0.5, 1.0) / points).transpose(0, 2, 1)
-    return forward.astype(np.float32), np.ascontiguousarray(inverse, dtype=np.float32)
+from engine.models._fno_transform import Array, Pair
 
 
 @njit(**COMPILED)

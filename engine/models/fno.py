@@ -16,20 +16,24 @@ the whole field.
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import torch
 from torch import Tensor, nn
 from torch.utils.checkpoint import checkpoint
 
+from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
+from engine.models._fno_transform import transform_matrices
+from engine.models._fno_wiring import Kernels, StringModes, Wiring, wire_fgru, wire_frnn
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
 
 if TYPE_CHECKING:
     from engine.models import _fno_kernel as kernel
+
+KEPT_BYTES = 2_000_000_000  # of a roll-out, for its gradient
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,7 @@ class _FourierRecurrent(StringModel[FieldState]):
     """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
 
     initialisations: ClassVar = ("paper",)
+    kept_fields: int  # of a step, for its gradient
 
     def __init__(self, grid_points: int, width: int, kind: InputKind) -> None:
         super().__init__()
@@ -124,6 +129,18 @@ class _FourierRecurrent(StringModel[FieldState]):
         """One sample of the definition: (batch, grid_points, width) to the same shape."""
 
     @abstractmethod
+    def store_modes(self, modes: StringModes) -> None:
+        """Makes it a string of these modes, as far as its form can be one (`_fno_wiring`).
+
+        Raises:
+            ValueError: it has too few channels or points for them.
+        """
+
+    @abstractmethod
+    def rollout(self, hidden: Tensor, steps: int) -> Tensor:
+        """The definition, faster: (grid_points, batch, width) to the fields after each step (steps, …)."""
+
+    @abstractmethod
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         """The kernel: advances hidden (batch, grid_points, width), fills frames (batch, steps, grid_points)."""
 
@@ -132,27 +149,33 @@ class _FourierRecurrent(StringModel[FieldState]):
         return FieldState(self.in_mapping(join_input(self.input, displacement[..., None], second)))
 
     def advance(self, state: FieldState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, FieldState]:
-        advance = self._advance_compiled if self._can_compile(state.hidden) else self._advance_by_definition
-        frames, hidden = advance(state.hidden, steps)
+        frames, hidden = self._advance_any_way(state.hidden, steps)
         if readout is not None:
             frames = frames @ readout.to(frames)
         return frames, FieldState(hidden)
 
-    def _can_compile(self, hidden: Tensor) -> bool:
-        learns = torch.is_grad_enabled() and any(t.requires_grad for t in (hidden, *self.parameters()))
+    def _advance_any_way(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        if torch.is_grad_enabled() and any(t.requires_grad for t in (hidden, *self.parameters())):
+            return self._advance_learning(hidden, steps)
         paired = hidden.shape[-1] % 2 == 0  # the kernel takes channels two at a time
-        return paired and not learns and hidden.device.type == "cpu" and hidden.dtype == torch.float32
+        if paired and hidden.device.type == "cpu" and hidden.dtype == torch.float32:
+            return self._advance_compiled(hidden, steps)
+        return self._stretch(hidden, steps)
 
-    def _advance_by_definition(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
-        if not torch.is_grad_enabled():
-            return self._stretch(hidden, steps)
-        # a gradient needs 0.3 MB of every step and string: kept for one stretch, computed again for the others
-        length, parts = math.isqrt(steps - 1) + 1, []
+    def _advance_learning(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+        fields, parts = hidden.transpose(0, 1).contiguous(), []
+        # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
+        step_bytes = self.kept_fields * fields.numel() * fields.element_size()
+        length = min(steps, max(1, KEPT_BYTES // step_bytes))
         for first in range(0, steps, length):
             count = min(length, steps - first)
-            part, hidden = checkpoint(self._stretch, hidden, count, use_reentrant=False, preserve_rng_state=False)
-            parts.append(part)
-        return torch.cat(parts, dim=1), hidden
+            if length == steps:
+                part = self.rollout(fields, count)
+            else:
+                part = checkpoint(self.rollout, fields, count, use_reentrant=False, preserve_rng_state=False)
+            fields = part[-1]
+            parts.append(self.out_mapping(part)[..., 0])
+        return torch.cat(parts).permute(2, 0, 1), fields.transpose(0, 1)
 
     def _stretch(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         frames = []
@@ -166,6 +189,16 @@ class _FourierRecurrent(StringModel[FieldState]):
         frames = fields.new_empty(len(fields), steps, self.grid_points)
         self._render(fields.numpy(), frames.numpy())
         return frames, fields
+
+    def _store(self, wiring: Wiring, layers: dict[FourierConvolution, Kernels]) -> None:
+        for layer, kernels in layers.items():
+            kernels.store(layer.weight, layer.bias)
+        with torch.no_grad():
+            self.in_mapping.weight.zero_()
+            self.in_mapping.weight[:, 0] = wiring.weight_in
+            self.in_mapping.bias.copy_(wiring.bias_in)
+            self.out_mapping.weight[0] = wiring.weight_out
+            self.out_mapping.bias.fill_(wiring.bias_out)
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
@@ -187,6 +220,8 @@ class _FourierRecurrent(StringModel[FieldState]):
 class FGRU(_FourierRecurrent):
     """See the module."""
 
+    kept_fields = 8
+
     def __init__(self, configuration: FGRUConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width, configuration.input)
         self.configuration = configuration
@@ -200,10 +235,21 @@ class FGRU(_FourierRecurrent):
         r = torch.sigmoid(self.r_layer(hidden))
         return (1 - z) * hidden + z * torch.tanh(self.h_layer(r * hidden))
 
+    def store_modes(self, modes: StringModes) -> None:
+        wiring = wire_fgru(modes, self.configuration.width)
+        layers = self.z_layer, self.r_layer, self.h_layer
+        self._store(wiring, dict(zip(layers, wiring.layers, strict=True)))
+
+    def rollout(self, hidden: Tensor, steps: int) -> Tensor:
+        z, r, candidate = (channel_matrices(layer.weight) for layer in (self.z_layer, self.r_layer, self.h_layer))
+        gates_bias = torch.cat([self.z_layer.bias_field(), self.r_layer.bias_field()], dim=1)
+        weights = joined(z, r), gates_bias, candidate, self.h_layer.bias_field()
+        return cast("Tensor", FGRURollout.apply(hidden, *weights, steps))
+
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
-        transforms = kernel.transform_matrices(self.grid_points)
+        transforms = transform_matrices(self.grid_points)
         convolutions = _convolution_arrays(self.z_layer, self.r_layer, self.h_layer)
         out = _dense_arrays(self.out_mapping)
         for field, trajectory in zip(hidden, frames, strict=True):
@@ -216,6 +262,7 @@ class FRNN(_FourierRecurrent):
     def __init__(self, configuration: FRNNConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width, configuration.input)
         self.configuration = configuration
+        self.kept_fields = 4 * configuration.depth
         sizes = configuration.grid_points, configuration.width
         self.fourier_layers = nn.ModuleList(FourierConvolution(*sizes) for _ in range(configuration.depth))
         self.pointwise_layers = nn.ModuleList(
@@ -227,10 +274,34 @@ class FRNN(_FourierRecurrent):
             hidden = torch.relu(convolve(hidden)) + pointwise(hidden)
         return hidden
 
+    def store_modes(self, modes: StringModes) -> None:
+        """As a linear string: its frequencies follow nothing."""
+        wiring = wire_frnn(modes, self.configuration.width, self.configuration.depth)
+        self._store(wiring, dict(zip(self._convolutions, wiring.layers, strict=True)))
+        with torch.no_grad():
+            for layer in self._pointwise:
+                layer.weight.zero_()
+                layer.bias.zero_()
+
+    def rollout(self, hidden: Tensor, steps: int) -> Tensor:
+        matrices = torch.stack([channel_matrices(layer.weight) for layer in self._convolutions])
+        biases = torch.stack([layer.bias_field() for layer in self._convolutions])
+        pointwise = torch.stack([layer.weight for layer in self._pointwise])
+        offsets = torch.stack([layer.bias for layer in self._pointwise])
+        return cast("Tensor", FRNNRollout.apply(hidden, matrices, biases, pointwise, offsets, steps))
+
+    @property
+    def _convolutions(self) -> list[FourierConvolution]:
+        return [layer for layer in self.fourier_layers if isinstance(layer, FourierConvolution)]
+
+    @property
+    def _pointwise(self) -> list[nn.Linear]:
+        return [layer for layer in self.pointwise_layers if isinstance(layer, nn.Linear)]
+
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
 
-        transforms = kernel.transform_matrices(self.grid_points)
+        transforms = transform_matrices(self.grid_points)
         convolutions = _convolution_arrays(*self.fourier_layers)
         pointwise = _dense_arrays(*self.pointwise_layers)
         out = _dense_arrays(self.out_mapping)

@@ -1,4 +1,6 @@
-"""A start for an integrated phase from the displacement alone: shapes, eigenvalues, how energies shift frequencies.
+"""A start from the displacement alone: shapes, eigenvalues, and how energies shift frequencies.
+
+For an integrated phase, which has that form, and for the Fourier cells, which can be wired to have it.
 
 The shapes that the motions show (`modes`) keep theirs while their frequencies move, so that the motion of a mode n
 in a string that starts at rest is, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t},
@@ -20,7 +22,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from torch import Tensor
 
-from engine.models import StringModel
+from engine.models import FGRU, FRNN, StringModel
+from engine.models.fno import StringModes
 from engine.models.integrated_phase import KoopmanIntegrated
 from training.data.dataset import Dataset
 from training.fitting.modes import SLOWEST, Modes, found_modes
@@ -49,18 +52,24 @@ class Phases:
 
 
 def start_from_phases(model: StringModel, dataset: Dataset, steps: int, seed: int) -> None:
-    """Gives an integrated phase what the first `steps` frames of the training split show.
+    """Gives a model what the first `steps` frames of the training split show.
+
+    An FRNN, whose start is a linear string, is given each mode's mean motion (`mean_motions`).
 
     Raises:
-        ValueError: the model is another, its data are strided, or have more modes than it has latents.
+        ValueError: the model is another, its data are strided, or have more modes than it can hold.
     """
-    if not isinstance(model, KoopmanIntegrated):
-        raise ValueError("blind without latent_epochs needs the model 'koopman_integrated'")
+    if not isinstance(model, (KoopmanIntegrated, FGRU, FRNN)):
+        raise ValueError("blind without latent_epochs needs one of the models koopman_integrated, fgru, frnn")
     if dataset.configuration.stride != 1:
         raise ValueError(f"blind needs every frame: the data's stride must be 1, not {dataset.configuration.stride}")
     modes = found_modes(dataset, steps)
-    found = fit_phases(modes, seed)
-    model.store_modes(modes.shapes, found.log_eigenvalues, found.starts, found.coupling)
+    found = mean_motions(modes) if isinstance(model, FRNN) else fit_phases(modes, seed)
+    if isinstance(model, KoopmanIntegrated):
+        model.store_modes(modes.shapes, found.log_eigenvalues, found.starts, found.coupling)
+    else:
+        squares = modes.motions[:, 0].square()
+        model.store_modes(StringModes(modes.shapes, found.log_eigenvalues, found.starts, found.coupling, squares))
 
 
 def fit_phases(modes: Modes, seed: int) -> Phases:
@@ -82,12 +91,35 @@ def fit_phases(modes: Modes, seed: int) -> Phases:
         if last == frames - 1:
             break
         last = min(frames - 1, int(MORE_FRAMES * last) + 1)
-    found = [_upright(guess) for guess in found]
+    return _phases([_upright(guess) for guess in found], slowest, count)
+
+
+def mean_motions(modes: Modes) -> Phases:
+    """Of each mode the one exponential that is nearest to all its motions, each by its own start; no coupling."""
+    motions = modes.motions.numpy()
+    frames, count = motions.shape[1:]
+    mean = np.einsum("rtn,rn->tn", motions, motions[:, 0]) / np.sum(motions[:, 0] ** 2, axis=0)
+    found = [_first_guess(motions[..., mode], 0) for mode in range(count)]
+    last = min(FIRST_FRAMES, frames - 1)
+    while True:
+        times = np.arange(1.0, last + 1)
+        for mode, guess in enumerate(found):
+            seen = mean[1 : last + 1, mode]
+            found[mode] = _Motion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
+        if last == frames - 1:
+            break
+        last = min(frames - 1, int(MORE_FRAMES * last) + 1)
+    return _phases([_upright(guess) for guess in found], SLOWEST / (frames - 1), count)
+
+
+def _phases(found: list[Floats], slowest: float, count: int) -> Phases:
+    """As fitted; `count` modes are coupled, or none where there is no κ."""
     omega, sigma, real, imag = np.array(found)[:, :4].T
+    coupling = np.array(found)[:, 4:] if len(found[0]) > 4 else np.zeros((count, count))
     return Phases(
         torch.from_numpy(-np.maximum(sigma, slowest) + 1j * omega),
         torch.from_numpy(real + 1j * imag),
-        torch.from_numpy(np.array(found)[:, 4:]),
+        torch.from_numpy(coupling),
     )
 
 

@@ -36,6 +36,8 @@ def test_bench_render_measures_every_model(run, monkeypatch: pytest.MonkeyPatch)
 def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.commands.benchmarks.train.BATCH", 2)
     monkeypatch.setattr("app.commands.benchmarks.train.FRAMES", 5)
-    (case, *_) = json.loads(run("bench", "train", "--json").out)["models"]
-    assert (case["model"], case["batch"], case["frames"]) == ("koopman", 2, 5)
-    assert case["step_s"] > 0
+    monkeypatch.setattr("app.commands.benchmarks.train.FEWER_FRAMES", {"fgru": 3})
+    cases = {case["model"]: case for case in json.loads(run("bench", "train", "--json").out)["models"]}
+    assert {(case["batch"], case["frames"]) for name, case in cases.items() if name != "fgru"} == {(2, 5)}
+    assert cases["fgru"]["frames"] == 3
+    assert all(case["step_s"] > 0 for case in cases.values())

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from engine.models import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration, count_parameters
-from engine.models._fno_kernel import transform_matrices
+from engine.models._fno_transform import transform_matrices
 from engine.models.base import Physics
 from engine.models.fno import FieldState, FourierConvolution
 from engine.resonators.sine_transform import listening_weights
@@ -132,6 +132,26 @@ def test_the_kernel_agrees_with_the_definition(make: Make, points: int) -> None:
     size = float(exact.abs().max())
     torch.testing.assert_close(fast.double(), exact, rtol=0, atol=1e-5 * size)
     torch.testing.assert_close(state.hidden.double(), last.hidden, rtol=0, atol=1e-5 * float(last.hidden.abs().max()))
+
+
+@pytest.mark.parametrize("kept_bytes", [10**9, 50_000])
+@pytest.mark.parametrize("points", [1, 2, 3, 10, 101])
+@both
+def test_what_learns_agrees_with_the_definition(
+    make: Make, points: int, kept_bytes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames, last state and every gradient; also where steps are computed again for want of memory."""
+    monkeypatch.setattr("engine.models.fno.KEPT_BYTES", kept_bytes)
+    model = drawn(make(points, 6)).double()
+    start, wanted = initial(3, points).double(), torch.randn(3, 7, points, generator=torch.Generator().manual_seed(2))
+    found = []
+    for advance in (model._stretch, model._advance_learning):
+        model.zero_grad()
+        frames, last = advance(model.encode(start).hidden, 7)
+        ((frames - wanted).square().mean() + last.square().mean()).backward()
+        found.append([frames, last, *(parameter.grad for parameter in model.parameters())])
+    for expected, fast in zip(*found, strict=True):
+        torch.testing.assert_close(fast, expected, rtol=1e-9, atol=1e-12)
 
 
 def test_the_folded_transform_and_its_inverse_undo_each_other() -> None:

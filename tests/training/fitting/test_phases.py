@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import Koopman, KoopmanConfiguration, KoopmanIntegrated
+from engine.models import Koopman, KoopmanConfiguration, KoopmanIntegrated, build_model
 from engine.models.integrated_phase import IntegratedPhaseConfiguration
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import PHASES, fit, initialisation_of
 from training.fitting.modes import Modes
-from training.fitting.phases import _Motion, _upright, fit_phases, start_from_phases
+from training.fitting.phases import _Motion, _upright, fit_phases, mean_motions, start_from_phases
 
 STEPS = 450
 
@@ -60,6 +60,33 @@ def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
     np.testing.assert_array_equal(_upright(upright), upright)
 
 
+def test_a_mean_motion_is_the_linear_strings_own() -> None:
+    omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
+    found = mean_motions(motions_of(omega, sigma, torch.zeros(3, 3).double(), 400))
+    torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
+    assert not found.coupling.any()
+
+
+def test_a_mean_motion_is_between_those_of_soft_and_loud_strings() -> None:
+    omega, sigma = torch.tensor([0.4, 1.3]).double(), torch.tensor([1e-4, 2e-3]).double()
+    coupling = torch.tensor([[0.002, 0.002], [0.002, 0.004]]).double()
+    found = mean_motions(motions_of(omega, sigma, coupling, 400)).log_eigenvalues
+    assert (found.imag > omega).all()
+    assert (found.imag < omega + coupling.sum(1)).all()
+    assert (-found.real > sigma).all()  # motions that part cancel one another
+
+
+@pytest.mark.parametrize(("model", "largest"), [("fgru", 0.02), ("frnn", 0.5)])
+def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(
+    small_dataset: Dataset, model: str, largest: float
+) -> None:
+    """FGRU's frequencies follow the squares; FRNN is the linear string that is nearest."""
+    cell = build_model(model)
+    start_from_phases(cell, small_dataset, 200, seed=0)
+    error = evaluate_model(cell, small_dataset, "validation", 200).total()
+    assert error.rel_mse < largest
+
+
 @pytest.mark.parametrize(("state_size", "physical_units"), [(5, True), (7, False)])
 def test_it_predicts_strings_that_the_fit_has_not_seen(
     small_dataset: Dataset, state_size: int, physical_units: bool
@@ -87,11 +114,11 @@ def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
 def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
     with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
         start_from_phases(integrated_phase(4), small_dataset, STEPS, seed=0)
-    with pytest.raises(ValueError, match="needs the model 'koopman_integrated'"):
+    with pytest.raises(ValueError, match="needs one of the models koopman_integrated, fgru, frnn"):
         start_from_phases(Koopman(KoopmanConfiguration()), small_dataset, STEPS, seed=0)
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
     with pytest.raises(ValueError, match="stride must be 1, not 2"):
         start_from_phases(integrated_phase(), strided, STEPS, seed=0)
     data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
-    with pytest.raises(ValueError, match="blind needs latent_epochs, or the model 'koopman_integrated', not 's5'"):
+    with pytest.raises(ValueError, match="or one of koopman_integrated, fgru, frnn, not 's5'"):
         TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, blind=True))

@@ -1,0 +1,108 @@
+"""Fourier cells that are wired as strings of known modes, against closed forms."""
+
+import pytest
+import torch
+
+from engine.models import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
+from engine.models._fno_wiring import Kernels, StringModes, shared_coupling
+from engine.models.fno import FourierConvolution
+from engine.resonators.sine_transform import synthesis_matrix
+
+POINTS = 31
+
+
+def modes(coupled: float = 0.0, count: int = 5, points: int = POINTS) -> StringModes:
+    """A string whose coupling is what FGRU can hold."""
+    n = torch.arange(1, count + 1, dtype=torch.float64)
+    eigenvalues = torch.complex(-1e-4 * n**2, 0.31 * n)
+    squares = torch.rand(30, count, generator=torch.Generator().manual_seed(3), dtype=torch.float64)
+    coupling = coupled * n[:, None] * n**2 * (1 + 0.5 * torch.eye(count, dtype=torch.float64))
+    starts = torch.complex(torch.ones_like(n), eigenvalues.real / eigenvalues.imag)
+    return StringModes(synthesis_matrix(points, count), eigenvalues, starts, coupling, squares)
+
+
+def motion(string: StringModes, initial: torch.Tensor, steps: int) -> torch.Tensor:
+    """Displacement (strings, steps, points) of initial amplitudes (strings, modes)."""
+    t = torch.arange(1.0, steps + 1, dtype=torch.float64)[:, None]
+    decay = -2 * string.log_eigenvalues.real
+    integrals = initial.square()[:, None] * (1 - torch.exp(-decay * t)) / decay
+    phases = string.log_eigenvalues * t + 1j * (integrals @ string.coupling.T)
+    return (initial[:, None] * (string.starts * torch.exp(phases)).real) @ string.shapes
+
+
+def relative_error(model: FGRU | FRNN, string: StringModes, steps: int, skipped: int = 0) -> float:
+    """Mean square error, relative, of frames `skipped` + 1 … `steps` of four strings."""
+    initial = torch.randn(4, len(string.shapes), generator=torch.Generator().manual_seed(0), dtype=torch.float64) / 2
+    truth = motion(string, initial, steps)
+    with torch.no_grad():
+        found = model((initial @ string.shapes).float(), steps).double()
+    return float((found - truth)[:, skipped:].square().sum() / truth[:, skipped:].square().sum())
+
+
+def fgru(string: StringModes, points: int = POINTS, width: int = 24) -> FGRU:
+    model = FGRU(FGRUConfiguration(points, width))
+    model.store_modes(string)
+    return model
+
+
+def frnn(string: StringModes, width: int = 8, depth: int = 3) -> FRNN:
+    model = FRNN(FRNNConfiguration(POINTS, width, depth))
+    model.store_modes(string)
+    return model
+
+
+@pytest.mark.parametrize("count", [4, 5])
+def test_an_frnn_is_a_linear_string(count: int) -> None:
+    string = modes(count=count)
+    assert relative_error(frnn(string), string, 300) < 1e-7
+
+
+def test_an_fgru_is_a_linear_string() -> None:
+    """But for its first frame, which it has no state for yet."""
+    assert relative_error(fgru(modes()), modes(), 300, skipped=1) < 1e-4
+    assert relative_error(fgru(modes()), modes(), 10) < 1e-2
+
+
+def test_an_fgru_follows_the_squares() -> None:
+    """The mean over a period is what the closed form has: what swings within one is left."""
+    string = modes(2e-4)
+    assert relative_error(fgru(string), string, 300) < 0.02
+    assert relative_error(fgru(modes()), string, 300) > 0.1
+
+
+def test_a_shared_coupling_is_found_again() -> None:
+    string = modes(1e-3)
+    everyone, others, own = shared_coupling(string.coupling, string.squares)
+    found = everyone[:, None] * others * (1 + own * torch.eye(5))
+    torch.testing.assert_close(found, string.coupling, rtol=0.02, atol=1e-4)
+    assert own == pytest.approx(0.5, abs=0.02)
+
+
+def test_kernels_pass_spread_and_gather() -> None:
+    shape = torch.rand(POINTS, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    kernels = Kernels(POINTS, 4)
+    kernels.pass_on(0, 1, 2.0, lag=-3)
+    kernels.spread(0, POINTS - 1, 2, shape)
+    kernels.gather(0, 3, 7, shape)
+    kernels.bias[5, 0] = 1.5
+    layer = FourierConvolution(POINTS, 4).double()
+    kernels.store(layer.weight, layer.bias)
+    field = torch.zeros(1, POINTS, 4, dtype=torch.float64)
+    field[0, -1, 0] = 3.0
+    with torch.no_grad():
+        found = layer(field)[0]
+    expected = torch.zeros(POINTS, 4, dtype=torch.float64)
+    expected[5, 0], expected[-4, 1], expected[:, 2] = 1.5, 6.0, 3 * shape
+    torch.testing.assert_close(found[:, :3], expected[:, :3], rtol=0, atol=1e-12)
+    assert float(found[7, 3]) == pytest.approx(3 * float(shape[-1]))
+
+
+def test_a_string_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(ValueError, match="5 modes need a width of 7 and a depth of 3, not 6 and 3"):
+        frnn(modes(), width=6)
+    with pytest.raises(ValueError, match="not 8 and 2"):
+        frnn(modes(), depth=2)
+    with pytest.raises(ValueError, match="5 modes need a width of 16 and 16 points"):
+        fgru(modes(), width=15)
+    with pytest.raises(ValueError, match="5 modes need a width of 16 and 16 points"):
+        fgru(modes(points=15), points=15)
