@@ -14,9 +14,9 @@ import torch
 from torch import Tensor
 
 from engine.pluck import FULL_SCALE_M
-from engine.preset import Preset, PresetInfo
-from engine.reference import ModalState, SplittingSolver
+from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
+from engine.truth import ModalState, SplittingSolver
 
 SILENCE = 1e-9  # of a mode, of all: what the truth leaves out is 180 dB down
 RUNAWAY_FACTOR = 20.0  # a string let go never exceeds about its initial peak

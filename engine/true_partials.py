@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 
 from engine.partials import phasors
-from engine.reference import ModalState, SplittingSolver
 from engine.resonators.base import Resonator
+from engine.truth import ModalState, SplittingSolver
 
 OVERSAMPLING = 4  # of the truth whose phasors are wanted
 

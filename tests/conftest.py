@@ -9,7 +9,7 @@ import torch
 
 from engine.models import KoopmanVar, KoopmanVarConfiguration
 from engine.models.base import Physics
-from engine.preset import PresetInfo, TrainedRange, save_preset
+from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
 from engine.schema import write
 

@@ -24,10 +24,10 @@ from engine.partials import (
     track_partials,
 )
 from engine.pluck import DEFAULT_LISTEN
-from engine.reference import ModalState, SplittingSolver
 from engine.resonators.sine_transform import listening_weights
 from engine.spectra import spectral_distances
 from engine.true_partials import true_phasors
+from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration
 from training.data.dataset import Dataset, draw_initial, split_rows
 from training.fitting.losses import KoopmanModel

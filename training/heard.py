@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.audible import FLOOR_DB, AudibleErrors, audible_errors
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, Pluck
-from engine.preset import Preset, PresetInfo, preset_digest
+from engine.presets import Preset, PresetInfo, preset_digest
 from engine.sources import ModelSource, Runaway
 from engine.voices import Ear, model_program, render_voice, truth_program
 from training.heard_file import Heard

@@ -10,7 +10,7 @@ from typing import Any
 
 from engine.metrics import ErrorSums
 from engine.models import StringModel
-from engine.preset import PresetInfo, load_preset
+from engine.presets import PresetInfo, load_preset
 from engine.schema import read
 from training.configuration import TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset

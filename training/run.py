@@ -26,14 +26,14 @@ from engine.excitation import (
 )
 from engine.metrics import ErrorSums, RelativeError
 from engine.models import MODELS
-from engine.preset import Preset, PresetInfo, TrainedRange, load_preset, save_preset
+from engine.presets import Preset, PresetInfo, TrainedRange, load_preset, save_preset
 from engine.schema import read, write
 from engine.whole_file import whole_file
 from training import provenance
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
-from training.fitting.fit import Diverged, FitResult, Progress, fit, initialisation_of
+from training.fitting.fit import Diverged, FitResult, Progress, fit, initialisation_of, knowledge_of
 from training.results import QUARTERS, Row
 from training.row_errors import row_errors
 
@@ -249,6 +249,7 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         scale_m=dataset.scale_m,
         trained_range=trained_range(data),
         initialisation=initialisation_of(configuration),
+        knows=knowledge_of(configuration),
         seed=recipe.seed,
         rel_mse=validation.rel_mse,
         rel_mae=validation.rel_mae,

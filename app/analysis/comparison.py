@@ -14,7 +14,7 @@ from app.presets.library import PresetEntry
 from app.rendering.job import BLOCK_FRAMES
 from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
-from engine.preset import PresetInfo, load_preset
+from engine.presets import PresetInfo, load_preset
 from engine.resonators.sine_transform import listening_weights, synthesis_matrix, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
 

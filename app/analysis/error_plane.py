@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from app.analysis.job import Job
 from engine.metrics import ErrorSums
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
-from engine.preset import Preset
-from engine.reference import default_substeps
+from engine.presets import Preset
 from engine.sources import TruthSource, project
+from engine.truth import default_substeps
 
 SMALLEST_AMPLITUDE_MM = 0.5
 STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level

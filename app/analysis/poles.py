@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.models.eigenvalues import VANISHED
-from engine.preset import Preset, PresetInfo
+from engine.presets import Preset, PresetInfo
 
 NEPERS_OF_60_DB = math.log(1000)
 

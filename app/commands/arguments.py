@@ -10,7 +10,7 @@ import typer
 from engine import pluck as plucks
 
 if TYPE_CHECKING:
-    from engine.preset import Preset
+    from engine.presets import Preset
 
 PresetName = Annotated[str, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -46,6 +46,6 @@ def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width
 def open_preset(name_or_path: str) -> Preset:
     """The preset of a name (the user's own among them) or a path. Raises PresetError."""
     from app.presets.folders import usable_files
-    from engine.preset import find_preset, load_preset
+    from engine.presets import find_preset, load_preset
 
     return load_preset(find_preset(name_or_path, usable_files()))

@@ -58,7 +58,7 @@ def batch(
     from app.export.batch import INDEX, BatchPlan, run_batch
     from app.export.wav import WavSettings
     from app.presets.folders import usable_files
-    from engine.preset import find_preset
+    from engine.presets import find_preset
 
     files = usable_files()
     paths = tuple(find_preset(name, files) for name in _words(presets))

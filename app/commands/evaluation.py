@@ -21,7 +21,7 @@ from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
     from app.commands.console import Report
-    from engine.preset import Preset
+    from engine.presets import Preset
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
 
@@ -128,7 +128,7 @@ def evaluate(
 def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: bool) -> None:
     from app.commands.heard import show_heard
     from app.presets.folders import usable_files
-    from engine.preset import find_preset
+    from engine.presets import find_preset
 
     if everything == (preset is not None):
         raise typer.BadParameter("give a preset, or --all for all of them", param_hint="PRESET")

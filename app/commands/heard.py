@@ -21,7 +21,7 @@ def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
         write: keep it in the table beside each preset.
     """
     from app.presets.heard_words import heard_word
-    from engine.preset import PresetError
+    from engine.presets import PresetError
     from engine.schema import write as plain
 
     found = []
@@ -58,7 +58,7 @@ def measure(path: Path, write: bool, report: Callable[[float], None] = lambda sh
         PresetError, ValueError: it cannot be used, or not be let go from rest.
         OSError: the table cannot be written.
     """
-    from engine.preset import load_preset
+    from engine.presets import load_preset
     from training.heard import listen_to
     from training.heard_file import add_heard
 

@@ -32,7 +32,7 @@ PRESET_FIELDS = (
 def presets(json: Json = False) -> None:
     """List the presets, the user's own among them. A broken file is told on standard error and hides no other."""
     from app.presets.folders import usable_files
-    from engine.preset import PresetError
+    from engine.presets import PresetError
     from training.heard_file import read_heard
 
     files = usable_files()
@@ -72,7 +72,7 @@ def models(json: Json = False) -> None:
 
 def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
     from app.presets.heard_words import heard_word
-    from engine.preset import described_parameters, preset_digest, read_info
+    from engine.presets import described_parameters, preset_digest, read_info
 
     info = read_info(path)
     values = (

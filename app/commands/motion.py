@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from app.commands.arrays import Motion
     from engine.metrics import ErrorSums
     from engine.pluck import Pluck
-    from engine.preset import Preset, PresetInfo
+    from engine.presets import Preset, PresetInfo
 
 InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
@@ -123,7 +123,7 @@ def compare(
 
 
 def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
-    from engine.preset import outside_training
+    from engine.presets import outside_training
 
     info = preset.info
     seconds = steps / info.rate_hz
@@ -183,8 +183,8 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 
 def _fast(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
     from app.commands.arrays import blocks_of
-    from engine.reference import ModalState, SplittingSolver
     from engine.resonators import StringParameters
+    from engine.truth import ModalState, SplittingSolver
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
         string = StringParameters().resonator(
@@ -203,8 +203,8 @@ def _fast(tension_modulated: bool, rate_hz: float, modes: int, steps: int, subst
 
 
 def _dop853(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
-    from engine.reference import ModalState, solve_dop853
     from engine.resonators import StringParameters
+    from engine.truth import ModalState, solve_dop853
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
         string = StringParameters().resonator(

@@ -15,7 +15,7 @@ from engine.pluck import DEFAULT_LISTEN
 if TYPE_CHECKING:
     from app.export.files import SoundRequest, WavReport
     from app.export.wav import WavSettings
-    from engine.preset import Preset
+    from engine.presets import Preset
 
 Value = TypeVar("Value")
 SILENT_DB = -120.0
@@ -139,7 +139,7 @@ def _render_again(file: Path, out: Path | None) -> None:
     from app.export.recipe import changed_preset_notice, preset_of, read_recipe
     from app.presets.folders import usable_files
     from app.shared.version import program_version
-    from engine.preset import load_preset
+    from engine.presets import load_preset
 
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, usable_files())
@@ -168,7 +168,7 @@ def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
 
 
 def _notes(request: SoundRequest, written: WavReport) -> list[str]:
-    from engine.preset import outside_training
+    from engine.presets import outside_training
 
     info = request.preset.info
     notes = []

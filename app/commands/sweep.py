@@ -123,7 +123,7 @@ def measure(
 
     Nothing is trained, and no figure that a row has is changed.
     """
-    from engine.preset import find_preset, preset_files, read_info
+    from engine.presets import find_preset, preset_files, read_info
     from training.results import RESULTS, add_rows, read_results
     from training.row_errors import configuration_of, filled
 

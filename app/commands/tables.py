@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from app.commands.console import Report
-    from engine.preset import Preset
+    from engine.presets import Preset
 
 figure = typer.Typer(help="Draw presets beside the truth: PNG, SVG or PDF.", no_args_is_help=True)
 

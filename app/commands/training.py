@@ -71,7 +71,7 @@ def train(
     """
     import torch
 
-    from engine.preset import SHIPPED
+    from engine.presets import SHIPPED
     from training.by_name import load
     from training.cell import Cell
     from training.run import default_runs, run_row

@@ -22,7 +22,7 @@ from app.export.wav import WavSettings
 from app.shared.vocabulary import Pickup, Source
 from engine.metrics import relative_error
 from engine.pluck import Pluck
-from engine.preset import Preset, PresetError, load_preset
+from engine.presets import Preset, PresetError, load_preset
 from engine.sources import Runaway
 
 BatchProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known

@@ -31,7 +31,7 @@ from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import BITS, Bits
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine.pluck import Pluck
-from engine.preset import PresetError
+from engine.presets import PresetError
 
 END_OF_TRAINING = "end of training"  # the marker's name
 DECAY_FADE_S = 0.05  # where a sound ends by its decay

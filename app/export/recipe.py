@@ -14,7 +14,7 @@ from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import Bits, Pickup, Source
 from engine.pluck import Pluck
-from engine.preset import Preset, PresetError, preset_digest
+from engine.presets import Preset, PresetError, preset_digest
 from engine.sources import FULL_SCALE_M
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from engine.pluck import Pluck
-from engine.preset import Preset
+from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
 from engine.voices import Ear, model_program, render_voice, truth_program
 

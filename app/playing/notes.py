@@ -24,7 +24,7 @@ from app.playing.stroke import Mix, Stroke
 from app.shared.thread_priority import Rank, step_back
 from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
-from engine.preset import PresetError
+from engine.presets import PresetError
 from engine.voices import Ear, Mixer, Voice, render_voice
 
 MOST_NOTES = 24  # that ring at once; the oldest makes room

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from app.rendering.loaded import Loaded
 from engine.pluck import Pluck
-from engine.preset import load_preset
+from engine.presets import load_preset
 from engine.sources import project
 from engine.voices import Program, model_program, truth_program
 

@@ -18,7 +18,7 @@ def user_folder() -> Path:
 
 def usable_files() -> list[Path]:
     """The files that names mean, by name: of two of one name, the shipped one."""
-    from engine import preset
+    from engine.presets import SHIPPED, preset_files
 
-    files = {path.stem: path for folder in (user_folder(), preset.SHIPPED) for path in preset.preset_files(folder)}
+    files = {path.stem: path for folder in (user_folder(), SHIPPED) for path in preset_files(folder)}
     return [files[name] for name in sorted(files)]

@@ -8,7 +8,7 @@ from itertools import count
 from pathlib import Path
 
 from app.shared.whole_file import WriteError, explain, whole_file
-from engine.preset import PresetError, load_preset, preset_digest
+from engine.presets import PresetError, load_preset, preset_digest
 from engine.sources import ModelSource
 
 SUFFIX = ".safetensors"

@@ -9,7 +9,7 @@ from pathlib import Path
 from psygnal import Signal
 
 from app.presets.folders import user_folder
-from engine.preset import (
+from engine.presets import (
     SHIPPED,
     PresetError,
     PresetInfo,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from engine.preset import PresetInfo
+from engine.presets import PresetInfo
 
 _MODELS = {
     "dmd": ("DMD", "fixed partials fitted to the data: each has one frequency and one decay"),

@@ -17,7 +17,7 @@ from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.take import SOURCES, Motion, Take
 from app.shared.vocabulary import OTHER
 from engine.metrics import ErrorSums
-from engine.preset import PresetError
+from engine.presets import PresetError
 
 Block = NDArray[np.float32]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.pluck import Pluck
-from engine.preset import PresetInfo
+from engine.presets import PresetInfo
 from engine.sources import Runaway, StringSource, project
 
 

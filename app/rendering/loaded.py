@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from engine.preset import Preset
+from engine.presets import Preset
 from engine.sources import ModelSource, TruthSource
 
 

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from engine.pluck import Pluck
-from engine.preset import PresetInfo
+from engine.presets import PresetInfo
 from engine.resonators.sine_transform import listening_weights
 
 SOURCES = ("model", "truth")

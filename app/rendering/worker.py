@@ -16,7 +16,7 @@ from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, step_back
-from engine.preset import PresetError
+from engine.presets import PresetError
 
 TIDY_AFTER_S = 1.0  # without anything to render
 IN_STEP_S = 0.5  # for so long a motion keeps step with its sound

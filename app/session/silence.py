@@ -11,7 +11,7 @@ from app.rendering import Take
 from app.session.choices import VOLUME_RANGE_DB, Choices
 from app.session.ears import heard_ear
 from app.session.slots import other_preset
-from engine.preset import outside_training
+from engine.presets import outside_training
 from engine.resonators.sine_transform import to_modes
 
 FAINT_DB = -70.0  # below full scale nobody hears a thing

@@ -44,7 +44,7 @@ from app.window.panels.rack import fill
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.settings import Settings, save_settings
-from engine.preset import SHIPPED, PresetError
+from engine.presets import SHIPPED, PresetError
 
 FRAME_MS = 16
 IDLE_MS = 100  # between two looks while nothing moves

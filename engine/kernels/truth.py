@@ -1,4 +1,4 @@
-"""A voice of the solved string: the splitting scheme of `engine.reference.splitting`, heard at two points."""
+"""A voice of the solved string: the splitting scheme of `engine.truth.splitting`, heard at two points."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from engine.kernels import cache, layout
 from engine.models import StringModel, build_model
 from engine.models.base import Physics
 from engine.pluck import Pluck
-from engine.preset import PresetInfo, TrainedRange
+from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import StringParameters
 from engine.sources import TruthSource, project
@@ -100,7 +100,7 @@ def _sound(voice: Voice) -> None:
 def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
     model = build_model(name, sizes)
     physics = Physics(INFO.resonator, INFO.rate_hz)
-    model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
+    model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
     return model.eval()
 
 

@@ -12,6 +12,7 @@ final subclass of `StringModel`, and one line in `engine/models/__init__.py`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -22,6 +23,7 @@ from engine.models.inputs import second_at_rest
 from engine.resonators.base import Resonator
 
 State = TypeVar("State")
+LINEAR_STRING = "its modes at rest: shapes, frequencies, decays"  # what a start "physics" is told
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,16 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
     grid_points: int
     configuration: Any  # the frozen dataclass that it was built from
-    initialisations: ClassVar[tuple[str, ...]]  # the first is the source's own
+    # by name what a start is told of the resonator, in words; empty: nothing. The first is the source's own.
+    initialisations: ClassVar[Mapping[str, str]]
     # names of parameters, or of their last parts, that a recipe gives a rate of their own
     eigenvalue_parameters: ClassVar[frozenset[str]] = frozenset()
     coupling_parameters: ClassVar[frozenset[str]] = frozenset()
+
+    @classmethod
+    def own_initialisation(cls) -> str:
+        """The one of the model's source."""
+        return next(iter(cls.initialisations))
 
     @abstractmethod
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:

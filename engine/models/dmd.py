@@ -20,7 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.models._diagonal import DiagonalModel, KoopmanState, dense
-from engine.models.base import Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
 
 _ROWS_AT_ONCE = 16_384  # of the Hankel matrix: bounds the memory of a fit
@@ -59,7 +59,7 @@ class DMD(DiagonalModel):
     Eigenvalues are float64: phases are exact at any frame. One may lie outside the unit circle: see `unstable`.
     """
 
-    initialisations: ClassVar = ("physics",)
+    initialisations: ClassVar = {"physics": LINEAR_STRING}
 
     def __init__(self, configuration: DMDConfiguration) -> None:
         super().__init__()

@@ -114,7 +114,7 @@ class FourierConvolution(nn.Module):
 class _FourierRecurrent(StringModel[FieldState]):
     """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
 
-    initialisations: ClassVar = ("paper",)
+    initialisations: ClassVar = {"paper": ""}
     kept_fields: int  # of a step, for its gradient
 
     def __init__(self, grid_points: int, width: int, kind: InputKind) -> None:

@@ -65,7 +65,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 
@@ -177,7 +177,11 @@ class _Segments(NamedTuple):
 class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     """See the module."""
 
-    initialisations: ClassVar = ("random", "physics", "averaging")
+    initialisations: ClassVar = {
+        "random": "",
+        "physics": LINEAR_STRING,
+        "averaging": f"{LINEAR_STRING}, and how tension couples them",
+    }
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
     coupling_parameters: ClassVar = frozenset({"K"})
 

@@ -30,7 +30,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 
@@ -67,7 +67,7 @@ class KoopmanConfiguration:
 class Koopman(DiagonalModel):
     """See the module."""
 
-    initialisations: ClassVar = ("paper", "physics")
+    initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: KoopmanConfiguration) -> None:

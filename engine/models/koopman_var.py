@@ -36,7 +36,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 
@@ -72,7 +72,7 @@ class KoopmanVar(DiagonalModel):
             computes every frame, as training does. The default leaves the displacement within 1e-5 of its peak.
     """
 
-    initialisations: ClassVar = ("paper", "physics")
+    initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: KoopmanVarConfiguration) -> None:

@@ -20,7 +20,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation
 from engine.models.inputs import InputKind, join_input
 
 CHUNK = 32  # steps between two exact carries; fewer cost more carries, more collect more rounding
@@ -307,7 +307,7 @@ class SSMState:
 class SSMString(StringModel[SSMState], ABC):
     """A first layer from the initial condition or an excitation, then blocks."""
 
-    initialisations: ClassVar = ("paper", "physics")
+    initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
 
     def __init__(self, kind: InputKind, first_layer: DiagonalSSM, blocks: Sequence[DiagonalSSM]) -> None:
         super().__init__()

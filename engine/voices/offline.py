@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.pluck import FULL_SCALE_M, Pluck
-from engine.preset import PresetInfo
+from engine.presets import PresetInfo
 from engine.sources import ModelSource, Runaway, project
 from engine.voices.ear import Ear
 from engine.voices.mixer import Mixer

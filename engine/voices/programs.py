@@ -22,8 +22,8 @@ from engine.models.base import StringModel
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M
-from engine.preset import PresetInfo
-from engine.reference import SplittingSolver, default_substeps
+from engine.presets import PresetInfo
+from engine.truth import SplittingSolver, default_substeps
 from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down

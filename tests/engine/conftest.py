@@ -15,7 +15,7 @@ from torch import Tensor
 from engine.kernels import layout as at
 from engine.models import KoopmanVar
 from engine.pluck import Pluck
-from engine.preset import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
+from engine.presets import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
 from engine.resonators.string import StringParameters
 from engine.sources import project
 from engine.voices import Ear, Mixer, Program, Voice, bank_program

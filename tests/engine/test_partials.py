@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from engine.partials import PartialErrors, PartialTrack, partial_errors, phasors, segment_frames, track_partials
-from engine.reference import ModalState, SplittingSolver
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, SplittingSolver
 
 RATE_HZ = 4000.0
 STRING = StringParameters()

@@ -7,10 +7,10 @@ import torch
 
 from engine.models import KoopmanVar
 from engine.pluck import Pluck
-from engine.preset import Preset, load_preset, read_info
-from engine.reference import ModalState, solve_dop853
+from engine.presets import Preset, load_preset, read_info
 from engine.resonators.sine_transform import listening_weights, to_grid, to_modes
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
+from engine.truth import ModalState, solve_dop853
 
 
 def both(preset_file: Path) -> tuple[StringSource, StringSource, torch.Tensor]:

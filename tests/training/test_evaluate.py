@@ -15,8 +15,8 @@ from torch import Tensor, nn
 
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
-from engine.reference import ModalState, SplittingSolver
 from engine.resonators.sine_transform import to_grid, to_modes
+from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model, evaluate_partials, evaluate_past_horizon
@@ -28,7 +28,7 @@ HORIZON_S = 0.025
 class Truth(StringModel[tuple[ModalState, int]]):
     """The solver as a model, louder by `gain`; from the frame `broken` on it is not a number."""
 
-    initialisations: ClassVar = ()
+    initialisations: ClassVar = {}
 
     def __init__(self, data: Dataset, gain: float = 1.0, broken: float = math.inf) -> None:
         super().__init__()
@@ -176,7 +176,7 @@ def test_kept_frames_of_a_stride_are_measured_alone(tmp_path: Path) -> None:
     physics = Physics(DATA.string.resonator(DATA.modes), DATA.rate_hz, every.scale_m)
     for name in ("koopman_integrated", "s5"):  # one knows any frame at once, one does not
         model = build_model(name, {"state_size": 16, "layers": 1, "hippo_blocks": 2} if name == "s5" else None)
-        model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
+        model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
         squared, absolute = evaluate_model(model, every, "validation").per_frame()
         kept_squared, kept_absolute = evaluate_model(
             model, replace(some, scale_m=every.scale_m), "validation"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from engine.preset import Preset, load_preset, preset_digest
+from engine.presets import Preset, load_preset, preset_digest
 from engine.sources import Runaway
 from training.heard import AMPLITUDES_MM, listen_to, standard_plucks
 from training.heard_file import COLUMNS, LARGEST_BYTES, METHOD, MOST_TOLD, NAME, Heard, add_heard, read_heard
@@ -190,7 +190,7 @@ def test_a_link_to_nowhere_is_no_table(tmp_path: Path) -> None:
 
 def test_the_shipped_table_knows_every_shipped_preset() -> None:
     """After a change of a preset: `learned-strings evaluate NAME --heard --write`."""
-    from engine.preset import SHIPPED, preset_files
+    from engine.presets import SHIPPED, preset_files
 
     known, problems = read_heard(SHIPPED)
     assert problems == []

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from engine.metrics import RelativeError
-from engine.preset import load_preset
+from engine.presets import load_preset
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import load_dataset

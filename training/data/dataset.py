@@ -23,8 +23,8 @@ from filelock import FileLock
 from torch import Tensor
 
 from engine.excitation import DRAWS
-from engine.reference import ModalState, SplittingSolver
 from engine.schema import write
+from engine.truth import ModalState, SplittingSolver
 from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
 
 CHUNK = 50  # trajectories a step of the progress

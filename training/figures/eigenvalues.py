@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from engine.models.eigenvalues import VANISHED
-from engine.preset import Preset, PresetError
+from engine.presets import Preset, PresetError
 from training.figures import motions, style
 
 REFERENCE = "#222222"

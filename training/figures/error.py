@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from engine.preset import Preset
+from engine.presets import Preset
 from training.figures import motions, style
 from training.figures.motions import Report
 

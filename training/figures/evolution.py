@@ -14,7 +14,7 @@ from torch import Tensor
 
 from engine.metrics import relative_error
 from engine.pluck import DEFAULT_LISTEN
-from engine.preset import Preset
+from engine.presets import Preset
 from engine.resonators.string import StringParameters
 from training.figures import motions, spectrum, style
 from training.figures.motions import Report

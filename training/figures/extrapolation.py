@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from engine.metrics import ErrorSums
 from engine.pluck import DEFAULT_LISTEN
-from engine.preset import Preset
+from engine.presets import Preset
 from training.figures import motions, spectrum, style
 from training.figures.motions import Report
 

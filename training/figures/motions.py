@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from engine.metrics import ErrorSums
-from engine.preset import Preset, PresetError
+from engine.presets import Preset, PresetError
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.schema import SchemaError, read
 from engine.sources import ModelSource, Runaway, SourceState, StringSource, TruthSource

@@ -37,6 +37,8 @@ LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
 PURSUIT = "matching pursuit"  # see `pursuit`
 BLIND_PURSUIT = "blind matching pursuit"
 PHASES = "phases of the displacement"  # see `phases`
+MODES_AND_RANGES = "its modes and the range of their frequencies"
+SYMMETRIES = "its symmetries and the number of its modes"
 TELL_EVERY_S = 5.0  # within an epoch
 
 
@@ -137,8 +139,15 @@ def initialisation_of(configuration: TrainingConfiguration) -> str:
     return PHASES if configuration.recipe.blind else _start(configuration)
 
 
+def knowledge_of(configuration: TrainingConfiguration) -> str:
+    """What a run's start is told of the string, in words; empty: nothing but the displacement."""
+    known = {LEAST_SQUARES: "", PURSUIT: MODES_AND_RANGES, BLIND_PURSUIT: SYMMETRIES, PHASES: SYMMETRIES}
+    start = initialisation_of(configuration)
+    return known[start] if start in known else MODELS[configuration.model][0].initialisations[start]
+
+
 def _start(configuration: TrainingConfiguration) -> str:
-    return configuration.recipe.initialisation or MODELS[configuration.model][0].initialisations[0]
+    return configuration.recipe.initialisation or MODELS[configuration.model][0].own_initialisation()
 
 
 def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringModel[Any]:

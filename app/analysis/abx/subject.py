@@ -8,7 +8,7 @@ from app.analysis.abx.record import HeardPluck
 from app.analysis.abx.sound import Candidate
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
-from engine.preset import preset_digest
+from engine.presets import preset_digest
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,7 @@ def _untrained(case: Case) -> StringModel[Any]:
     model = build_model(case.model, dict(case.sizes))
     physics = Physics(StringParameters().resonator(case.modes), case.rate_hz)
     # a string's modes fall silent one by one, which the integrated phase makes use of; a random ring would at once
-    how = "averaging" if "averaging" in model.initialisations else model.initialisations[0]
+    how = "averaging" if "averaging" in model.initialisations else model.own_initialisation()
     model.initialise(how, physics, torch.Generator().manual_seed(0))
     return model.eval()
 

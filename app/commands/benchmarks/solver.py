@@ -11,9 +11,9 @@ from torch import Tensor
 
 from app.commands.benchmarks.machine import Machine, median_s, one_thread
 from engine.pluck import Pluck
-from engine.reference import ModalState, SplittingSolver, solve_dop853
 from engine.resonators.string import StringParameters
 from engine.sources import SILENCE
+from engine.truth import ModalState, SplittingSolver, solve_dop853
 from training.configuration import DatasetConfiguration
 from training.data.dataset import draw_initial
 

@@ -52,7 +52,7 @@ def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
 def _step_s(name: str, frames: int) -> float:
     model = build_model(name)
     physics = Physics(StringParameters().resonator(10), 4_000)
-    model.initialise(model.initialisations[0], physics, torch.Generator().manual_seed(0))
+    model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
     optimiser = torch.optim.AdamW(model.parameters())
     target = torch.randn(BATCH, frames, model.grid_points, generator=torch.Generator().manual_seed(0))
     batch = Batch(target[:, 0], None, torch.arange(1, frames + 1), target)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from app.commands.benchmarks.machine import Machine, one_thread
 from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, Pluck
-from engine.preset import SHIPPED, Preset, load_preset, preset_files
+from engine.presets import SHIPPED, Preset, load_preset, preset_files
 from engine.sources import ModelSource, StringSource, TruthSource, project
 from engine.voices import Ear, Mixer, Program, Voice, bank_program, truth_program
 from engine.voices.voice import ATTACK_S

@@ -29,7 +29,7 @@ from app.shared.vocabulary import Pickup
 from app.views.dialogs.export_job import ExportJob, Work
 from app.views.dialogs.export_pages import BatchPage, SoundPage, as_heard
 from app.views.dialogs.sound_form import SoundForm, wav_settings
-from engine.preset import load_preset
+from engine.presets import load_preset
 
 _RECIPE_NOTE = "Each file carries its recipe: drop it on the window, and its preset and pluck are restored."
 

@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from app.export.files import ExportCancelled, ExportError
 from app.export.recipe import RecipeError
 from app.shared.thread_priority import Rank, step_back
-from engine.preset import PresetError
+from engine.presets import PresetError
 from engine.sources import Runaway
 
 Tell = Callable[[float, str, float | None], None]  # share, what is done, seconds left where known

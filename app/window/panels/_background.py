@@ -23,7 +23,7 @@ from PySide6.QtCore import QObject, Qt, Signal, Slot
 from app.analysis.job import Cancelled, Job
 from app.rendering import Take
 from app.shared.thread_priority import Rank, step_back
-from engine.preset import PresetError
+from engine.presets import PresetError
 
 BREATH_S = 0.001  # between pieces of a job
 LOOK_AGAIN_S = 0.02

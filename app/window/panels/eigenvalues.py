@@ -11,7 +11,7 @@ from app.session.choices import Session
 from app.views.plots.eigenvalues_view import EigenvaluesView
 from app.window.panels._background import Background
 from app.window.panels.base import Moment, Panel
-from engine.preset import load_preset
+from engine.presets import load_preset
 
 
 class EigenvaluesPanel(Panel):

@@ -13,7 +13,7 @@ from app.views.plots.error_plane_view import ErrorPlaneView
 from app.window.panels._background import Background
 from app.window.panels.base import Moment, Panel
 from engine.pluck import Pluck
-from engine.preset import load_preset, preset_digest
+from engine.presets import load_preset, preset_digest
 
 MM = 1000.0
 SETTLED_S = 0.3  # a width that is still being turned is not computed

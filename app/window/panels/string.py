@@ -19,7 +19,7 @@ from app.views.string.view import StringView
 from app.window.panels.base import Moment, Panel
 from engine.metrics import ErrorSums
 from engine.pluck import SHAPES, WIDTH_RANGE
-from engine.preset import PresetInfo, outside_training
+from engine.presets import PresetInfo, outside_training
 
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch

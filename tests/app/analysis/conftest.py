@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.analysis.job import Cancelled
 from app.rendering import Take
 from engine.pluck import Pluck
-from engine.preset import read_info
+from engine.presets import read_info
 
 MakeTake = Callable[..., Take]
 

@@ -14,7 +14,7 @@ from app.analysis.comparison import ComparedRow, Trial, compare, same_string
 from app.analysis.job import Cancelled
 from app.presets.library import PresetEntry, list_presets
 from engine.pluck import Pluck
-from engine.preset import load_preset, save_preset
+from engine.presets import load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights
 from engine.sources import ModelSource, TruthSource, project
 

@@ -23,7 +23,7 @@ from app.analysis.error_plane import (
 from app.analysis.job import Cancelled
 from engine.metrics import relative_error
 from engine.pluck import Pluck
-from engine.preset import load_preset
+from engine.presets import load_preset
 from engine.sources import ModelSource, TruthSource, project
 
 

@@ -11,7 +11,7 @@ from app.rendering.take import Motion
 from app.rendering.velocity import Differentiator
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
-from engine.preset import PresetInfo, TrainedRange
+from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.string import StringParameters
 from engine.voices import Ear
 

@@ -13,14 +13,14 @@ import torch
 from app.analysis.poles import pole_figure
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.preset import Preset, load_preset
+from engine.presets import Preset, load_preset
 
 
 def of_family(path: Path, model: str) -> Preset:
     """The small preset with another model that starts from the physics."""
     preset = load_preset(path)
     made = build_model(model, {})
-    how = "physics" if "physics" in made.initialisations else made.initialisations[0]
+    how = "physics" if "physics" in made.initialisations else made.own_initialisation()
     info = preset.info
     made.initialise(how, Physics(info.string.resonator(info.modes), info.rate_hz), torch.Generator().manual_seed(0))
     return Preset(preset.name, path, replace(info, model=model), made.eval())

@@ -10,7 +10,7 @@ from app.rendering import Take
 from app.rendering.take import Motion
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
-from engine.preset import PresetInfo, TrainedRange
+from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.string import StringParameters
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,

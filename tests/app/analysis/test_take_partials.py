@@ -13,7 +13,7 @@ from app.analysis.job import Cancelled, Job
 from app.analysis.take_partials import take_partials
 from app.rendering import Take
 from engine.pluck import Pluck
-from engine.preset import PresetInfo, read_info
+from engine.presets import PresetInfo, read_info
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource, project
 

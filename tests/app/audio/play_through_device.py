@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from engine.pluck import Pluck
-from engine.preset import SHIPPED, load_preset
+from engine.presets import SHIPPED, load_preset
 from engine.sources import project
 from engine.voices import Ear, Mixer, Program, Voice, bank_program, truth_program
 

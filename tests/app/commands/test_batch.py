@@ -14,7 +14,7 @@ from app.export import batch, sound
 from app.export.batch import BatchPlan, ExportCancelled, run_batch
 from app.export.files import SoundRequest, export_sound
 from engine.pluck import Pluck
-from engine.preset import load_preset
+from engine.presets import load_preset
 from engine.sources import Runaway
 
 
@@ -25,7 +25,7 @@ def words(small_preset: Path, tmp_path: Path, folder: Path, monkeypatch: pytest.
     shipped.mkdir()
     for name in ("a", "b"):
         shutil.copy(small_preset, shipped / f"{name}.safetensors")
-    monkeypatch.setattr("engine.preset.SHIPPED", shipped)
+    monkeypatch.setattr("engine.presets.finding.SHIPPED", shipped)
     lists = ["--presets", "a,b", "--positions", "0.3, 0.45", "--amplitudes", "2"]
     return ["batch", *lists, "--seconds", 0.15, "--out", folder / "out"]
 

@@ -15,7 +15,7 @@ import torch
 from app.presets.heard_words import heard_word
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.preset import load_preset, preset_digest, save_preset
+from engine.presets import load_preset, preset_digest, save_preset
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.heard_file import read_heard
@@ -263,7 +263,7 @@ def test_all_presets_are_listened_to_and_a_broken_one_is_told(
     run, preset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (preset.parent / "broken.safetensors").write_bytes(b"not a preset")
-    monkeypatch.setattr("engine.preset.SHIPPED", preset.parent)
+    monkeypatch.setattr("engine.presets.finding.SHIPPED", preset.parent)
     told = run("evaluate", "--heard", "--all", "--write", "--json")
     assert told.status == 0
     assert [facts["name"] for facts in json.loads(told.out)] == ["tiny"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.preset import preset_digest
+from engine.presets import preset_digest
 from training.heard_file import NAME, Heard, add_heard
 
 
@@ -15,7 +15,7 @@ def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     """A folder of shipped presets with one good and one broken file."""
     shutil.copy(small_preset, tmp_path / "good.safetensors")
     (tmp_path / "broken.safetensors").write_bytes(b"not a preset")
-    monkeypatch.setattr("engine.preset.SHIPPED", tmp_path)
+    monkeypatch.setattr("engine.presets.finding.SHIPPED", tmp_path)
     return tmp_path
 
 

@@ -14,11 +14,11 @@ import torch
 from app.commands import arrays, motion
 from engine.metrics import relative_error
 from engine.pluck import Pluck
-from engine.preset import load_preset
-from engine.reference import ModalState, solve_linear
+from engine.presets import load_preset
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, TruthSource, project
+from engine.truth import ModalState, solve_linear
 
 
 def simulate(u0: Path, out: Path, string: str = "linear", steps: int = 200, modes: int = 10, *more: Any) -> list[Any]:

@@ -20,7 +20,7 @@ def installed(small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     shipped = tmp_path / "shipped"
     shipped.mkdir()
     shutil.copy(small_preset, shipped / "good.safetensors")
-    monkeypatch.setattr("engine.preset.SHIPPED", shipped)
+    monkeypatch.setattr("engine.presets.finding.SHIPPED", shipped)
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
     return shipped / "good.safetensors"
 

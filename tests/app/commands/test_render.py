@@ -14,7 +14,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from engine.preset import LARGEST_FILE_BYTES, METADATA_KEY
+from engine.presets.file import LARGEST_FILE_BYTES, METADATA_KEY
 
 
 def render(preset: object, out: Path, *more: Any, position: float = 0.4, amplitude_mm: float = 3) -> list[Any]:
@@ -142,7 +142,7 @@ def _not_finite(tensors: Tensors, facts: dict[str, Any]) -> None:
 
 
 def _newer(tensors: Tensors, facts: dict[str, Any]) -> None:
-    facts["format_version"] = 2
+    facts["format_version"] = 99
 
 
 def _impossible(tensors: Tensors, facts: dict[str, Any]) -> None:
@@ -156,7 +156,7 @@ def _impossible(tensors: Tensors, facts: dict[str, Any]) -> None:
         (_re_typed, "tensor 'nu_log' is of type F64, expected F32"),
         (_re_shaped, "tensor 'nu_log' has shape (15,), expected (16,)"),
         (_not_finite, "tensor 'nu_log' holds values that are not finite"),
-        (_newer, "format_version 2 is newer than this program's 1; update the program"),
+        (_newer, "format_version 99 is newer than this program's 2; update the program"),
         (_impossible, "rate_hz must be above 0"),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from app.presets.heard_words import heard_word
-from engine.preset import load_preset, preset_digest
+from engine.presets import load_preset, preset_digest
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
 

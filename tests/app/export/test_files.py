@@ -30,7 +30,7 @@ from app.export.recipe import Recipe
 from app.export.wav_chunks import Marker, read_markers
 from app.playing.ahead import AheadVoice
 from engine.pluck import FULL_SCALE_M_S, Pluck
-from engine.preset import SHIPPED, load_preset
+from engine.presets import SHIPPED, load_preset
 from engine.resonators.sine_transform import listening_weights
 from engine.sources import FULL_SCALE_M, ModelSource, TruthSource, project
 from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program

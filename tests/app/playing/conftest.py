@@ -13,7 +13,7 @@ from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.playing.stroke import Stroke
 from engine.pluck import Pluck
-from engine.preset import SHIPPED
+from engine.presets import SHIPPED
 from engine.voices import Ear, Mixer
 
 DEADLINE_S = 30.0

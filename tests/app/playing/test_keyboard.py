@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.playing.keyboard import KeyPress, Reach, place_of, play
-from engine.preset import read_info
+from engine.presets import read_info
 
 REACH = Reach((0.3, 0.7), (1.0, 10.0))
 

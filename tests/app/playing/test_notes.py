@@ -21,7 +21,7 @@ from app.playing.stroke import Mix, Stroke
 from engine.kernels import layout as at
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
-from engine.preset import load_preset, save_preset
+from engine.presets import load_preset, save_preset
 from engine.voices import Ear, Mixer, Voice
 
 RATE_HZ = 48_000

@@ -13,7 +13,7 @@ import pytest
 from app.playing import sources as module
 from app.playing.sources import Sources
 from engine.pluck import Pluck
-from engine.preset import Preset, PresetError, load_preset
+from engine.presets import Preset, PresetError, load_preset
 from engine.sources import project
 
 RATE_HZ = 8_000

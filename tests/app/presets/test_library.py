@@ -17,7 +17,7 @@ from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, list_presets
 from app.window.dropped_files import receive
 from engine.pluck import Pluck
-from engine.preset import load_preset, preset_digest
+from engine.presets import load_preset, preset_digest
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
 

@@ -11,7 +11,7 @@ from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
 from app.session.ears import drawn_ear
 from app.session.shown import DEFAULT_SOURCES, full_scale_words, part_words, readable_unit, shown_sources
-from engine.preset import read_info
+from engine.presets import read_info
 
 
 @pytest.fixture

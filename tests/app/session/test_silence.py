@@ -13,7 +13,7 @@ from app.rendering import Take
 from app.session.choices import Choices
 from app.session.silence import why_difference_silent, why_ran_away, why_silent
 from engine.pluck import Pluck
-from engine.preset import read_info
+from engine.presets import read_info
 
 
 @pytest.fixture

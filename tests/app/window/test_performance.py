@@ -24,7 +24,7 @@ from app.window.settings import Settings
 from engine.kernels.layout import QUANTUM
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
-from engine.preset import SHIPPED
+from engine.presets import SHIPPED
 from engine.voices import Mixer
 
 RATE_HZ = 48_000

@@ -16,7 +16,7 @@ from app.views.dialogs.preset_browser import PresetBrowser
 from app.window.controller import Controller
 from app.window.settings import FIRST_FAVOURITES, load_settings
 from engine.pluck import Pluck
-from engine.preset import load_preset, preset_digest, preset_files
+from engine.presets import load_preset, preset_digest, preset_files
 from training.heard_file import Heard, add_heard
 
 KEY = Qt.Key

@@ -15,10 +15,10 @@ from torch import Tensor
 from engine.models import KoopmanIntegrated
 from engine.models.dmd import DMD, DMDConfiguration
 from engine.pluck import FULL_SCALE_M, Pluck
-from engine.preset import Preset, PresetInfo
-from engine.reference import ModalState, SplittingSolver, solve_linear
+from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import ModelSource
+from engine.truth import ModalState, SplittingSolver, solve_linear
 from engine.voices import Ear, Mixer, Voice, bank_program
 
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"

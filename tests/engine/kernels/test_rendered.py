@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from app.rendering.velocity import Differentiator
 from engine.kernels.layout import QUANTUM
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
-from engine.preset import PresetInfo
+from engine.presets import PresetInfo
 from engine.voices import Ear, Mixer, Program, Voice, plain_program, rendered_program
 
 RATE_HZ = 48_000

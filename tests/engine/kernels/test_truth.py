@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.pluck import FULL_SCALE_M, Pluck
-from engine.preset import Preset, PresetInfo
-from engine.reference import ModalState, solve_dop853, solve_linear
+from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource
+from engine.truth import ModalState, solve_dop853, solve_linear
 from engine.voices import Ear, Voice, truth_program
 
 STEREO = Ear((0.37, 0.8))

@@ -14,7 +14,7 @@ from engine.kernels import layout as at
 from engine.kernels.voice import MOVE_QUANTA
 from engine.models import KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
-from engine.preset import Preset, PresetInfo
+from engine.presets import Preset, PresetInfo
 from engine.voices import Ear, Mixer, Voice, bank_program, plain_program, truth_program
 from engine.voices.voice import FADE_S
 

@@ -12,7 +12,7 @@ import torch
 from engine.models import MODELS, StringModel, build_model, count_parameters
 from engine.models.base import Physics
 from engine.pluck import Pluck
-from engine.preset import load_preset, read_info, save_preset
+from engine.presets import load_preset, read_info, save_preset
 from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, write
@@ -31,7 +31,7 @@ PHYSICS = Physics(StringParameters().resonator(10), 4_000)
 
 def made(name: str, seed: int = 0) -> StringModel[Any]:
     model = build_model(name)
-    model.initialise(model.initialisations[0], PHYSICS, torch.Generator().manual_seed(seed))
+    model.initialise(model.own_initialisation(), PHYSICS, torch.Generator().manual_seed(seed))
     return model.eval()
 
 
@@ -99,7 +99,7 @@ def test_a_preset_of_it_renders_what_the_model_does(
         read_info(preset_file),
         model=name,
         model_configuration=write(model.configuration),
-        initialisation=model.initialisations[0],
+        initialisation=model.own_initialisation(),
     )
     path = tmp_path / f"{name}.safetensors"
     save_preset(path, info, model)
@@ -122,7 +122,7 @@ def test_sizes_are_checked_by_name() -> None:
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "dmd"])
 def test_a_velocity_can_be_given_and_at_rest_it_is_zero(name: str, preset_file: Path, tmp_path: Path) -> None:
     model = build_model(name, {"input": "displacement_velocity"})
-    model.initialise(model.initialisations[0], PHYSICS, torch.Generator().manual_seed(0))
+    model.initialise(model.own_initialisation(), PHYSICS, torch.Generator().manual_seed(0))
     info = replace(read_info(preset_file), model=name, model_configuration=write(model.configuration))
     path = tmp_path / f"{name}.safetensors"
     save_preset(path, info, model)

@@ -11,9 +11,9 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.dmd import DMD, DMDConfiguration
 from engine.models.inputs import InputKind
-from engine.reference import ModalState, SplittingSolver
 from engine.resonators.sine_transform import listening_weights, to_grid, to_modes
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, SplittingSolver
 
 STRING, MODES, RATE_HZ = StringParameters(), 25, 16_000
 

@@ -12,9 +12,9 @@ from engine.models import MODELS, IntegratedPhaseConfiguration, KoopmanIntegrate
 from engine.models._averaging import FIXED_POINT_STEPS
 from engine.models._cubics import integrate_parabolas
 from engine.models.base import Physics
-from engine.reference import ModalState, SplittingSolver, solve_linear
 from engine.resonators.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, SplittingSolver, solve_linear
 
 SMALL = {"encoder_widths": (12,), "eigenvalue_widths": (12, 12)}
 KINDS: tuple[dict, ...] = (

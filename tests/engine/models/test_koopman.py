@@ -9,9 +9,9 @@ import torch
 
 from engine.models.base import Physics, count_parameters
 from engine.models.koopman import SHARPEST, Koopman, KoopmanConfiguration
-from engine.reference import ModalState, solve_linear
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, solve_linear
 
 REFERENCE = Path(__file__).parent / "references" / "koopman.npz"
 PHYSICS = Physics(StringParameters().resonator(10), 4_000)

@@ -9,9 +9,9 @@ import torch
 from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters
 from engine.models.base import Physics
 from engine.models.inputs import InputKind
-from engine.reference import ModalState, SplittingSolver, solve_linear
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, SplittingSolver, solve_linear
 
 REFERENCE = Path(__file__).parent / "references" / "koopman_var.npz"
 

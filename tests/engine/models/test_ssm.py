@@ -8,9 +8,9 @@ import torch
 from engine.models import LRU, S5, LRUConfiguration, S5Configuration
 from engine.models.base import Physics
 from engine.models.ssm import SSMString, evolve, recur
-from engine.reference import ModalState, solve_linear
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, solve_linear
 
 PHYSICS = Physics(StringParameters().resonator(10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from engine.kernels import layout as at
 from engine.pluck import FULL_SCALE_M, Pluck
-from engine.preset import Preset, PresetInfo, load_preset
+from engine.presets import Preset, PresetInfo, load_preset
 from engine.sources import ModelSource, Runaway
 from engine.voices import (
     Ear,

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from engine.reference import ModalState, SplittingSolver
 from engine.resonators.sine_transform import analysis_matrix
+from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration, Recipe
 from training.data.batches import Batch, TrainingData, batches
 from training.data.dataset import START_EVERY, Dataset, load_dataset

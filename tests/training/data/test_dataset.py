@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from engine.reference import ModalState, SplittingSolver
+from engine.truth import ModalState, SplittingSolver
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration
 from training.data.dataset import START_EVERY, Dataset, dataset_folder, draw_initial, load_dataset, split_rows

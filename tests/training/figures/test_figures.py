@@ -16,10 +16,10 @@ from matplotlib.image import imread
 from engine.metrics import ErrorSums
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.preset import Preset, PresetError, PresetInfo, TrainedRange
-from engine.reference import ModalState, SplittingSolver
+from engine.presets import Preset, PresetError, PresetInfo, TrainedRange
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.schema import write
+from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import draw_initial
 from training.figures import evolution, extrapolation, motions, spectrum, style
@@ -44,7 +44,7 @@ def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, *
     fields: dict[str, Any] = {"initial": "gaussian", "rate_hz": 4000, "modes": 5, "steps": 50, "count": 30} | data
     c = DatasetConfiguration(**fields)
     built = build_model(model, SIZES[model])
-    how = "physics" if "physics" in built.initialisations else built.initialisations[0]
+    how = "physics" if "physics" in built.initialisations else built.own_initialisation()
     built.initialise(how, Physics(c.string.resonator(c.modes), c.rate_hz, 1e-3), torch.Generator().manual_seed(0))
     training = TrainingConfiguration("Tiny", model, c, Recipe(1), model_configuration=SIZES[model])
     info = PresetInfo(

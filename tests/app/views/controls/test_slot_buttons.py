@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
 from app.views.controls.slot_buttons import NARROW_WIDTH, WIDTH, SlotButtons
-from engine.preset import read_info
+from engine.presets import read_info
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.presets.library import PresetEntry
 from app.views.dialogs.preset_card import preset_card, preset_summary
-from engine.preset import read_info
+from engine.presets import read_info
 
 
 def test_the_test_split_stands_beside_validation(qapp: QApplication, small_preset: Path) -> None:

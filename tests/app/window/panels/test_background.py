@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 from app.analysis.job import Cancelled, Job
 from app.window.panels import _background
 from app.window.panels._background import Background
-from engine.preset import PresetError
+from engine.presets import PresetError
 
 NAME = "a thread of tests"
 

@@ -34,7 +34,7 @@ from app.window.panels import (
 )
 from app.window.panels.spectrum import EVERY
 from engine.pluck import Pluck
-from engine.preset import read_info
+from engine.presets import read_info
 from engine.voices import Ear
 
 LEFT = Qt.MouseButton.LeftButton

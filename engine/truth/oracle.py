@@ -7,8 +7,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from engine.reference.state import ModalState
 from engine.resonators.base import Resonator
+from engine.truth.state import ModalState
 
 
 def solve_dop853(

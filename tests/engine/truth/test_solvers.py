@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from engine.excitation import DRAWS, draw_noise
-from engine.reference import ModalState, SplittingSolver, default_substeps, solve_dop853, solve_linear
-from engine.reference.splitting import KICKS, ROTATIONS
 from engine.resonators.sine_transform import to_modes
 from engine.resonators.string import StringParameters
+from engine.truth import ModalState, SplittingSolver, default_substeps, solve_dop853, solve_linear
+from engine.truth.splitting import KICKS, ROTATIONS
 
 STRING = StringParameters()
 PROTOCOL = [("gaussian", 4_000, 10), ("noise", 4_000, 10), ("gaussian", 16_000, 25), ("noise", 16_000, 25)]

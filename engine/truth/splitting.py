@@ -17,9 +17,9 @@ from concurrent.futures import ThreadPoolExecutor
 import torch
 from torch import Tensor
 
-from engine.reference.linear import damped_rotation
-from engine.reference.state import ModalState
 from engine.resonators.base import Resonator
+from engine.truth.linear import damped_rotation
+from engine.truth.state import ModalState
 
 # Half of the palindromes: A₁ B₁ A₂ B₂ A₃ B₃ A₄ B₄ A₄ B₃ A₃ B₂ A₂ B₁ A₁.
 _A_HALF = (0.0711334264982231178, 0.241153427956640099, 0.521411761772814789, -0.333698616227678006)
@@ -137,7 +137,7 @@ class SplittingSolver:
 
     def _advance_compiled(self, q: Tensor, v: Tensor, out: Tensor) -> None:
         # compiles, or loads what it compiled earlier: only when it is needed
-        from engine.reference._splitting_kernel import advance
+        from engine.truth._splitting_kernel import advance
 
         constants = [t.numpy() for t in self.constants]
 

@@ -10,11 +10,9 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -22,98 +20,17 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from engine.models import MODELS, StringModel, build_model, count_parameters
-from engine.pluck import Pluck
-from engine.resonators.base import Resonator
-from engine.resonators.string import StringParameters
+from engine.presets.info import PresetInfo
+from engine.presets.migrations import UnknownVersion, migrated
 from engine.schema import SchemaError, read, write
 from engine.whole_file import whole_file
 
-FORMAT_VERSION = 1
 METADATA_KEY = "learned_strings"
 LARGEST_FILE_BYTES = 256 * 2**20
-SHIPPED = Path(__file__).parents[1] / "presets"
 
 
 class PresetError(ValueError):
     """A preset that cannot be used. The message names the file, what is wrong with it and the remedy."""
-
-
-@dataclass(frozen=True)
-class TrainedRange:
-    """What the initial displacements of the training set covered; None: not a parameter of that kind.
-
-    Attributes:
-        tension_rise: the largest ΔT/T₀, to which draws were softened; None: they were left as drawn.
-    """
-
-    position: tuple[float, float] | None
-    width: tuple[float, float] | None
-    peak_m: tuple[float, float]
-    tension_rise: float | None = None
-
-
-@dataclass(frozen=True)
-class PresetInfo:
-    """What a preset says of itself.
-
-    Attributes:
-        horizon_steps: number of frames after the initial one that the model was trained on.
-        modes: modes kept in the training data; the initial displacement is projected on them.
-        scale_m: the model's unit of displacement.
-        rel_mse, rel_mae: validation errors over the horizon (the paper's metrics), test errors beside them.
-        training: the complete training configuration, so that the run can be repeated.
-    """
-
-    title: str
-    model: str
-    model_configuration: dict[str, Any]
-    string: StringParameters
-    tension_modulated: bool
-    initial: Literal["gaussian", "noise", "pluck"]
-    rate_hz: int
-    modes: int
-    grid_points: int
-    horizon_steps: int
-    scale_m: float
-    trained_range: TrainedRange
-    initialisation: str
-    seed: int
-    rel_mse: float | None = None
-    rel_mae: float | None = None
-    test_rel_mse: float | None = None
-    test_rel_mae: float | None = None
-    training_seconds: float | None = None
-    training: dict[str, Any] = field(default_factory=dict)
-    description: str = ""
-    licence: str = "MIT"
-    format_version: int = FORMAT_VERSION
-
-    def __post_init__(self) -> None:
-        if self.model not in MODELS:
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
-        for name in ("rate_hz", "modes", "horizon_steps", "scale_m"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
-        if self.rate_hz > 1_000_000:
-            raise ValueError(f"rate_hz must be at most 1000000, not {self.rate_hz}")
-        if not 3 <= self.grid_points <= 10_001 or self.modes > self.grid_points - 2:
-            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
-
-    @property
-    def horizon_s(self) -> float:
-        return self.horizon_steps / self.rate_hz
-
-    @cached_property
-    def resonator(self) -> Resonator:
-        """What its model learned, at rest and with the tension that it knows."""
-        return self.string.resonator(
-            self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
-        )
-
-    @property
-    def string_kind(self) -> str:
-        """The command line's word: "linear" or "nonlinear"."""
-        return "nonlinear" if self.tension_modulated else "linear"
 
 
 @dataclass(frozen=True)
@@ -212,62 +129,6 @@ def _digest(path: Path, changed_ns: int, size_bytes: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
-    """How a pluck differs from what the preset was trained on, in plain words; empty where it does not."""
-    if info.initial == "noise":
-        found = [f"a {pluck.shape.replace('_', ' ')} pluck is not the noise that this preset was trained on"]
-    elif info.initial == "gaussian" and pluck.shape != "gaussian":
-        found = [f"shape {pluck.shape.replace('_', ' ')} is not the trained gaussian"]
-    elif pluck.shape == "triangular":
-        found = []  # it has no width
-    else:
-        found = _beyond("width", pluck.width, info.trained_range.width)
-    peak_mm = (1000 * info.trained_range.peak_m[0], 1000 * info.trained_range.peak_m[1])
-    return [
-        *_beyond("position", pluck.position, info.trained_range.position),
-        *found,
-        *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
-        *_too_tense(info, pluck),
-    ]
-
-
-def _too_tense(info: PresetInfo, pluck: Pluck) -> list[str]:
-    limit = info.trained_range.tension_rise
-    if limit is None:
-        return []
-    rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(pluck.displacement(info.grid_points))))
-    if rise <= limit:
-        return []
-    return [f"the pluck raises the tension by {rise:.0%}, beyond the trained {limit:.0%}: pull less, or wider"]
-
-
-def _beyond(name: str, value: float, trained: tuple[float, float] | None, unit: str = "") -> list[str]:
-    if trained is None or trained[0] <= value <= trained[1]:
-        return []
-    return [f"{name} {value:.4g}{unit} is outside the trained {trained[0]:g} … {trained[1]:g}{unit}"]
-
-
-def preset_files(*folders: Path) -> list[Path]:
-    """The preset files of the given folders (the shipped ones by default), by name."""
-    return sorted((p for folder in folders or (SHIPPED,) for p in folder.glob("*.safetensors")), key=lambda p: p.stem)
-
-
-def find_preset(name_or_path: str, files: Iterable[Path] | None = None) -> Path:
-    """The file of a preset given by its name among `files` (by default the shipped ones), or by path.
-
-    Raises:
-        PresetError: there is none; the message lists the names.
-    """
-    by_name = {path.stem: path for path in (preset_files() if files is None else files)}
-    if name_or_path in by_name:
-        return by_name[name_or_path]
-    path = Path(name_or_path)
-    if path.exists():
-        return path
-    known = ", ".join(by_name) or "none is installed"
-    raise PresetError(f"no preset {name_or_path!r}; give a file or one of: {known}")
-
-
 class _open:
     """`safe_open` with the file checked first and every failure told in our words."""
 
@@ -307,13 +168,12 @@ def _info_of(path: Path, file: Any) -> PresetInfo:
         data = json.loads(text)
     except json.JSONDecodeError as error:
         raise PresetError(f"{path}: metadata is not JSON ({error}); get the preset again") from error
-    version = data.get("format_version") if isinstance(data, dict) else None
-    if isinstance(version, int) and version > FORMAT_VERSION:
-        raise PresetError(
-            f"{path}: format_version {version} is newer than this program's {FORMAT_VERSION}; update the program"
-        )
-    if version != FORMAT_VERSION:
-        raise PresetError(f"{path}: format_version {version!r} is not known; get the preset again")
+    if not isinstance(data, dict):
+        raise PresetError(f"{path}: metadata is no JSON object; get the preset again")
+    try:
+        data = migrated(data)
+    except UnknownVersion as error:
+        raise PresetError(f"{path}: {error}") from error
     try:
         info = read(PresetInfo, data, "metadata")
         read(MODELS[info.model][1], info.model_configuration, "metadata.model_configuration")

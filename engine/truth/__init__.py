@@ -5,9 +5,9 @@
 `oracle`     SciPy's DOP853 at the paper's tolerances, slow: what the fast solver is checked against
 """
 
-from engine.reference.linear import solve_linear
-from engine.reference.oracle import solve_dop853
-from engine.reference.splitting import SplittingSolver, default_substeps
-from engine.reference.state import ModalState
+from engine.truth.linear import solve_linear
+from engine.truth.oracle import solve_dop853
+from engine.truth.splitting import SplittingSolver, default_substeps
+from engine.truth.state import ModalState
 
 __all__ = ["ModalState", "SplittingSolver", "default_substeps", "solve_dop853", "solve_linear"]

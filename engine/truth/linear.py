@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from engine.reference.state import ModalState
 from engine.resonators.base import Resonator
+from engine.truth.state import ModalState
 
 
 def damped_rotation(eigenvalues: Tensor, time_s: Tensor) -> Tensor:

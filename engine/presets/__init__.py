@@ -1,0 +1,35 @@
+"""Presets: trained weights with what they were trained on, in one safetensors file. Data, never code.
+
+info        what a preset says of itself
+file        the file and all its checks
+finding     which files there are
+migrations  from what earlier versions wrote
+"""
+
+from engine.presets.file import (
+    Preset,
+    PresetError,
+    described_parameters,
+    load_preset,
+    preset_digest,
+    read_info,
+    save_preset,
+)
+from engine.presets.finding import SHIPPED, find_preset, preset_files
+from engine.presets.info import PresetInfo, TrainedRange, outside_training
+
+__all__ = [
+    "SHIPPED",
+    "Preset",
+    "PresetError",
+    "PresetInfo",
+    "TrainedRange",
+    "described_parameters",
+    "find_preset",
+    "load_preset",
+    "outside_training",
+    "preset_digest",
+    "preset_files",
+    "read_info",
+    "save_preset",
+]

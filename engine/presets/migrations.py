@@ -1,0 +1,53 @@
+"""From what earlier versions wrote to what this one reads: a step for each version of the metadata.
+
+Every preset that was ever shipped loads for ever; weights are never changed on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+Metadata = dict[str, Any]
+
+# What starts of version 1 knew, by their names. Blind ones were given the symmetries and how many modes to look for.
+_BLIND = "its symmetries and the number of its modes"
+_LINEAR = "its modes at rest: shapes, frequencies, decays"
+_KNOWN_TO_VERSION_1 = {
+    "physics": _LINEAR,
+    "averaging": f"{_LINEAR}, and how tension couples them",
+    "matching pursuit": "its modes and the range of their frequencies",
+    "blind matching pursuit": _BLIND,
+    "phases of the displacement": _BLIND,
+}
+
+
+def _knows(data: Metadata) -> Metadata:
+    """1 → 2: what a training was told of the string stands in words of its own."""
+    return {**data, "knows": _KNOWN_TO_VERSION_1.get(str(data.get("initialisation")), "")}
+
+
+MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows}
+FORMAT_VERSION = max(MIGRATIONS) + 1
+
+
+class UnknownVersion(ValueError):
+    """No version that this program reads; the message says what to do."""
+
+
+def migrated(data: Metadata) -> Metadata:
+    """Metadata of any version so far, as this version writes it.
+
+    Raises:
+        UnknownVersion: it has none, or a newer one.
+    """
+    version = data.get("format_version")
+    if not isinstance(version, int) or isinstance(version, bool) or version < min(MIGRATIONS):
+        raise UnknownVersion(f"format_version {version!r} is not known; get the preset again")
+    if version > FORMAT_VERSION:
+        raise UnknownVersion(
+            f"format_version {version} is newer than this program's {FORMAT_VERSION}; update the program"
+        )
+    for step in range(version, FORMAT_VERSION):
+        data = {**MIGRATIONS[step](data), "format_version": step + 1}
+    return data

@@ -1,0 +1,84 @@
+"""Presets of every version load, and those that were shipped sound as they did then."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+
+from engine.pluck import Pluck
+from engine.presets import PresetError, load_preset, preset_digest, preset_files, read_info
+from engine.presets.file import METADATA_KEY
+from engine.presets.migrations import FORMAT_VERSION, MIGRATIONS, UnknownVersion, migrated
+from engine.sources import ModelSource, project
+
+SHIPPED = json.loads(Path(__file__).with_name("shipped.json").read_text(encoding="utf-8"))
+FRAMES = 64  # from the pluck on: enough to tell any other weights or any other reading of them
+EVERY = 8
+
+
+def beginning(path: Path) -> list[float]:
+    """The middle of the string in units of 10 µm, every so many frames after a pluck, from a preset's model."""
+    preset = load_preset(path)
+    source = ModelSource(preset)
+    pluck = Pluck(shape="gaussian", position=0.4, amplitude_mm=4.0, width=0.05)
+    state = source.start(project(pluck.displacement(preset.info.grid_points), preset.info.modes)[None])
+    frames, _ = source.advance(state, FRAMES)
+    return [round(float(value) * 1e5, 3) for value in frames[0, ::EVERY, preset.info.grid_points // 2]]
+
+
+@pytest.mark.parametrize("path", preset_files(), ids=lambda path: path.stem)
+def test_a_shipped_preset_sounds_as_it_did_when_it_was_shipped(path: Path) -> None:
+    """Where one is added or trained again: add what the message shows to shipped.json."""
+    digest = preset_digest(path)
+    assert digest in SHIPPED, f"not in shipped.json: {json.dumps(digest)}: {beginning(path)}"
+    np.testing.assert_allclose(beginning(path), SHIPPED[digest], rtol=0, atol=0.02)
+
+
+def test_the_chain_is_whole() -> None:
+    assert sorted(MIGRATIONS) == list(range(1, FORMAT_VERSION))
+
+
+@pytest.mark.parametrize(
+    ("initialisation", "knows"),
+    [
+        ("averaging", "its modes at rest: shapes, frequencies, decays, and how tension couples them"),
+        ("blind matching pursuit", "its symmetries and the number of its modes"),
+        ("paper", ""),
+    ],
+)
+def test_version_1_is_told_what_its_start_knew(initialisation: str, knows: str) -> None:
+    old = {"format_version": 1, "initialisation": initialisation, "title": "as it was"}
+    assert migrated(old) == {**old, "format_version": FORMAT_VERSION, "knows": knows}
+    assert old["format_version"] == 1  # what is given stays as it is
+
+
+@pytest.mark.parametrize("version", [None, 0, -1, "1", True, 1.0, FORMAT_VERSION + 1])
+def test_other_versions_are_refused(version: Any) -> None:
+    remedy = "update the program" if version == FORMAT_VERSION + 1 else "get the preset again"
+    with pytest.raises(UnknownVersion, match=remedy):
+        migrated({"format_version": version})
+
+
+def test_metadata_that_is_no_object_is_refused(small_preset: Path, tmp_path: Path) -> None:
+    path = tmp_path / "list.safetensors"
+    save_file(load_file(small_preset), path, metadata={METADATA_KEY: "[1, 2]"})
+    with pytest.raises(PresetError, match="no JSON object"):
+        read_info(path)
+
+
+def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset: Path, tmp_path: Path) -> None:
+    with safe_open(small_preset, "pt") as file:
+        facts = json.loads(file.metadata()[METADATA_KEY])
+    del facts["knows"]
+    facts["format_version"] = 1
+    path = tmp_path / "old.safetensors"
+    save_file(load_file(small_preset), path, metadata={METADATA_KEY: json.dumps(facts)})
+    old, new = load_preset(path), load_preset(small_preset)
+    assert old.info.format_version == FORMAT_VERSION
+    for name, weight in new.model.state_dict().items():
+        assert torch.equal(weight, old.model.state_dict()[name])
