@@ -1,4 +1,55 @@
 """The engine: string physics, its reference solutions, learned models, metrics and presets.
 
-It needs torch, numpy, scipy, numba and safetensors only, and knows no window and no sound device.
+It needs torch, numpy, scipy, numba and safetensors only, and knows no window and no sound device. What a notebook
+needs is named here (README, "From Python"), and loaded when it is first asked for: the window imports from here
+before torch.
 """
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from engine.metrics import relative_error
+    from engine.pluck import Pluck
+    from engine.presets import find_preset, load_preset
+    from engine.resonators import Resonator, StringParameters
+    from engine.sources import ModelSource, TruthSource
+    from engine.voices import Ear, model_program, render_voice, truth_program
+
+_HOMES = {
+    "Ear": "engine.voices",
+    "ModelSource": "engine.sources",
+    "Pluck": "engine.pluck",
+    "Resonator": "engine.resonators",
+    "StringParameters": "engine.resonators",
+    "TruthSource": "engine.sources",
+    "find_preset": "engine.presets",
+    "load_preset": "engine.presets",
+    "model_program": "engine.voices",
+    "relative_error": "engine.metrics",
+    "render_voice": "engine.voices",
+    "truth_program": "engine.voices",
+}
+
+__all__ = [
+    "Ear",
+    "ModelSource",
+    "Pluck",
+    "Resonator",
+    "StringParameters",
+    "TruthSource",
+    "find_preset",
+    "load_preset",
+    "model_program",
+    "relative_error",
+    "render_voice",
+    "truth_program",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)
