@@ -206,6 +206,8 @@ def _figures(trained: TrainedPreset, dataset: Dataset) -> dict[str, Any]:
         "rel_mae_spread": spread.rel_mae,
         "parameters": trained.preset.parameters,
         "epochs": result.epochs,
+        "start_rel_mse": result.start.rel_mse if result.start else None,
+        "start_rel_mae": result.start.rel_mae if result.start else None,
         "best_epoch": result.best_epoch,
         "seconds": result.seconds,
     }

@@ -107,6 +107,8 @@ def train(
         ("test", row.test_rel_mse, row.test_rel_mae),
     ):
         print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
+    if row.start_rel_mse is not None and row.start_rel_mae is not None:
+        print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
     print(f"trained in  {duration(row.seconds or 0.0)}, best epoch {row.best_epoch}")
     _tell_heard(file)
 

@@ -74,13 +74,21 @@ class Progress:
 
 @dataclass(frozen=True)
 class FitResult:
-    """The model of the best validation MAE, and what it took."""
+    """The model of the best validation MAE, and what it took.
+
+    Attributes:
+        best_epoch: 0 where training did not beat the start.
+        seconds: of all of it, what it starts from and the measuring among it.
+        start: validation error of the untrained model; None where there is none: a fit in one go, a start whose
+            latents are still to be learned, or a model that runs away.
+    """
 
     model: StringModel[Any]
     validation: RelativeError
     epochs: int
     best_epoch: int
     seconds: float
+    start: RelativeError | None = None
 
 
 def fit(
@@ -104,11 +112,15 @@ def fit(
     """
     if configuration.model == "dmd":
         return _fit_dmd(configuration, dataset, report)
+    begun = time.monotonic()
     run = _Run(configuration, dataset, torch.device(device))
     path = run_folder / "checkpoint.safetensors"
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
     if path.exists():
         run.restore(Checkpoint.load(path), path)
+    else:
+        run.measure_start()
+        run.seconds = time.monotonic() - begun
     started = saved = told = time.monotonic()
     first_step, earlier_s = run.step, run.seconds
     while not run.ended:
@@ -209,6 +221,7 @@ class _Run:
             self._average = AveragedModel(self._model, multi_avg_fn=mean, use_buffers=True)
         self.step, self.seconds = 0, 0.0
         self._total = torch.zeros((), device=device)  # of this epoch's losses
+        self._start: RelativeError | None = None
         self._best: RelativeError | None = None
         self._best_epoch = 0
         self._best_model = _copy(self._model)
@@ -304,12 +317,18 @@ class _Run:
             self._best, self._best_epoch, self._best_model = error, self.epoch, _copy(model)
         return error
 
+    def measure_start(self) -> None:
+        """The error before the first step, which training must beat."""
+        if not self._latent_steps:
+            error = self.validate()
+            self._start = error if _is_finite(error) else None
+
     def result(self) -> FitResult:
         if self._best is None:
             raise Diverged("the validation error was never a number; lower peak_learning_rate")
         model = self._measured()
         model.load_state_dict(self._best_model)
-        return FitResult(model.eval(), self._best, self.epoch, self._best_epoch, self.seconds)
+        return FitResult(model.eval(), self._best, self.epoch, self._best_epoch, self.seconds, self._start)
 
     def checkpoint(self) -> Checkpoint:
         facts = {
@@ -317,6 +336,7 @@ class _Run:
             "step": self.step,
             "loss_total": float(self._total),
             "seconds": self.seconds,
+            "start": write(self._start) if self._start else None,
             "best": write(self._best) if self._best else None,
             "best_epoch": self._best_epoch,
         }
@@ -332,6 +352,8 @@ class _Run:
             self._total.fill_(facts["loss_total"])
             self._best_epoch = int(facts["best_epoch"])
             self._best = read(RelativeError, facts["best"], f"{path}: best") if facts["best"] else None
+            start = facts.get("start")
+            self._start = read(RelativeError, start, f"{path}: start") if start else None
         except (SchemaError, KeyError, TypeError) as error:
             raise ValueError(f"{path}: of another version ({error}); delete it to start the run again") from error
         if other.digest != self._configuration.digest:
