@@ -206,7 +206,8 @@ SQUARE_SIZE = 0.01  # what the roots of all squares come to, typically
 SQUARE_SLOPE = 20.0  # of the gates in which squares arise
 SUM_SIZE = 40.0  # factor in front of a square
 OWN_SIZE = 0.02  # what a mode's own square comes to, typically
-LARGEST_DRIFT = 5.0  # times the typical one: so much farther the loudest strings turn
+LARGEST_DRIFT = 7.0  # times the typical one: so much farther the loudest strings turn
+RAREST = 0.01  # of the weight of a drift of 0: any drift counts so much, lest a loud string grow without end
 LEAST_DRIFT = 1e-6  # rad a sample
 WINDOW = 0.4  # how much the fields that a string is released in differ from one another
 ALTERNATIONS = 30
@@ -371,7 +372,8 @@ def _gates(modes: StringModes) -> tuple[Tensor, Tensor]:
     """
     decay, angle = torch.exp(modes.log_eigenvalues.real), modes.log_eigenvalues.imag
     shares = torch.linspace(0, LARGEST_DRIFT, 51, dtype=torch.float64)[:, None]
-    likely = torch.exp(-shares) / torch.exp(-shares).sum()
+    likely = torch.exp(-shares) + RAREST
+    likely = likely / likely.sum()
     drift = torch.where(modes.drift.abs() < LEAST_DRIFT, LEAST_DRIFT, modes.drift)
     angles = angle + shares * drift
     wanted = torch.logit(0.5 + MARGIN * decay * torch.stack([torch.cos(angles), torch.sin(angles)]))

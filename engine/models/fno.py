@@ -9,9 +9,10 @@ convolution (`FourierConvolution`), and every step is
 
 with the same map of each point from the initial displacement to h and from h to the displacement.
 
-The modules are the definition, which can be trained. On the CPU in single precision, where no gradient is wanted,
-a compiled kernel computes the same (`_fno_kernel`). A listening point costs what the grid costs: the recurrence needs
-the whole field.
+The modules are the definition. Where a gradient is wanted, roll-outs compute the same with fewer and larger products
+(`_fno_rollout`); where none is, on the CPU in single precision, a compiled kernel does (`_fno_kernel`). A listening
+point costs what the grid costs: the recurrence needs the whole field. A training may set out from weights that are
+a string already (`_fno_wiring`).
 """
 
 from __future__ import annotations
