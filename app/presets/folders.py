@@ -18,7 +18,8 @@ def user_folder() -> Path:
 
 def usable_files() -> list[Path]:
     """The files that names mean, by name: of two of one name, the shipped one."""
-    from engine.presets import SHIPPED, preset_files
+    from engine.presets import finding
 
-    files = {path.stem: path for folder in (user_folder(), SHIPPED) for path in preset_files(folder)}
+    folders = (user_folder(), finding.SHIPPED)
+    files = {path.stem: path for folder in folders for path in finding.preset_files(folder)}
     return [files[name] for name in sorted(files)]

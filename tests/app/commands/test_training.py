@@ -74,7 +74,8 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
     assert f"rel. MSE {info.test_rel_mse:.4g}, rel. MAE {info.test_rel_mae:.4g}" in lines[2]
     heard, problems = read_heard(place.folder)
     assert problems == []
-    assert lines[4] == f"heard       {heard_word(heard[preset_digest(path)])}"
+    assert lines[3].startswith("untrained   rel. MSE ")
+    assert lines[5] == f"heard       {heard_word(heard[preset_digest(path)])}"
     assert info.trained_range.position == (0.3, 0.7)
     assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
 
