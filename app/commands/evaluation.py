@@ -70,7 +70,13 @@ def evaluate(
 ) -> None:
     """Measure a preset's errors on the data set that it was trained with, beside those stored in it."""
     of_heard = (("--all", everything), ("--write", write))
-    of_data = (("--past", past), ("--partials", partials), ("--trajectories", trajectories), ("--csv", table))
+    of_data = (
+        ("--past", past),
+        ("--partials", partials),
+        ("--trajectories", trajectories),
+        ("--csv", table),
+        ("--held-out", fresh),
+    )
     for option, given in of_data if heard else of_heard:
         if given:
             raise typer.BadParameter(f"does not go {'with' if heard else 'without'} --heard", param_hint=option)

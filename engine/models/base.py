@@ -23,7 +23,7 @@ from engine.models.inputs import second_at_rest
 from engine.resonators.base import Resonator
 
 State = TypeVar("State")
-LINEAR_STRING = "its modes at rest: shapes, frequencies, decays"  # what a start "physics" is told
+LINEAR_STRING = "the modes of the string at rest"  # what a start "physics" is told
 
 
 @dataclass(frozen=True)

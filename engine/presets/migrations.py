@@ -10,13 +10,14 @@ from typing import Any
 
 Metadata = dict[str, Any]
 
-# What starts of version 1 knew, by their names. Blind ones were given the symmetries and how many modes to look for.
-_BLIND = "its symmetries and the number of its modes"
-_LINEAR = "its modes at rest: shapes, frequencies, decays"
+# What starts of version 1 knew, by their names. Blind ones had the symmetries, an integrated phase a latent a mode.
+_BLIND = "that a string may be mirrored and its sign turned"
+_COUNTED = ", and how many modes it has"
+_LINEAR = "the modes of the string at rest"
 _KNOWN_TO_VERSION_1 = {
     "physics": _LINEAR,
     "averaging": f"{_LINEAR}, and how tension couples them",
-    "matching pursuit": "its modes and the range of their frequencies",
+    "matching pursuit": "the modes of the string and the range of their frequencies",
     "blind matching pursuit": _BLIND,
     "phases of the displacement": _BLIND,
 }
@@ -24,7 +25,10 @@ _KNOWN_TO_VERSION_1 = {
 
 def _knows(data: Metadata) -> Metadata:
     """1 → 2: what a training was told of the string stands in words of its own."""
-    return {**data, "knows": _KNOWN_TO_VERSION_1.get(str(data.get("initialisation")), "")}
+    knows = _KNOWN_TO_VERSION_1.get(str(data.get("initialisation")), "")
+    if knows == _BLIND and data.get("model") == "koopman_integrated":
+        knows += _COUNTED
+    return {**data, "knows": knows}
 
 
 MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows}

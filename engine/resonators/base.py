@@ -15,6 +15,8 @@ from dataclasses import dataclass, fields, replace
 import torch
 from torch import Tensor
 
+OWN = ("omega", "sigma", "coupling", "stretch", "tension_rise")  # of a row; shapes and symmetry are a batch's
+
 
 @dataclass(frozen=True)
 class Resonator:
@@ -83,9 +85,11 @@ class Resonator:
 
     def row(self, index: int) -> Resonator:
         """One of a batch."""
-        shared = ("shapes", "analysis", "mirror")
-        own = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared}
-        return replace(self, **own)
+        return replace(self, **{name: getattr(self, name)[index] for name in OWN})
+
+    def each(self) -> list[Resonator]:
+        """Those of a batch; empty where it is one."""
+        return [self.row(index) for count in self.rows for index in range(count)]
 
     @classmethod
     def stacked(cls, resonators: list[Resonator]) -> Resonator:
@@ -97,8 +101,7 @@ class Resonator:
         first = resonators[0]
         if any(not torch.equal(first.shapes, each.shapes) for each in resonators):
             raise ValueError("resonators of one batch must have the same modes on the same grid")
-        own = ("omega", "sigma", "coupling", "stretch", "tension_rise")
-        return replace(first, **{name: torch.stack([getattr(each, name) for each in resonators]) for name in own})
+        return replace(first, **{name: torch.stack([getattr(each, name) for each in resonators]) for name in OWN})
 
     def eigenvalues(self) -> Tensor:
         """Continuous-time eigenvalues -σ + i√(ω² - σ²) at rest, complex128 (modes,).
@@ -109,7 +112,7 @@ class Resonator:
         squared = self.omega**2 - self.sigma**2
         if bool((squared <= 0).any()):
             first = int((squared <= 0).nonzero()[0, -1]) + 1
-            raise ValueError(f"mode {first} is overdamped: lower damping_d1/damping_d3 or keep fewer modes")
+            raise ValueError(f"mode {first} is overdamped: lower its damping, or keep fewer modes")
         return torch.complex(-self.sigma, squared.sqrt())
 
     def relative_tension_rise(self, amplitudes: Tensor) -> Tensor:

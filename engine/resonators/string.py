@@ -60,10 +60,6 @@ class StringParameters:
         bending = self.youngs_modulus_pa * self.second_moment_m4
         return ((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m).sqrt()
 
-    def eigenvalues(self, modes: int) -> Tensor:
-        """Continuous-time eigenvalues of the linear string, complex128 (modes,); see `Resonator.eigenvalues`."""
-        return self.resonator(modes, tension_modulated=False, grid_points=modes + 2).eigenvalues()
-
     def tension_coupling(self, modes: int) -> Tensor:
         """k_μ = EAη_μ² / 4ρA in 1/(m² s²)·m², float64 (modes,).
 

@@ -29,10 +29,8 @@ def solve_dop853(
 
     if resonator.rows:
         rows = [ModalState(q[None], v[None]) for q, v in zip(state.amplitude, state.velocity, strict=True)]
-        solved = [
-            solve_dop853(resonator.row(i), row, rate_hz, steps, rtol=rtol, atol=atol) for i, row in enumerate(rows)
-        ]
-        return torch.cat(solved)
+        pairs = zip(resonator.each(), rows, strict=True)
+        return torch.cat([solve_dop853(one, row, rate_hz, steps, rtol=rtol, atol=atol) for one, row in pairs])
     modes = resonator.modes
     stiffness, friction = resonator.omega.square().numpy(), 2 * resonator.sigma.numpy()
     eta_squared, coupling = resonator.stretch.numpy(), resonator.coupling.numpy()

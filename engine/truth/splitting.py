@@ -73,8 +73,8 @@ class SplittingSolver:
         self.device = torch.device(device)
         self._silence = silence
         self._rows = [
-            SplittingSolver(resonator.row(row), rate_hz, substeps=substeps, silence=silence, device=device)
-            for row in range(sum(resonator.rows))
+            SplittingSolver(one, rate_hz, substeps=substeps, silence=silence, device=device)
+            for one in resonator.each()
         ]
         if self._rows:
             return

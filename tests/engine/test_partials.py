@@ -15,7 +15,7 @@ from engine.truth import ModalState, SplittingSolver
 
 RATE_HZ = 4000.0
 STRING = StringParameters()
-LINEAR_HZ = (STRING.eigenvalues(10).imag / (2 * math.pi)).tolist()  # modes 9 and 10 lie above half the rate
+LINEAR_HZ = (STRING.resonator(10).eigenvalues().imag / (2 * math.pi)).tolist()  # 9 and 10 lie above half the rate
 RESOLVED = [0, 1, 2, 3, 4, 5, 6, 8, 9]  # mode 8 is at 1994 Hz
 
 
@@ -172,7 +172,7 @@ def test_too_short_for_a_segment() -> None:
 
 
 def test_the_phasors_of_the_linear_string_are_exact() -> None:
-    eigenvalues = STRING.eigenvalues(10)
+    eigenvalues = STRING.resonator(10).eigenvalues()
     amplitude = torch.linspace(1, 2, 10, dtype=torch.float64)
     spacing_s = 1 / 16_000
     expected = amplitude * torch.exp(eigenvalues * torch.linspace(0, 0.1, 50, dtype=torch.float64)[:, None])

@@ -37,8 +37,9 @@ LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
 PURSUIT = "matching pursuit"  # see `pursuit`
 BLIND_PURSUIT = "blind matching pursuit"
 PHASES = "phases of the displacement"  # see `phases`
-MODES_AND_RANGES = "its modes and the range of their frequencies"
-SYMMETRIES = "its symmetries and the number of its modes"
+MODES_AND_RANGES = "the modes of the string and the range of their frequencies"
+SYMMETRIES = "that a string may be mirrored and its sign turned"
+COUNT = "how many modes it has"
 TELL_EVERY_S = 5.0  # within an epoch
 
 
@@ -153,8 +154,12 @@ def initialisation_of(configuration: TrainingConfiguration) -> str:
 
 def knowledge_of(configuration: TrainingConfiguration) -> str:
     """What a run's start is told of the string, in words; empty: nothing but the displacement."""
-    known = {LEAST_SQUARES: "", PURSUIT: MODES_AND_RANGES, BLIND_PURSUIT: SYMMETRIES, PHASES: SYMMETRIES}
     start = initialisation_of(configuration)
+    if start in (BLIND_PURSUIT, PHASES):
+        counted = configuration.model == "koopman_integrated"  # its recipe has a latent for each mode
+        told = (SYMMETRIES if configuration.recipe.flip else "", COUNT if counted else "")
+        return ", and ".join(words for words in told if words)
+    known = {LEAST_SQUARES: "", PURSUIT: MODES_AND_RANGES}
     return known[start] if start in known else MODELS[configuration.model][0].initialisations[start]
 
 

@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.session.choices import Choices
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from app.views import theme
 from app.views.controls.parts import tool_button
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from app.presets.library import PresetEntry
 
 SLOTS = ("a", "b")
-DIFFERENCE_GAINS_DB = (0, 10, 20, 30, 40, 50, 60)
+DIFFERENCE_GAINS_DB = range(0, int(DIFFERENCE_GAIN_RANGE_DB[1]) + 1, 10)
 WIDTH, NARROW_WIDTH = 148, 108  # fixed, so that a longer title moves nothing
 PADDING = 18  # of the style sheet, with the borders
 

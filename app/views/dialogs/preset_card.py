@@ -72,7 +72,7 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
     if info.rel_mae is not None:
         test = "" if info.test_rel_mae is None else f", on the test set {100 * info.test_rel_mae:.2g} %"
         facts.append(("Error", f"{100 * info.rel_mae:.2g} % of the motion in validation{test}"))
-    facts.append(("Told", f"of the string, before training: {info.knows or 'nothing'}"))
+    facts.append(("Given", f"before training: {info.knows or 'nothing but the displacement'}"))
     facts.append(("Heard", heard_sentence(entry.heard, entry.name)))
     if info.training_seconds is not None:
         facts.append(("Trained in", time_word(info.training_seconds)))

@@ -43,7 +43,7 @@ def test_a_model_that_starts_from_the_string_has_its_modes(small_preset: Path, m
 def test_modes_above_half_the_rate_keep_their_own_frequency_and_fold_where_they_are_heard(small_preset: Path) -> None:
     preset = load_preset(small_preset)
     figure = pole_figure(preset)
-    own_hz = preset.info.string.eigenvalues(10).imag.numpy() / (2 * math.pi)
+    own_hz = preset.info.string.resonator(10).eigenvalues().imag.numpy() / (2 * math.pi)
     assert own_hz[-1] > 2000  # or the test tests nothing
     np.testing.assert_allclose(figure.string.mode_hz, own_hz)
     np.testing.assert_allclose(figure.string.folded_hz, np.minimum(own_hz, 4000 - own_hz))

@@ -130,7 +130,7 @@ def test_initialisations_lie_where_they_should() -> None:
     radius = torch.exp(-small_model().nu_log.detach().exp())
     assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1
     physical = small_model(how="physics")
-    linear = StringParameters().eigenvalues(10) / 4_000
+    linear = StringParameters().resonator(10).eigenvalues() / 4_000
     torch.testing.assert_close(physical.nu_log.detach()[:10].exp().double(), -linear.real, rtol=1e-5, atol=0)
     raised = physical.theta_log.detach().exp().double() / linear.imag.repeat(4)[:32]
     torch.testing.assert_close(raised, 1 + SHARPEST * (torch.arange(32) // 10).double() / 3, rtol=1e-5, atol=0)

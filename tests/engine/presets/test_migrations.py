@@ -44,15 +44,21 @@ def test_the_chain_is_whole() -> None:
 
 
 @pytest.mark.parametrize(
-    ("initialisation", "knows"),
+    ("model", "initialisation", "knows"),
     [
-        ("averaging", "its modes at rest: shapes, frequencies, decays, and how tension couples them"),
-        ("blind matching pursuit", "its symmetries and the number of its modes"),
-        ("paper", ""),
+        ("koopman_integrated", "averaging", "the modes of the string at rest, and how tension couples them"),
+        (
+            "koopman_integrated",
+            "phases of the displacement",
+            "that a string may be mirrored and its sign turned, and how many modes it has",
+        ),
+        ("fgru", "phases of the displacement", "that a string may be mirrored and its sign turned"),
+        ("koopman", "blind matching pursuit", "that a string may be mirrored and its sign turned"),
+        ("koopman", "paper", ""),
     ],
 )
-def test_version_1_is_told_what_its_start_knew(initialisation: str, knows: str) -> None:
-    old = {"format_version": 1, "initialisation": initialisation, "title": "as it was"}
+def test_version_1_is_told_what_its_start_knew(model: str, initialisation: str, knows: str) -> None:
+    old = {"format_version": 1, "model": model, "initialisation": initialisation, "title": "as it was"}
     assert migrated(old) == {**old, "format_version": FORMAT_VERSION, "knows": knows}
     assert old["format_version"] == 1  # what is given stays as it is
 

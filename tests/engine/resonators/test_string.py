@@ -21,7 +21,7 @@ def test_a_string_without_stiffness_is_harmonic() -> None:
 
 def test_eigenvalues_solve_the_characteristic_equation() -> None:
     string = StringParameters()
-    s = string.eigenvalues(25)
+    s = string.resonator(25).eigenvalues()
     residual = s**2 + 2 * string.decay_rates(25) * s + string.undamped_frequencies(25) ** 2
     assert float((residual.abs() / s.abs() ** 2).max()) < 1e-14
 
@@ -54,4 +54,4 @@ def test_impossible_parameters_are_named(field: str, value: float) -> None:
 
 def test_overdamped_modes_are_named() -> None:
     with pytest.raises(ValueError, match="mode 1 is overdamped"):
-        StringParameters(damping_d1_kg_m_s=10.0).eigenvalues(3)
+        StringParameters(damping_d1_kg_m_s=10.0).resonator(3).eigenvalues()

@@ -262,11 +262,11 @@ def test_eigenvalues_are_those_of_the_parameters() -> None:
     x, y = line(circle, 1)
     np.testing.assert_allclose(x + 1j * y, learned)
     x, y = line(circle, 2)  # the linear string, both of each pair
-    linear = np.exp(one.info.string.eigenvalues(5).numpy() / 4000)
+    linear = np.exp(one.info.string.resonator(5).eigenvalues().numpy() / 4000)
     np.testing.assert_allclose(x + 1j * y, np.concatenate([linear, linear.conj()]))
     khz, rates = line(decay, 1)
     np.testing.assert_allclose(rates, one.info.string.decay_rates(5).numpy())
-    np.testing.assert_allclose(khz, one.info.string.eigenvalues(5).imag.numpy() / (2000 * np.pi))
+    np.testing.assert_allclose(khz, one.info.string.resonator(5).eigenvalues().imag.numpy() / (2000 * np.pi))
     assert len(other.lines) == 4  # circle, block, first layer, string
     np.testing.assert_allclose(line(other, 2)[0], lru.model.first_layer.log_eigenvalues().exp().real.tolist())  # type: ignore[operator,union-attr]
 
@@ -278,7 +278,7 @@ def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: in
     one = preset(model)
     found = one.model.log_eigenvalues()
     assert [log.dtype for log in found] == [torch.complex128] * layers
-    linear = one.info.string.eigenvalues(5) / 4000
+    linear = one.info.string.resonator(5).eigenvalues() / 4000
     nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)
     assert float(nearest.max()) < 1e-5  # all of them started from the string's
     assert eigenvalues([one]).axes

@@ -94,7 +94,7 @@ def test_it_predicts_strings_that_the_fit_has_not_seen(
     model = integrated_phase(state_size, physical_units)
     start_from_phases(model, small_dataset, STEPS, seed=0)
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
-    linear = small_dataset.configuration.string.eigenvalues(5) / small_dataset.configuration.rate_hz
+    linear = small_dataset.configuration.string.resonator(5).eigenvalues() / small_dataset.configuration.rate_hz
     torch.testing.assert_close(model.theta_log[:5].exp(), linear.imag, rtol=2e-3, atol=0)
 
 

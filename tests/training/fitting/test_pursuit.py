@@ -71,7 +71,7 @@ def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Datas
     truth = small_dataset.split("train")[:, : STEPS + 1].double() / small_dataset.scale_m @ sines
     torch.testing.assert_close(modes.motions @ modes.shapes, truth, rtol=0, atol=1e-5)
     assert modes.mirror == (1, -1, 1, -1, 1)
-    linear = small_dataset.configuration.string.eigenvalues(5) / small_dataset.configuration.rate_hz
+    linear = small_dataset.configuration.string.resonator(5).eigenvalues() / small_dataset.configuration.rate_hz
     for grid, eigenvalue in zip(modes.grids, linear, strict=True):
         assert grid.imag.min() <= eigenvalue.imag < grid.imag.max()
         assert -float(grid.real.max()) == pytest.approx(-float(eigenvalue.real), rel=0.5, abs=3e-5)
