@@ -56,7 +56,7 @@ class RenderWorker:
             self._closing = True
             self._mailbox.notify()
         self._thread.join(10)
-        self._helper.shutdown(wait=False)
+        self._helper.shutdown()  # at most a block
 
     # All below runs in the worker's thread.
 

@@ -80,7 +80,7 @@ def test_many_trajectories_agree_with_pydmd() -> None:
 
 
 def test_finds_the_linear_strings_eigenvalues() -> None:
-    half = np.exp(STRING.eigenvalues(MODES).numpy() / RATE_HZ)
+    half = np.exp(STRING.resonator(MODES).eigenvalues().numpy() / RATE_HZ)
     assert_same_set(eigenvalues(fitted()), np.concatenate([half, half.conj()]), 1e-7)
 
 
