@@ -3,7 +3,7 @@
 There are a dozen numbers, and each string's error is close to quadratic in them, so that a step by least squares
 does what a thousand steps along a gradient do. The loss is the mean logarithm of each string's relative error: a
 string on which it is 1e-9 counts as much as one on which it is 1e-3. Its Gauss–Newton matrix is that of the residuals
-divided by the present errors. Derivatives by the curves' numbers are differences, which the smooth motion allows to 1e-6.
+divided by the present errors. Derivatives by the curves' numbers are differences, which the smooth motion allows.
 """
 
 from __future__ import annotations
