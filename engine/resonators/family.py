@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from engine.resonators.string import StringParameters
 
 BRIGHT_HZ = 3_000.0  # where the second decay time is told
+NEAR = 1.01  # of a range's end: nothing changes there
 
 Bounds = tuple[float, float]
 
@@ -46,7 +47,7 @@ class StringFamily:
             f"{name} {value:.3g}{unit} is outside the trained "
             + " and ".join(f"{low:g} … {high:g}{unit}" for low, high in trained)
             for name, value, trained, unit in told
-            if not any(low * 0.999 <= value <= high * 1.001 for low, high in trained)
+            if not any(low / NEAR <= value <= high * NEAR for low, high in trained)
         ]
 
 
