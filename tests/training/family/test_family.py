@@ -1,4 +1,4 @@
-"""A family of strings: what is drawn lies in it, what is learned holds on others, and files that are damaged say so."""
+"""A family of strings: what is drawn lies in it, and what is learned holds on others."""
 
 from __future__ import annotations
 
