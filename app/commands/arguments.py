@@ -16,12 +16,12 @@ PresetName = Annotated[str, typer.Argument(metavar="PRESET", help="A preset's na
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Cache = Annotated[Path | None, typer.Option(help="Folder of the data sets; made where it is not there.")]
 
-StringFile = Annotated[
-    Path | None,
+StringName = Annotated[
+    str | None,
     typer.Option(
         "--string",
-        metavar="STRING.toml",
-        help="For a preset of many strings: another one, by the eight parameters of a configuration's [data.string].",
+        metavar="NAME|STRING.toml",
+        help="For a preset of many strings: another one, by name, or a file of a configuration's [data.string].",
     ),
 ]
 StringRate = Annotated[
@@ -68,15 +68,17 @@ def open_preset(name_or_path: str) -> Preset:
 
 
 def open_preset_of_string(
-    name_or_path: str, string: Path | None, rate_hz: int | None = None, modes: int | None = None
+    name_or_path: str, string: str | None, rate_hz: int | None = None, modes: int | None = None
 ) -> Preset:
     """The same, of the string of a file, at a rate, with so many modes; None: the preset's own.
 
     Raises:
         PresetError, SchemaError: no such preset or string; or the preset is of one string.
     """
-    from engine.presets import of_string, read_string
+    from engine.presets import find_string, of_string, read_string
 
     if rate_hz is not None:
         check_range("--rate", rate_hz, 1_000, 1_000_000, "Hz")
-    return of_string(open_preset(name_or_path), None if string is None else read_string(string), rate_hz, modes)
+    return of_string(
+        open_preset(name_or_path), None if string is None else read_string(find_string(string)), rate_hz, modes
+    )

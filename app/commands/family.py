@@ -133,6 +133,16 @@ def evaluate(
             )
 
 
+@family.command()
+def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any_string") -> None:
+    """Write a preset for each string that is shipped, with what PRESET learned."""
+    from engine.presets import SHIPPED
+    from training.family.shelf import put_on_shelf
+
+    for path in put_on_shelf(open_preset(preset), SHIPPED):
+        print(path)
+
+
 def _report(report: Report, start: float, length: float, share: float) -> None:
     report(start + length * share)
 

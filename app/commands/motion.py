@@ -35,8 +35,8 @@ def simulate(
     string: Annotated[
         str,
         typer.Option(
-            metavar="KIND|STRING.toml",
-            help='"linear" or "nonlinear" (tension-modulated), the nylon B3; or the nonlinear string of a file.',
+            metavar="KIND|NAME|STRING.toml",
+            help='"linear" or "nonlinear" (tension-modulated), the nylon B3; or another nonlinear one, by name or file.',
         ),
     ],
     rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate in Hz.")],
@@ -81,7 +81,7 @@ def predict(
     u0: InputFile,
     out: OutputFile,
     steps: Steps,
-    string: arguments.StringFile = None,
+    string: arguments.StringName = None,
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,
 ) -> None:
@@ -124,7 +124,7 @@ def compare(
     seconds: arguments.Seconds,
     shape: arguments.Shape = arguments.DEFAULT_SHAPE,
     width: arguments.Width = arguments.DEFAULT_WIDTH,
-    string: arguments.StringFile = None,
+    string: arguments.StringName = None,
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,
     json: arguments.Json = False,
@@ -217,18 +217,12 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 
 def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
     """A string, and whether its stretch adds to its tension."""
-    from engine.presets import read_string
+    from engine.presets import find_string, read_string
     from engine.resonators import StringParameters
 
     if kind_or_file in STRING_KINDS:
         return StringParameters(), kind_or_file == "nonlinear"
-    file = Path(kind_or_file)
-    if not file.is_file():
-        raise typer.BadParameter(
-            f"must be {' or '.join(STRING_KINDS)}, or a string's .toml file, not {kind_or_file!r}",
-            param_hint="--string",
-        )
-    return read_string(file), True
+    return read_string(find_string(kind_or_file)), True
 
 
 def _fast(

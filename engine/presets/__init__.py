@@ -18,16 +18,18 @@ from engine.presets.file import (
 )
 from engine.presets.finding import SHIPPED, find_preset, preset_files
 from engine.presets.info import PresetInfo, TrainedRange, outside_training
-from engine.presets.of_string import of_string, read_string
+from engine.presets.of_string import STRINGS, find_string, of_string, read_string
 
 __all__ = [
     "SHIPPED",
+    "STRINGS",
     "Preset",
     "PresetError",
     "PresetInfo",
     "TrainedRange",
     "described_parameters",
     "find_preset",
+    "find_string",
     "load_preset",
     "of_string",
     "outside_training",

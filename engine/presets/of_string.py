@@ -9,11 +9,13 @@ from pathlib import Path
 
 from engine.models.base import Physics
 from engine.presets.file import Preset, PresetError
+from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read
 
 HIGHEST_HZ = 20_000.0  # modes above are not heard
 LARGEST_FILE_BYTES = 65_536
+STRINGS = SHIPPED / "strings"
 MOST_MODES_COUNTED = 10_000
 
 
@@ -33,6 +35,19 @@ def read_string(path: Path) -> StringParameters:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise SchemaError(f"{path}: not valid TOML: {error}") from error
     return read(StringParameters, fields, str(path))
+
+
+def find_string(name_or_path: str) -> Path:
+    """The file of a string by its name among the shipped ones, or by path.
+
+    Raises:
+        PresetError: there is none; the message lists the names.
+    """
+    by_name = {path.stem: path for path in STRINGS.glob("*.toml")}
+    path = by_name.get(name_or_path, Path(name_or_path))
+    if not path.is_file():
+        raise PresetError(f"no string {name_or_path!r}; give a .toml file or one of: {', '.join(sorted(by_name))}")
+    return path
 
 
 def of_string(
