@@ -36,7 +36,7 @@ def simulate(
         str,
         typer.Option(
             metavar="KIND|NAME|STRING.toml",
-            help='"linear" or "nonlinear" (tension-modulated), the nylon B3; or another nonlinear one, by name or file.',
+            help='"linear" or "nonlinear" (tension-modulated), the nylon B3; or another one, by name or file.',
         ),
     ],
     rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate in Hz.")],

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from engine.pluck import Pluck
-from engine.presets import PresetError, find_preset, load_preset, of_string, read_string
+from engine.presets import STRINGS, PresetError, find_preset, find_string, load_preset, of_string, read_string
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError
 from engine.sources import ModelSource, TruthSource, project
@@ -107,3 +107,20 @@ def test_modes_are_counted_in_closed_form() -> None:
         preset = of_string(load_preset(find_preset("studio_any_string")), string, 48_000)
         assert preset.info.modes == string.modes_below(20_000)
     assert torch.isfinite(STEEL.undamped_frequencies(3)).all()
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in STRINGS.glob("*.toml")))
+def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> None:
+    many = load_preset(find_preset("studio_any_string"))
+    string = read_string(find_string(name))
+    assert many.info.family is not None
+    assert many.info.family.outside(string) == []
+    own, expected = load_preset(find_preset(f"studio_any_{name}")), of_string(many, string)
+    assert own.info.string == string
+    for key, tensor in expected.model.state_dict().items():
+        assert torch.equal(own.model.state_dict()[key], tensor)
+
+
+def test_an_unknown_string_lists_those_that_there_are() -> None:
+    with pytest.raises(PresetError, match="nylon_e2"):
+        find_string("nylon_h7")
