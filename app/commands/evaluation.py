@@ -282,7 +282,9 @@ def _on(preset: Preset, run: str) -> Preset:
     data = load(run).data
     told = replace(preset.info, tension_modulated=data.tension_modulated)
     own = of_string(replace(preset, info=told), data.string, data.rate_hz, data.modes)
-    return replace(own, info=replace(own.info, horizon_steps=data.steps))
+    # the errors that it tells are those of the family
+    info = replace(own.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
+    return replace(own, info=replace(info, horizon_steps=data.steps))
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:

@@ -217,12 +217,16 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 
 def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
     """A string, and whether its stretch adds to its tension."""
-    from engine.presets import find_string, read_string
+    from engine.presets import PresetError, find_string, read_string
     from engine.resonators import StringParameters
 
     if kind_or_file in STRING_KINDS:
         return StringParameters(), kind_or_file == "nonlinear"
-    return read_string(find_string(kind_or_file)), True
+    try:
+        return read_string(find_string(kind_or_file)), True
+    except PresetError as error:
+        kinds = " or ".join(STRING_KINDS)
+        raise typer.BadParameter(f"must be {kinds}, or a string: {error}", param_hint="--string") from error
 
 
 def _fast(

@@ -20,6 +20,7 @@ from training.family.strings import Column, PluckedString, displacement_m, draw_
 # modal amplitudes (steps, modes) in m of a string, at a rate
 Player = Callable[[PluckedString, int, int], Tensor]
 LARGE = 1e-2  # an error that is heard as another string
+UNHEARD = 1e-18  # of the energy at the pluck: an error below that of a string that has fallen so far is none
 SCALE_M = 1e-3
 
 
@@ -79,9 +80,10 @@ def measure(
         truth = (solve(plucked, rate_hz, last) if cache is None else true_motion(plucked, rate_hz, last, cache))[
             first:
         ]
+        unheard = UNHEARD * float(plucked.amplitudes_m.square().sum()) * len(truth)
         for name, play in players.items():
             wrong = play(plucked, rate_hz, last)[first:] - truth
-            error = float(wrong.square().sum() / truth.square().sum())
+            error = float(wrong.square().sum() / max(float(truth.square().sum()), unheard))
             told = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
             found[name].append(StringError(*told, error if math.isfinite(error) else math.inf))
         report((number + 1) / count)
