@@ -297,7 +297,7 @@ def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
 def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> None:
     np.save(folder / "u.npy", Pluck(0.3, 20.0, "triangular").displacement(101)[None].numpy())
     text = find_string(STEEL_E4).read_text()
-    (folder / "slack.toml").write_text(text.replace("tension_n = 7", "tension_n = 0.7"))
+    (folder / "slack.toml").write_text(text.replace("tension_n = 72.592", "tension_n = 0.72592"))
     files = (folder / "u.npy", folder / "m.npy")
     found = run("predict", "studio_any_string", *files, "--string", folder / "slack.toml", "--steps", 9)
     assert found.status == 0
