@@ -111,7 +111,7 @@ class Performance(QObject):
             return 0.0
         heard_s = shown.parked_s
         if shown.note is not None:
-            heard_s = shown.note.seconds - self._sound.mixer.output_latency_s
+            heard_s = max(shown.note.seconds - self._sound.mixer.output_latency_s, shown.note.from_s)
         return min(max(heard_s, 0.0), shown.take.seconds)
 
     @property
