@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from engine.models import MODELS
+from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, write
 
-FROM_PHASES = ("koopman_integrated", "fgru", "frnn")  # models that start from what the displacement shows (`phases`)
+# models that can start from what the displacement shows (`fitting.phases`)
+FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -77,6 +79,8 @@ class Recipe:
     latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of a matching pursuit
     # Koopman's pursuit, or an integrated phase, starts from what the displacement shows and knows no string
     blind: bool = False
+    # of a blind integrated phase: its state_size is so many for each mode that the data show; 0: as it is configured
+    latents_per_mode: int = 0
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
     random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
@@ -96,7 +100,7 @@ class Recipe:
         for name in ("epochs", "batch_size", "first_horizon", "validate_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish"):
+        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish", "latents_per_mode"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
         if self.latent_polish and not self.latent_epochs:
@@ -125,6 +129,10 @@ class TrainingConfiguration:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
         if self.recipe.blind and not self.recipe.latent_epochs and self.model not in FROM_PHASES:
             raise ValueError(f"blind needs latent_epochs, or one of {', '.join(FROM_PHASES)}, not {self.model!r}")
+        if self.recipe.latents_per_mode and not (self.recipe.blind and self.model == "koopman_integrated"):
+            raise ValueError(f"latents_per_mode needs blind and the model 'koopman_integrated', not {self.model!r}")
+        if self.recipe.latents_per_mode and "state_size" in self.model_configuration:
+            raise ValueError("state_size follows latents_per_mode; leave one of them out")
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:

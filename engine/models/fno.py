@@ -27,9 +27,10 @@ from torch.utils.checkpoint import checkpoint
 
 from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
 from engine.models._fno_transform import transform_matrices
-from engine.models._fno_wiring import Kernels, StringModes, Wiring, wire_fgru, wire_frnn
+from engine.models._fno_wiring import Kernels, Wiring, wire_fgru, wire_frnn
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
 from engine.models.inputs import InputKind, input_size, join_input
+from engine.models.string_modes import StartsFromModes, StringModes
 
 if TYPE_CHECKING:
     from engine.models import _fno_kernel as kernel
@@ -112,7 +113,7 @@ class FourierConvolution(nn.Module):
         nn.init.uniform_(self.bias, 0, 1 / width, generator=generator)
 
 
-class _FourierRecurrent(StringModel[FieldState]):
+class _FourierRecurrent(StringModel[FieldState], StartsFromModes):
     """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
 
     initialisations: ClassVar = {"paper": ""}
@@ -128,14 +129,6 @@ class _FourierRecurrent(StringModel[FieldState]):
     @abstractmethod
     def step(self, hidden: Tensor) -> Tensor:
         """One sample of the definition: (batch, grid_points, width) to the same shape."""
-
-    @abstractmethod
-    def store_modes(self, modes: StringModes) -> None:
-        """Makes it a string of these modes, as far as its form can be one (`_fno_wiring`).
-
-        Raises:
-            ValueError: it has too few channels or points for them.
-        """
 
     @abstractmethod
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
@@ -222,6 +215,7 @@ class FGRU(_FourierRecurrent):
     """See the module."""
 
     kept_fields = 8
+    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width, configuration.input)
@@ -237,6 +231,7 @@ class FGRU(_FourierRecurrent):
         return (1 - z) * hidden + z * torch.tanh(self.h_layer(r * hidden))
 
     def store_modes(self, modes: StringModes) -> None:
+        """See `_fno_wiring`."""
         wiring = wire_fgru(modes, self.configuration.width)
         layers = self.z_layer, self.r_layer, self.h_layer
         self._store(wiring, dict(zip(layers, wiring.layers, strict=True)))
@@ -260,6 +255,8 @@ class FGRU(_FourierRecurrent):
 class FRNN(_FourierRecurrent):
     """See the module. Nothing bounds it: it may blow up, more so before it is trained."""
 
+    holds_coupling: ClassVar = False
+
     def __init__(self, configuration: FRNNConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width, configuration.input)
         self.configuration = configuration
@@ -276,7 +273,7 @@ class FRNN(_FourierRecurrent):
         return hidden
 
     def store_modes(self, modes: StringModes) -> None:
-        """As a linear string: its frequencies follow nothing."""
+        """As a linear string: its frequencies follow nothing. See `_fno_wiring`."""
         wiring = wire_frnn(modes, self.configuration.width, self.configuration.depth)
         self._store(wiring, dict(zip(self._convolutions, wiring.layers, strict=True)))
         with torch.no_grad():

@@ -68,6 +68,7 @@ from engine.models._diagonal import (
 from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
+from engine.models.string_modes import StartsFromModes, StringModes
 
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
 SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
@@ -174,7 +175,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
+class KoopmanIntegrated(StringModel[IntegratedPhaseState], StartsFromModes):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -184,6 +185,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     }
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
     coupling_parameters: ClassVar = frozenset({"K"})
+    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
         super().__init__()
@@ -534,39 +536,32 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
                 self._initialise_averaging(physics)
 
     @torch.no_grad()
-    def store_modes(self, shapes: Tensor, log_eigenvalues: Tensor, starts: Tensor, coupling: Tensor) -> None:
-        """A latent for each of some modes, at first all that is heard; spare latents stay silent.
+    def store_modes(self, modes: StringModes) -> None:
+        """A latent for each mode, at first all that is heard; spare latents stay silent.
 
         z_n(0) = s_n q_n of a displacement Σ_n q_n shape_n, and û = Σ_n Re z_n shape_n.
-
-        Args:
-            shapes: (modes, grid_points), linearly independent.
-            log_eigenvalues: -σ + iω, complex (modes,).
-            starts: s, complex (modes,).
-            coupling: rad/sample that the square of each mode's q at the start adds to each ω, (modes, modes).
 
         Raises:
             ValueError: more modes than latents.
         """
-        n, modes = self.configuration.state_size, len(shapes)
-        if modes > n:
-            raise ValueError(f"state_size must be at least {modes}, the modes that the data show, not {n}")
-        analysis = torch.linalg.pinv(shapes).T
-        self.nu_log[:modes] = (-log_eigenvalues.real).log()
-        self.theta_log[:modes] = log_eigenvalues.imag.log()
+        n, count = self.configuration.state_size, len(modes.shapes)
+        if count > n:
+            raise ValueError(f"state_size must be at least {count}, the modes that the data show, not {n}")
+        analysis, starts, omega = modes.analysis, modes.starts, modes.log_eigenvalues.imag
+        self.nu_log[:count] = (-modes.log_eigenvalues.real).log()
+        self.theta_log[:count] = omega.log()
         for linear in (self.encoder, self.decoder):
             nn.init.zeros_(linear.weight)
-        self.encoder.weight[:modes, : self.grid_points] = (starts.real[:, None] * analysis).to(self.K.dtype)
-        self.encoder.weight[n : n + modes, : self.grid_points] = (starts.imag[:, None] * analysis).to(self.K.dtype)
-        self.decoder.weight[:, :modes] = shapes.T.to(self.K.dtype)
-        coupling = coupling / starts.abs().square()
+        self.encoder.weight[:count, : self.grid_points] = (starts.real[:, None] * analysis).to(self.K.dtype)
+        self.encoder.weight[n : n + count, : self.grid_points] = (starts.imag[:, None] * analysis).to(self.K.dtype)
+        self.decoder.weight[:, :count] = modes.shapes.T.to(self.K.dtype)
+        coupling = modes.coupling / starts.abs().square()
         if self.energy_units is not None and self.rate_units is not None:
-            omega = log_eigenvalues.imag
-            self.rate_units[:modes] = omega
-            self.energy_units[:modes] = (coupling / omega[:, None]).abs().median(0).values
-            coupling = coupling / self.energy_units[:modes]
-        rate_units = self._rate_units[:modes, None] if isinstance(self._rate_units, Tensor) else self._rate_units
-        self.K[n : n + modes, :modes] = (coupling / rate_units).to(self.K.dtype)
+            self.rate_units[:count] = omega
+            self.energy_units[:count] = (coupling / omega[:, None]).abs().median(0).values
+            coupling = coupling / self.energy_units[:count]
+        rate_units = self._rate_units[:count, None] if isinstance(self._rate_units, Tensor) else self._rate_units
+        self.K[n : n + count, :count] = (coupling / rate_units).to(self.K.dtype)
 
     def _initialise_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes

@@ -74,7 +74,7 @@ def test_titles_do_not_enter_the_digest_but_the_seed_does() -> None:
     [
         ("nylon_nonlinear_noise_16k_foo", "model 'foo' is not one of dmd, koopman"),
         ("nylon_nonlinear_noise_8k_lru", "rate_hz must be one of 4000, 16000"),
-        ("nylon_nonlinear_noise_4k_lru_400_theirs", "recipe 'theirs' is not one of blind, ours, paper"),
+        ("nylon_nonlinear_noise_4k_lru_400_theirs", "recipe 'theirs' is not one of blind, hinted, ours, paper"),
         ("nylon_nonlinear_noise_4k_lru_0", "horizon must be at least 1"),
         ("no_such_thing", "no training configuration 'no_such_thing'"),
     ],
@@ -105,4 +105,4 @@ def test_a_case_matches_what_it_names() -> None:
     assert not Case(tension_modulated=False).matches(cell)
     with pytest.raises(ValueError, match="model 'koop' is not one of"):
         Case(model=("koop",))
-    assert recipe_names() == ["blind", "ours", "paper"]
+    assert recipe_names() == ["blind", "hinted", "ours", "paper"]

@@ -10,7 +10,7 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError
-from training.fitting.fit import LEAST_SQUARES, PURSUIT
+from training.knowledge import LEAST_SQUARES, PURSUIT
 from training.results import COLUMNS, Row, add_rows, read_results
 
 

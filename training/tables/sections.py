@@ -32,7 +32,7 @@ TOLD_OF_THE_STRING = (
     "phases of the displacement",
 )  # starts of blind runs before purification
 
-RecipeChoice = Literal["ours", "blind", "paper", "all"]
+RecipeChoice = Literal["ours", "blind", "hinted", "paper", "all"]
 
 
 @dataclass(frozen=True)
