@@ -40,11 +40,15 @@ def given_to(model: str, start: str) -> str:
     return STARTS[start] if start in STARTS else MODELS[model][0].initialisations.get(start, "")
 
 
-def knowledge_of(configuration: TrainingConfiguration) -> str:
-    """What a run's start is given of the string, in words; empty: nothing but the displacement."""
-    start = initialisation_of(configuration)
-    if start not in (BLIND_PURSUIT, PHASES):
-        return given_to(configuration.model, start)
+def hints_of(configuration: TrainingConfiguration) -> str:
+    """What a run that found its start in the displacement was given beside it, in words; empty for other runs."""
+    if initialisation_of(configuration) not in (BLIND_PURSUIT, PHASES):
+        return ""
     counted = configuration.model == "koopman_integrated" and not configuration.recipe.latents_per_mode
     told = (SYMMETRIES if configuration.recipe.flip else "", COUNT if counted else "")
     return ", and ".join(words for words in told if words)
+
+
+def knowledge_of(configuration: TrainingConfiguration) -> str:
+    """What a run's start is given of the string, in words; empty: nothing but the displacement."""
+    return given_to(configuration.model, initialisation_of(configuration)) or hints_of(configuration)

@@ -22,7 +22,7 @@ from engine.truth import ModalState, SplittingSolver, solve_linear
 from engine.voices import Ear, Mixer, Voice, bank_program
 
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
-BLIND = f"{KNOWING}_blind"
+BLIND = f"{KNOWING}_hinted"
 NYLON, STEEL = "studio_nylon_b3", "studio_steel_e4"
 EAR, STEREO, SOLO = Ear((0.37,)), Ear((0.3, 0.62)), Ear((0.37,), solo=2)
 

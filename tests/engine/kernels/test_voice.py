@@ -317,7 +317,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
             info = small_info(True)
             voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
         else:
-            name = {"knowing": KNOWING, "blind": f"{KNOWING}_blind", "steel": STEEL}[str(kind)]
+            name = {"knowing": KNOWING, "hinted": f"{KNOWING}_hinted", "steel": STEEL}[str(kind)]
             voice = strike(name, pluck, ear=ear, gain=gain)
         voice.begin_at(int(choice.integers(0, 4000)))
         if choice.random() < 0.3:
