@@ -14,10 +14,11 @@ from engine.models import MODELS
 from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, write
+from engine.schema import SchemaError, read, write
 
 # models that can start from what the displacement shows (`fitting.phases`)
 FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
+DIGEST_VERSION = 2  # of the rule by which runs are told apart; see `training.migration`
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -83,7 +84,6 @@ class Recipe:
     latents_per_mode: int = 0
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
-    random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
     grow_until: float = 0.5  # … over this share of the run
@@ -149,19 +149,58 @@ class TrainingConfiguration:
 
     @property
     def digest(self) -> str:
-        """Of all that determines the run's result; what it is called does not.
+        """Of all that determines the run's result, the model's defaults among it; what it is called does not.
 
-        Fields that have their default are left out, so that one which comes later leaves earlier runs their digest.
+        Of data and recipe, whose defaults are never changed, fields that have theirs are left out, so that one which
+        comes later leaves earlier runs their digest. Where a model's sizes change, or this rule does, rows are
+        carried over by `training.migration`.
         """
-        plain = {
-            "model": self.model,
-            "model_configuration": write(self.model_configuration),
-            "data": unlike_default(self.data),
-            "data_version": DATA_VERSION,
-            "recipe": unlike_default(self.recipe),
-            "horizon": self.steps,
-        }
-        return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
+        kind, sizes = MODELS[self.model]
+        start = self.recipe.initialisation or kind.own_initialisation()
+        return digest_of(
+            {
+                "digest_version": DIGEST_VERSION,
+                "model": self.model,
+                "model_configuration": write(read(sizes, self.model_configuration, "model_configuration")),
+                "data": unlike_default(self.data),
+                "data_version": DATA_VERSION,
+                "recipe": {**unlike_default(self.recipe), "initialisation": start},
+                "horizon": self.steps,
+            }
+        )
+
+
+def digest_of(plain: dict[str, Any]) -> str:
+    """Sixteen digits that tell plain data apart."""
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
+
+
+# fields of earlier versions, and the only value that they ever had in a run that was kept
+RETIRED: dict[str, dict[str, Any]] = {
+    "recipe": {"random_start": False},
+    "model_configuration": {"input": "displacement"},
+}
+
+
+def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
+    """A configuration as a preset or a checkpoint of this version or an earlier one holds it.
+
+    Raises:
+        SchemaError: it is none, or sets what is no longer there; the message names the field.
+    """
+    if isinstance(plain, dict):
+        plain = {name: _without_retired(name, value, where) for name, value in plain.items()}
+    return read(TrainingConfiguration, plain, where)
+
+
+def _without_retired(part: str, value: Any, where: str) -> Any:
+    retired = RETIRED.get(part, {})
+    if not isinstance(value, dict):
+        return value
+    for name in retired.keys() & value.keys():
+        if value[name] != retired[name]:
+            raise SchemaError(f"{where}.{part}.{name}: {value[name]!r} is of an earlier version; train it anew")
+    return {name: entry for name, entry in value.items() if name not in retired}
 
 
 def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:

@@ -34,6 +34,7 @@ from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit
 from training.knowledge import initialisation_of, knowledge_of
+from training.migration import carried_over
 from training.results import QUARTERS, Row
 from training.row_errors import row_errors
 
@@ -138,7 +139,7 @@ def run_row(
         file = folder / "row.json"
         output = preset or folder / f"{name}.safetensors"
         if file.exists() and output.exists():
-            row = _read_row(file)
+            row = carried_over(_read_row(file), configuration)
             if row.digest == configuration.digest:
                 return row
         dataset = load_dataset(configuration.data, cache)

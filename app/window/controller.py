@@ -207,7 +207,7 @@ class Controller(QObject):
     def listening_test(self) -> None:
         """Opens the ABX test on what is on stage; until it is closed, the sound belongs to it."""
         entry = self.entry
-        if entry is None or entry.unplayable:
+        if entry is None:
             self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:

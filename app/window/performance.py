@@ -135,7 +135,7 @@ class Performance(QObject):
     def strike(self, choices: Choices) -> Note | None:
         """Lets the string go as `choices` say, beside those that ring. From any thread; the picture is told later."""
         entry = self._library.find(choices.preset)
-        if entry is None or entry.unplayable:
+        if entry is None:
             return None
         note = self.notes.strike(stroke_of(choices, entry.path, self._library))
         self._latest = note

@@ -29,7 +29,6 @@ from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrice
 from engine.models._fno_transform import transform_matrices
 from engine.models._fno_wiring import Kernels, Wiring, wire_fgru, wire_frnn
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
-from engine.models.inputs import InputKind, input_size, join_input
 from engine.models.string_modes import StartsFromModes, StringModes
 
 if TYPE_CHECKING:
@@ -44,12 +43,10 @@ class FGRUConfiguration:
 
     Attributes:
         width: channels of the hidden field.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
     width: int = 32
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "width")
@@ -62,13 +59,11 @@ class FRNNConfiguration:
     Attributes:
         width: channels of the hidden field.
         depth: Fourier layers in a step.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
     width: int = 32
     depth: int = 3
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "width", "depth")
@@ -119,11 +114,10 @@ class _FourierRecurrent(StringModel[FieldState], StartsFromModes):
     initialisations: ClassVar = {"paper": ""}
     kept_fields: int  # of a step, for its gradient
 
-    def __init__(self, grid_points: int, width: int, kind: InputKind) -> None:
+    def __init__(self, grid_points: int, width: int) -> None:
         super().__init__()
         self.grid_points = grid_points
-        self.input = kind
-        self.in_mapping = nn.Linear(input_size(kind, 1), width)
+        self.in_mapping = nn.Linear(1, width)
         self.out_mapping = nn.Linear(width, 1)
 
     @abstractmethod
@@ -138,9 +132,8 @@ class _FourierRecurrent(StringModel[FieldState], StartsFromModes):
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         """The kernel: advances hidden (batch, grid_points, width), fills frames (batch, steps, grid_points)."""
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> FieldState:
-        second = None if second is None else second[..., None]
-        return FieldState(self.in_mapping(join_input(self.input, displacement[..., None], second)))
+    def encode(self, displacement: Tensor) -> FieldState:
+        return FieldState(self.in_mapping(displacement[..., None]))
 
     def advance(self, state: FieldState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, FieldState]:
         frames, hidden = self._advance_any_way(state.hidden, steps)
@@ -218,7 +211,7 @@ class FGRU(_FourierRecurrent):
     holds_coupling: ClassVar = True
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width, configuration.input)
+        super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
         sizes = configuration.grid_points, configuration.width
         self.z_layer = FourierConvolution(*sizes)
@@ -258,7 +251,7 @@ class FRNN(_FourierRecurrent):
     holds_coupling: ClassVar = False
 
     def __init__(self, configuration: FRNNConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width, configuration.input)
+        super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
         self.kept_fields = 4 * configuration.depth
         sizes = configuration.grid_points, configuration.width

@@ -23,7 +23,7 @@ from engine.metrics import RelativeError
 from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
 from engine.schema import SchemaError, read, write
-from training.configuration import Recipe, TrainingConfiguration
+from training.configuration import Recipe, TrainingConfiguration, read_configuration
 from training.data.batches import TrainingData, batches
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
@@ -198,10 +198,7 @@ class _Run:
         else:
             self._model = new_model(configuration, dataset.scale_m)
         self._model.to(device)
-        kind = self._model.configuration.input
-        if recipe.random_start and kind != "displacement_velocity":
-            raise ValueError("recipe.random_start needs a model of the input 'displacement_velocity'")
-        self._data = TrainingData(dataset, configuration.steps, kind, device)
+        self._data = TrainingData(dataset, device)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
         self._optimiser = _optimiser(self._model, recipe)
         self._average: AveragedModel | None = None
@@ -336,7 +333,7 @@ class _Run:
     def restore(self, checkpoint: Checkpoint, path: Path) -> None:
         facts, device = checkpoint.facts, next(self._model.parameters()).device
         try:  # read, not compared as it is: fields that came later have their defaults
-            other = read(TrainingConfiguration, facts["configuration"], f"{path}: configuration")
+            other = read_configuration(facts["configuration"], f"{path}: configuration")
             self.step, self.seconds = int(facts["step"]), float(facts["seconds"])
             self._total.fill_(facts["loss_total"])
             self._best_epoch = int(facts["best_epoch"])
