@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
+from engine.schema import SchemaError, write
 from training.cell import Cell, configuration_of
+from training.configuration import read_configuration
 from training.migration import earlier_digest, migrated
 from training.results import RESULTS, Row, read_results
 
@@ -35,3 +39,14 @@ def test_no_row_is_lost_and_none_becomes_a_figure_that_it_was_not() -> None:
 def test_the_committed_rows_are_carried_over() -> None:
     rows = read_results(RESULTS)
     assert migrated(rows) == rows
+
+
+def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> None:
+    now = configuration_of(CELL)
+    plain = write(now)
+    plain["recipe"]["random_start"] = False
+    plain["model_configuration"]["input"] = "displacement"
+    assert read_configuration(plain, "a preset") == now
+    plain["recipe"]["random_start"] = True
+    with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it anew"):
+        read_configuration(plain, "a preset")

@@ -3,6 +3,12 @@
 Koopman models are trained on prediction, encoding and consistency (§4.2); the others on prediction alone, the Fourier
 models on its logarithm. All take any selection of frames: a Koopman rollout needs no recursion, the others run up to
 the last of them.
+
+Where the paper's text and its authors' code (rodrigodzf/physmodjax, `lindyn_loss`) differ, the terms are the text's:
+consistency is of Λᵏ φ(u₀), encoding of frame 0. The code compares φ(u_k) with Koopman_var's multiplied states, and
+takes the encoding of all frames, past the multiplier; here frame 0 is decoded with it, as any other frame. Of the
+weights neither has ours: consistency is a sum over latents beside a mean over grid points, which counts it 101 times
+as much as the text's sums do, and 256 times as much as the code's means.
 """
 
 from __future__ import annotations
