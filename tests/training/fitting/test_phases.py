@@ -126,6 +126,18 @@ def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
         TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, blind=True))
 
 
+def test_latents_follow_the_modes_of_a_blind_integrated_phase_alone() -> None:
+    data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
+    with pytest.raises(ValueError, match="and the model 'koopman_integrated', not 'fgru'"):
+        TrainingConfiguration("A test", "fgru", data, Recipe(epochs=1, blind=True, latents_per_mode=1))
+    with pytest.raises(ValueError, match="latents_per_mode needs blind"):
+        TrainingConfiguration("A test", "koopman_integrated", data, Recipe(epochs=1, latents_per_mode=1))
+    recipe = Recipe(epochs=1, blind=True, latents_per_mode=2)
+    with pytest.raises(ValueError, match="state_size follows latents_per_mode"):
+        sizes = {"state_size": 10}
+        TrainingConfiguration("A test", "koopman_integrated", data, recipe, model_configuration=sizes)
+
+
 BLIND_CELLS = [
     Cell(model, True, "gaussian", rate_hz, recipe="blind")
     for model in ("koopman", "koopman_integrated")
