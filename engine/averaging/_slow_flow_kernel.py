@@ -1,0 +1,426 @@
+"""The compiled parts of `slow_flow`: coefficients of the averaged Hamiltonian, its flow, the way back to amplitudes.
+
+Symbols as there. All of it is a function of z = √I e^{iθ}, apart in real and imaginary parts, and of the mean stretch
+S̄, on which every coefficient depends smoothly and alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from engine.kernels.compiled import COMPILED
+
+Array = NDArray[np.float64]
+Triads = NDArray[np.int32]
+
+NEWTON_STEPS = 12  # at most; S̄ is a concave equation of one unknown, three or four suffice
+NODES_A_CHOICE = 16  # between two choices of the modes and triads that still count
+
+
+@njit(**COMPILED)
+def mean_stretch(actions: Array, frequencies: Array, stiffening: Array, stretch: Array, guess: float) -> float:
+    """S̄ = Σ η² I/√(ω² + c η² S̄) by Newton's method from a guess."""
+    for _ in range(NEWTON_STEPS):
+        found = slope = 0.0
+        for n in range(len(actions)):
+            raised = 1 / math.sqrt(frequencies[n] * frequencies[n] + stiffening[n] * guess)
+            share = stretch[n] * actions[n] * raised
+            found += share
+            slope += 0.5 * share * stiffening[n] * raised * raised
+        change = (found - guess) / (1 + slope)
+        guess += change
+        if abs(change) <= 1e-14 * guess:
+            break
+    return guess
+
+
+@njit(**COMPILED)
+def raise_frequencies(
+    s: float, frequencies: Array, stiffening: Array, stretch: Array, raised: Array, b: Array, v: Array
+) -> None:
+    """Writes Ω, b = η²/Ω (modes,) and V_mn = 1/(Ω_m² - Ω_n²) with a zero diagonal (modes, modes)."""
+    modes = len(raised)
+    for n in range(modes):
+        raised[n] = math.sqrt(frequencies[n] * frequencies[n] + stiffening[n] * s)
+        b[n] = stretch[n] / raised[n]
+    for m in range(modes):
+        own = raised[m] * raised[m]
+        for n in range(modes):
+            v[m, n] = 1 / (own - raised[n] * raised[n]) if m != n else 0.0
+
+
+@njit(**COMPILED)
+def weigh_triads(triads: Triads, c: float, raised: Array, b: Array, tau: Array) -> None:
+    """τ of 2τ Re(z_j² z_k² z̄_l²), (triads,)."""
+    for i in range(len(triads)):
+        j, k, last = triads[i, 0], triads[i, 1], triads[i, 2]
+        oj, ok, ol = raised[j], raised[k], raised[last]
+        bj, bk, bl = b[j], b[k], b[last]
+        sums = (bj + bk) / ol - (bj - bl) / ok - (bk - bl) / oj
+        tau[i] = -(c * c / 32) * bj * bk * bl * sums * (0.5 if j == k else 1.0)
+
+
+@njit(**COMPILED)
+def exponents(
+    re: Array, im: Array, c: float, raised: Array, b: Array, v: Array, growth: Array, turn: Array, work: Array
+) -> None:
+    """∂χ/∂I as `turn` and -∂χ/∂θ / 2I as `growth`, of which the first order of a period's swing is made: (modes,)."""
+    modes = len(re)
+    x, y = work[0], work[1]
+    for n in range(modes):
+        x[n] = b[n] * (re[n] * re[n] - im[n] * im[n])
+        y[n] = b[n] * (2 * re[n] * im[n]) * raised[n]
+    for n in range(modes):
+        row = v[n]
+        t = u = 0.0
+        for m in range(modes):
+            t += row[m] * x[m]
+            u -= row[m] * y[m]
+        t *= raised[n]
+        action = re[n] * re[n] + im[n] * im[n] + 1e-300
+        cosine = (re[n] * re[n] - im[n] * im[n]) / action
+        sine = 2 * re[n] * im[n] / action
+        half = c / 4 * b[n]
+        own = c / 16 * b[n] * b[n] * action / raised[n]
+        growth[n] = -half * (t * cosine - u * sine) - own * (cosine * cosine - sine * sine)
+        turn[n] = half * (t * sine + u * cosine) + own * 2 * sine * cosine
+
+
+@njit(**COMPILED)
+def read(
+    re: Array,
+    im: Array,
+    c: float,
+    frequencies: Array,
+    stiffening: Array,
+    stretch: Array,
+    s: float,
+    raised: Array,
+    b: Array,
+    v: Array,
+    work: Array,
+    out: Array,
+) -> None:
+    """Modal amplitudes of z, with coefficients at the mean stretch s; work (6, modes)."""
+    modes = len(re)
+    growth, turn, actions, swing = work[2], work[3], work[4], work[5]
+    exponents(re, im, c, raised, b, v, growth, turn, work)
+    for n in range(modes):
+        gain = math.exp(growth[n])
+        cosine, sine = gain * math.cos(turn[n]), gain * math.sin(turn[n])
+        p, q = re[n] * cosine - im[n] * sine, re[n] * sine + im[n] * cosine
+        growth[n], turn[n] = p, q
+        actions[n] = p * p + q * q
+    s = mean_stretch(actions, frequencies, stiffening, stretch, s)
+    total = slope = 0.0
+    for n in range(modes):
+        own = 1 / math.sqrt(frequencies[n] * frequencies[n] + stiffening[n] * s)
+        swing[n] = own
+        total += stretch[n] * own * own * 2 * growth[n] * turn[n]
+        slope += 0.5 * stretch[n] * actions[n] * own * stiffening[n] * own * own
+    total *= c / 4 / (1 + slope)
+    for n in range(modes):
+        own = swing[n]
+        angle = total * stretch[n] * own
+        out[n] = math.sqrt(2 * own) * (growth[n] * math.cos(angle) - turn[n] * math.sin(angle))
+
+
+@njit(**COMPILED)
+def velocities(
+    re: Array,
+    im: Array,
+    c: float,
+    frequencies: Array,
+    stiffening: Array,
+    stretch: Array,
+    s: float,
+    v: Array,
+    triads: Triads,
+    tau: Array,
+    chosen: NDArray[np.int64],
+    count: int,
+    speed: Array,
+    pull: Array,
+    work: Array,
+) -> float:
+    """Writes ∂(K₀ + K₁ + K₂)/∂I as `speed` (modes,), and g of żₙ = i g z̄ₙ that triads add (2, modes); returns S̄."""
+    modes = len(re)
+    a, raised, b, squares = work[0], work[1], work[2], work[3]
+    for n in range(modes):
+        a[n] = re[n] * re[n] + im[n] * im[n]
+    s = mean_stretch(a, frequencies, stiffening, stretch, s)
+    slope = through = 0.0
+    for n in range(modes):
+        raised[n] = math.sqrt(frequencies[n] * frequencies[n] + stiffening[n] * s)
+        b[n] = stretch[n] / raised[n]
+        a[n] *= b[n]
+        squares[n] = a[n] * a[n]
+        slope += 0.5 * c * a[n] * b[n] / raised[n]
+        through -= c * c / 8 * squares[n] * b[n] / raised[n]
+    deep = 0.0
+    for n in range(modes):
+        row = v[n]
+        one = two = three = 0.0
+        for m in range(modes):  # Σ_m W_nm a_m² and Σ_m W_mn a_m, W_mn = 2η_m² V_mn
+            one += row[m] * squares[m]
+            two -= row[m] * a[m] * stretch[m]
+            three += row[m] * row[m] * a[m] * stretch[m] * (stretch[m] - stretch[n])
+        second = 3 * squares[n] * b[n] / raised[n] + 4 * stretch[n] * one + 8 * a[n] * two
+        deep -= a[n] * b[n] / (2 * raised[n]) * second + squares[n] * (
+            a[n] * b[n] / (raised[n] * raised[n]) * b[n] + 4 * three
+        )
+        speed[n] = raised[n] + b[n] * (c / 4 * a[n] - c * c / 64 * second)
+    through = (through - c * c * c / 64 * deep) / (1 + slope)
+    for n in range(modes):
+        speed[n] += b[n] * through
+    if count > 0:
+        sx, sy = work[4], work[5]
+        for n in range(modes):
+            sx[n] = re[n] * re[n] - im[n] * im[n]
+            sy[n] = 2 * re[n] * im[n]
+            pull[0, n] = pull[1, n] = 0.0
+        for i in range(count):
+            of = chosen[i]
+            j, k, last = triads[of, 0], triads[of, 1], triads[of, 2]
+            w = 2 * tau[of]
+            jx, jy, kx, ky, lx, ly = w * sx[j], w * sy[j], sx[k], sy[k], sx[last], sy[last]
+            pull[0, last] += jx * kx - jy * ky
+            pull[1, last] += jx * ky + jy * kx
+            pull[0, k] += jx * lx + jy * ly
+            pull[1, k] += jx * ly - jy * lx
+            pull[0, j] += w * (kx * lx + ky * ly)
+            pull[1, j] += w * (kx * ly - ky * lx)
+    return s
+
+
+@njit(**COMPILED)
+def choose(
+    triads: Triads,
+    tau: Array,
+    actions: Array,
+    raised: Array,
+    left_s: float,
+    negligible: float,
+    chosen: NDArray[np.int64],
+) -> int:
+    """Writes which triads among the modes that move count in the time that is left; returns how many."""
+    modes = len(actions)
+    whole = 0.0
+    for n in range(modes):
+        whole += actions[n] / raised[n]
+    count = 0
+    for i in range(len(triads)):
+        j, k, last = triads[i, 0], triads[i, 1], triads[i, 2]
+        if last >= modes or j >= modes or k >= modes:
+            continue
+        ij, ik, il = actions[j], actions[k], actions[last]
+        least = min(ij / raised[j], ik / raised[k], il / raised[last]) + 1e-300
+        detuning = 2 * abs(raised[j] + raised[k] - raised[last])
+        time_s = min(left_s, 1 / (detuning + 1e-300))
+        effect = 2 * abs(tau[i]) * ij * ik * il * time_s / (raised[j] * math.sqrt(least * whole))
+        if effect > negligible:
+            chosen[count] = i
+            count += 1
+    return count
+
+
+@njit(**COMPILED)
+def flow(
+    start: Array,
+    c: float,
+    frequencies: Array,
+    decays: Array,
+    stiffening: Array,
+    stretch: Array,
+    triads: Triads,
+    rate_hz: float,
+    node_s: float,
+    silence: float,
+    negligible: float,
+    out: Array,
+) -> None:
+    """Writes the modal amplitudes of frames 1 … steps, (steps, modes), from z at frame 0, (2, modes).
+
+    Latents are z = w e^{-σt + iΦ}: phases Φ of the frequencies ∂(K₀ + K₁ + K₂)/∂I, and w that triads alone change.
+    Both by classical Runge-Kutta from node to node, and by cubics in between.
+    """
+    steps, modes = out.shape
+    phase, w = np.zeros(modes), start.copy()
+    z, work, flight = np.empty((2, modes)), np.empty((6, modes)), np.empty((6, modes))
+    stage_phase, stage_w = np.empty(modes), np.empty((2, modes))
+    speed, pull, drift = np.empty((4, modes)), np.zeros((2, modes)), np.zeros((4, 2, modes))
+    raised, b, v = np.empty(modes), np.empty(modes), np.empty((modes, modes))
+    tau, chosen = np.empty(len(triads)), np.empty(len(triads), np.int64)
+    last_phase, last_w, last_speed, last_drift = (
+        np.empty(modes),
+        np.empty((2, modes)),
+        np.empty(modes),
+        np.empty((2, modes)),
+    )
+    actions = np.empty(modes)
+    moving, count, frame, node = modes, 0, 0, 0
+    for n in range(modes):
+        actions[n] = w[0, n] ** 2 + w[1, n] ** 2
+    s = mean_stretch(actions, frequencies, stiffening, stretch, 0.0)
+    while frame < steps:
+        begin_s = node * node_s
+        if node % NODES_A_CHOICE == 0:
+            whole = 0.0
+            for n in range(moving):
+                actions[n] = (w[0, n] ** 2 + w[1, n] ** 2) * math.exp(-2 * decays[n] * begin_s)
+                raised[n] = math.sqrt(frequencies[n] * frequencies[n] + stiffening[n] * s)
+                whole += actions[n] / raised[n]
+            while moving > 1 and actions[moving - 1] / raised[moving - 1] < silence * silence * whole:
+                moving -= 1
+            raise_frequencies(
+                s,
+                frequencies[:moving],
+                stiffening[:moving],
+                stretch[:moving],
+                raised[:moving],
+                b[:moving],
+                v[:moving, :moving],
+            )
+            weigh_triads(triads, c, raised, b, tau)
+            left_s = steps / rate_hz - begin_s
+            count = choose(triads, tau, actions[:moving], raised[:moving], left_s, negligible, chosen)
+        mo = moving
+        fr, st, sr = frequencies[:mo], stiffening[:mo], stretch[:mo]
+        vv = v[:mo, :mo]
+        raise_frequencies(s, fr, st, sr, raised[:mo], b[:mo], vv)
+        weigh_triads(triads, c, raised, b, tau)
+        for stage in range(5):  # the fifth: the slopes at the end, for the cubics
+            part = 0.0 if stage == 0 else 0.5 if stage < 3 else 1.0
+            time_s = begin_s + part * node_s
+            if stage < 4:
+                for n in range(mo):
+                    if stage == 0:
+                        stage_phase[n], stage_w[0, n], stage_w[1, n] = phase[n], w[0, n], w[1, n]
+                    else:
+                        h = part * node_s
+                        stage_phase[n] = phase[n] + h * speed[stage - 1, n]
+                        stage_w[0, n] = w[0, n] + h * drift[stage - 1, 0, n]
+                        stage_w[1, n] = w[1, n] + h * drift[stage - 1, 1, n]
+            else:
+                for n in range(mo):
+                    last_phase[n], last_speed[n] = phase[n], speed[0, n]
+                    phase[n] += node_s / 6 * (speed[0, n] + 2 * (speed[1, n] + speed[2, n]) + speed[3, n])
+                    stage_phase[n] = phase[n]
+                    for e in range(2):
+                        last_w[e, n], last_drift[e, n] = w[e, n], drift[0, e, n]
+                        w[e, n] += (
+                            node_s / 6 * (drift[0, e, n] + 2 * (drift[1, e, n] + drift[2, e, n]) + drift[3, e, n])
+                        )
+                        stage_w[e, n] = w[e, n]
+            for n in range(mo):
+                decay = math.exp(-decays[n] * time_s)
+                cosine, sine = decay * math.cos(stage_phase[n]), decay * math.sin(stage_phase[n])
+                z[0, n] = stage_w[0, n] * cosine - stage_w[1, n] * sine
+                z[1, n] = stage_w[0, n] * sine + stage_w[1, n] * cosine
+            slot = stage % 4
+            s = velocities(
+                z[0, :mo],
+                z[1, :mo],
+                c,
+                fr,
+                st,
+                sr,
+                s,
+                vv,
+                triads,
+                tau,
+                chosen,
+                count,
+                speed[slot, :mo],
+                pull[:, :mo],
+                flight[:, :mo],
+            )
+            for n in range(mo):  # ẇ = i g z̄ e^{σt - iΦ}
+                growth = math.exp(decays[n] * time_s)
+                x, y = pull[0, n] * z[0, n] + pull[1, n] * z[1, n], pull[1, n] * z[0, n] - pull[0, n] * z[1, n]
+                cosine, sine = growth * math.cos(stage_phase[n]), growth * math.sin(stage_phase[n])
+                drift[slot, 0, n] = -y * cosine + x * sine
+                drift[slot, 1, n] = x * cosine + y * sine
+        while frame < steps and (frame + 1) / rate_hz <= (node + 1) * node_s * (1 + 1e-12):
+            time_s = (frame + 1) / rate_hz
+            t = time_s / node_s - node
+            h00, h10 = (1 + 2 * t) * (1 - t) ** 2, t * (1 - t) ** 2 * node_s
+            h01, h11 = t * t * (3 - 2 * t), t * t * (t - 1) * node_s
+            for n in range(mo):
+                angle = h00 * last_phase[n] + h10 * last_speed[n] + h01 * phase[n] + h11 * speed[0, n]
+                p = h00 * last_w[0, n] + h10 * last_drift[0, n] + h01 * w[0, n] + h11 * drift[0, 0, n]
+                q = h00 * last_w[1, n] + h10 * last_drift[1, n] + h01 * w[1, n] + h11 * drift[0, 1, n]
+                decay = math.exp(-decays[n] * time_s)
+                cosine, sine = decay * math.cos(angle), decay * math.sin(angle)
+                z[0, n], z[1, n] = p * cosine - q * sine, p * sine + q * cosine
+            read(z[0, :mo], z[1, :mo], c, fr, st, sr, s, raised[:mo], b[:mo], vv, work[:, :mo], out[frame, :mo])
+            for n in range(mo, modes):
+                out[frame, n] = 0.0
+            frame += 1
+        node += 1
+
+
+@njit(**COMPILED)
+def swing(
+    z: NDArray[np.complex128], c: float, frequencies: Array, decays: Array, stiffening: Array, stretch: Array
+) -> NDArray[np.complex128]:
+    """How far the flow of χ takes log z in one unit of its time, complex (modes,), by one step of Runge-Kutta."""
+    modes = len(z)
+    raised, b, v, work = np.empty(modes), np.empty(modes), np.empty((modes, modes)), np.empty((2, modes))
+    growth, turn, slope = np.empty(modes), np.empty(modes), np.zeros(modes, np.complex128)
+    total, s = np.zeros(modes, np.complex128), 0.0
+    for stage in range(4):
+        at = z * np.exp(slope * (0.0 if stage == 0 else 0.5 if stage < 3 else 1.0))
+        re, im = at.real.copy(), at.imag.copy()
+        s = mean_stretch(re * re + im * im, frequencies, stiffening, stretch, s)
+        raise_frequencies(s, frequencies, stiffening, stretch, raised, b, v)
+        exponents(re, im, c, raised, b, v, growth, turn, work)
+        slope = growth + 1j * turn
+        total += slope / (6 if stage in (0, 3) else 3)
+    return total
+
+
+@njit(**COMPILED)
+def second_order(
+    actions: Array, c: float, frequencies: Array, decays: Array, stiffening: Array, stretch: Array, resonant: float
+) -> Array:
+    """-∂χ₂/∂θ / 2I at angles 0 or π, where χ₂ takes away what second order leaves of a period's swing: (modes,).
+
+    Its terms are XX and YY, whose coefficients are sums over a third mode, and triads of all signs. Those that are
+    detuned by less than `resonant` stay in the flow.
+    """
+    modes = len(actions)
+    raised, b, v = np.empty(modes), np.empty(modes), np.empty((modes, modes))
+    s = mean_stretch(actions, frequencies, stiffening, stretch, 0.0)
+    raise_frequencies(s, frequencies, stiffening, stretch, raised, b, v)
+    for m in range(modes):  # R of χ = (c/4) Σ R_mn Y_m X_n, in place
+        for n in range(modes):
+            v[m, n] = raised[m] * v[m, n] if m != n else 0.25 / raised[n]
+    a = b * actions
+    ab = a * b
+    r, growth = np.zeros(modes), np.empty(modes)
+    for m in range(modes):
+        r += ab[m] * v[m]
+    for n in range(modes):
+        total = 0.0
+        for m in range(modes):
+            of_xx = -(r[n] + r[m]) / 16 - (ab[n] * v[n, m] + ab[m] * v[m, n]) / 32
+            of_yy = (ab[n] * v[m, n] + ab[m] * v[n, m]) / 32
+            total += a[m] * (of_xx - of_yy) / (raised[n] + raised[m])
+            if m != n:
+                total += a[m] * (of_xx + of_yy) / (raised[n] - raised[m])
+        for j in range(modes):
+            for sign_j in (-1.0, 1.0):
+                bj, oj = sign_j * b[j], sign_j * raised[j]
+                for k in range(modes):
+                    for sign_k in (-1.0, 1.0):
+                        bk, ok = sign_k * b[k], sign_k * raised[k]
+                        if abs(frequencies[n] + sign_j * frequencies[j] + sign_k * frequencies[k]) >= resonant:
+                            form = (b[n] + bj) / ok + (b[n] + bk) / oj + (bj + bk) / raised[n]
+                            total += a[j] * a[k] * form / (32 * (raised[n] + oj + ok))
+        growth[n] = -c * c / 2 * b[n] * total
+    return growth
