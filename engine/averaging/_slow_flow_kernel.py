@@ -194,7 +194,74 @@ def velocities(
             pull[1, k] += jx * ly - jy * lx
             pull[0, j] += w * (kx * lx + ky * ly)
             pull[1, j] += w * (kx * ly - ky * lx)
+        whole = level = energy = 0.0
+        for n in range(modes):
+            whole += a[n]
+            level += a[n] * b[n] / raised[n]
+            energy += (pull[0, n] * sx[n] + pull[1, n] * sy[n]) / 3
+        through = -2.5 * c * level / (whole + 1e-300) * energy / (1 + slope)
+        for n in range(modes):
+            speed[n] += b[n] * through
     return s
+
+
+@njit(**COMPILED)
+def third_order(re: Array, im: Array, c: float, raised: Array, b: Array, v: Array, speed: Array) -> None:
+    """Writes ∂K₃/∂I with S̄ held, (modes,)."""
+    modes = len(re)
+    a, q, s = np.empty(modes), np.empty(modes), np.empty(modes)
+    sums = np.zeros((7, modes))
+    r, u, ks, ksq, mq, ms, eq = sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6]
+    for n in range(modes):
+        a[n] = b[n] * (re[n] * re[n] + im[n] * im[n])
+        q[n] = a[n] * a[n]
+        s[n] = a[n] * b[n]
+    for m in range(modes):
+        om, bm = raised[m], b[m]
+        for n in range(modes):
+            on, bn = raised[n], b[n]
+            if m == n:
+                one = two = 0.25 / om
+                of_x, of_y = -bm / (2 * om), bm / (2 * om)
+            else:
+                one, two = om * v[m, n], on * v[n, m]  # R_mn, R_nm
+                of_x, of_y = -(bm * one + bn * two), bn * one + bm * two
+            r[m] += two * s[n]
+            u[m] += one * q[n]
+            ks[m] += one * two * s[n]
+            ksq[m] += one * two * s[n] * q[n]
+            mq[m] += (7 / 6 * one * one + 0.5 * two * two) * q[n]
+            ms[m] += (7 / 6 * two * two + 0.5 * one * one) * s[n] * s[n]
+            own, other = bm / om, bn / on
+            form = of_x * of_x + of_y * of_y + 4 / 3 * own * other
+            form -= 4 / 3 * of_x * (own + other) + 2 / 3 * of_y * (bm / on + bn / om)
+            eq[m] += 0.5 * form * q[n]
+    of_r, of_u = np.empty(modes), np.empty(modes)
+    for n in range(modes):
+        of_r[n] = 4 / 3 * s[n] * u[n] + 8 / 3 * q[n] * r[n]
+        of_u[n] = 4 / 3 * s[n] * r[n] + 1 / 6 * s[n] * s[n] / raised[n]
+    cube = (c / 4) ** 3
+    for m in range(modes):
+        rho = 0.25 / raised[m]
+        of_s = 4 / 3 * u[m] * (r[m] + rho * s[m]) + 2 * s[m] * mq[m]
+        of_s += 2 / 3 * (ksq[m] + q[m] * ks[m]) - 4 / 3 * rho * rho * s[m] * q[m]
+        of_q = 4 / 3 * r[m] * r[m] + ms[m] + 2 / 3 * s[m] * ks[m] - 2 / 3 * rho * rho * s[m] * s[m]
+        of_q += 2 * eq[m] - 5 / 4 * q[m] * (b[m] / raised[m]) ** 2
+        for n in range(modes):
+            one, two = (raised[m] * v[m, n], raised[n] * v[n, m]) if m != n else (rho, rho)
+            of_s += one * of_r[n]
+            of_q += two * of_u[n]
+        speed[m] = cube * b[m] * (b[m] * of_s + 2 * a[m] * of_q)
+    whole = level = slope = energy = 0.0
+    for n in range(modes):
+        beta = b[n] / raised[n]
+        whole += a[n]
+        level += a[n] * beta
+        slope += 0.5 * c * a[n] * beta
+        energy += 0.25 * speed[n] * a[n] / b[n]
+    through = -4 * c * level / (whole + 1e-300) * energy / (1 + slope)
+    for n in range(modes):
+        speed[n] += b[n] * through
 
 
 @njit(**COMPILED)
@@ -261,7 +328,7 @@ def flow(
         np.empty(modes),
         np.empty((2, modes)),
     )
-    actions = np.empty(modes)
+    actions, third = np.empty(modes), np.empty(modes)
     moving, count, frame, node = modes, 0, 0, 0
     for n in range(modes):
         actions[n] = w[0, n] ** 2 + w[1, n] ** 2
@@ -321,6 +388,8 @@ def flow(
                 cosine, sine = decay * math.cos(stage_phase[n]), decay * math.sin(stage_phase[n])
                 z[0, n] = stage_w[0, n] * cosine - stage_w[1, n] * sine
                 z[1, n] = stage_w[0, n] * sine + stage_w[1, n] * cosine
+            if stage == 0:
+                third_order(z[0, :mo], z[1, :mo], c, raised[:mo], b[:mo], vv, third[:mo])
             slot = stage % 4
             s = velocities(
                 z[0, :mo],
@@ -339,6 +408,8 @@ def flow(
                 pull[:, :mo],
                 flight[:, :mo],
             )
+            for n in range(mo):
+                speed[slot, n] += third[n]
             for n in range(mo):  # ẇ = i g z̄ e^{σt - iΦ}
                 growth = math.exp(decays[n] * time_s)
                 x, y = pull[0, n] * z[0, n] + pull[1, n] * z[1, n], pull[1, n] * z[0, n] - pull[0, n] * z[1, n]
