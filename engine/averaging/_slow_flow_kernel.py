@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 Triads = NDArray[np.int32]
 
 NEWTON_STEPS = 12  # at most; S̄ is a concave equation of one unknown, three or four suffice
+STRONG = 1e-4  # effect of a triad from which on its third order counts
+MOST_STRONG = 400
 NODES_A_CHOICE = 16  # between two choices of the modes and triads that still count
 
 
@@ -143,6 +145,8 @@ def velocities(
     tau: Array,
     chosen: NDArray[np.int64],
     count: int,
+    strong: int,
+    kappa: Array,
     speed: Array,
     pull: Array,
     work: Array,
@@ -187,6 +191,9 @@ def velocities(
             of = chosen[i]
             j, k, last = triads[of, 0], triads[of, 1], triads[of, 2]
             w = 2 * tau[of]
+            if i < strong:
+                for m in range(modes):
+                    w += 2 * kappa[i, m] * a[m]
             jx, jy, kx, ky, lx, ly = w * sx[j], w * sy[j], sx[k], sy[k], sx[last], sy[last]
             pull[0, last] += jx * kx - jy * ky
             pull[1, last] += jx * ky + jy * kx
@@ -194,6 +201,10 @@ def velocities(
             pull[1, k] += jx * ly - jy * lx
             pull[0, j] += w * (kx * lx + ky * ly)
             pull[1, j] += w * (kx * ly - ky * lx)
+            if i < strong:
+                product = 2 * ((sx[j] * kx - sy[j] * ky) * lx + (sx[j] * ky + sy[j] * kx) * ly)
+                for m in range(modes):
+                    speed[m] += b[m] * kappa[i, m] * product
         whole = level = energy = 0.0
         for n in range(modes):
             whole += a[n]
@@ -265,6 +276,54 @@ def third_order(re: Array, im: Array, c: float, raised: Array, b: Array, v: Arra
 
 
 @njit(**COMPILED)
+def third_order_triad(
+    triad: NDArray[np.int32], c: float, raised: Array, b: Array, r: Array, x: Array, y: Array, w: Array, found: Array
+) -> None:
+    """Writes κ_m of a triad's third order, 2 Σ κ_m a_m Re(z_j² z_k² z̄_l²), (modes,); matrices as `third_order` has them."""
+    modes = len(raised)
+    scale = (c / 4) ** 3 * b[triad[0]] * b[triad[1]] * b[triad[2]] * (0.5 if triad[0] == triad[1] else 1.0)
+    for m in range(modes):
+        found[m] = 0.0
+    for turn in range(3):
+        p, q, t = triad[turn], triad[(turn + 1) % 3], triad[(turn + 2) % 3]
+        of_p, of_q, of_t = (-1.0 if turn == 2 else 1.0), (-1.0 if turn == 1 else 1.0), (-1.0 if turn == 0 else 1.0)
+        signs = of_q * of_t
+        one = x[q, t] - signs * y[q, t]
+        two = x[q, t] - signs * w[q, t]
+        for m in range(modes):
+            bm = b[m]
+            of_c = -4 / 3 * bm * (r[m, p] + 1 / raised[m])
+            value = 0.25 * of_c * one - bm * r[m, p] / 3 * two
+            value -= bm / 3 * (x[q, m] * r[m, t] + r[m, q] * x[m, t])
+            value -= bm / 3 * signs * (w[q, m] * r[t, m] + r[q, m] * w[m, t])
+            of_x = -2 / 3 * bm * (r[m, q] + r[m, t])
+            value += 0.5 * of_p * (of_t * b[t] + of_q * b[q]) * of_x / raised[p]
+            found[m] += value
+        found[p] -= 0.25 / 3 * b[p] / raised[p] * one
+        for first in range(2):  # what is left of G and L where the third is q or t itself
+            u, v, of_v = (q, t, of_t) if first == 0 else (t, q, of_q)
+            factor = -0.5 * of_v * of_p / raised[p] / 6
+            found[v] += factor * b[v] * (b[u] * r[u, v] + b[v] * r[v, u])
+            found[u] += factor * b[u] * (b[u] * r[v, u] + b[v] * r[u, v])
+    for m in range(modes):
+        found[m] *= scale
+
+
+@njit(**COMPILED)
+def pair_matrices(raised: Array, b: Array, v: Array, r: Array, x: Array, y: Array, w: Array) -> None:
+    """Writes R of χ = (c/4) Σ R_mn Y_m X_n; x and y of {S̄, χ} ~ Σ x_mn X_m X_n + Σ y_mn Y_m Y_n; w = y - 2 Σ b Y Y/Ω."""
+    modes = len(raised)
+    for m in range(modes):
+        for n in range(modes):
+            r[m, n] = raised[m] * v[m, n] if m != n else 0.25 / raised[m]
+    for m in range(modes):
+        for n in range(modes):
+            x[m, n] = -(b[m] * r[m, n] + b[n] * r[n, m])
+            y[m, n] = b[n] * r[m, n] + b[m] * r[n, m]
+            w[m, n] = y[m, n] - b[m] / raised[n] - b[n] / raised[m]
+
+
+@njit(**COMPILED)
 def choose(
     triads: Triads,
     tau: Array,
@@ -273,13 +332,14 @@ def choose(
     left_s: float,
     negligible: float,
     chosen: NDArray[np.int64],
-) -> int:
+    kappa: Array,
+) -> tuple[int, int]:
     """Writes which triads among the modes that move count in the time that is left; returns how many."""
     modes = len(actions)
     whole = 0.0
     for n in range(modes):
         whole += actions[n] / raised[n]
-    count = 0
+    count = strong = 0
     for i in range(len(triads)):
         j, k, last = triads[i, 0], triads[i, 1], triads[i, 2]
         if last >= modes or j >= modes or k >= modes:
@@ -291,8 +351,11 @@ def choose(
         effect = 2 * abs(tau[i]) * ij * ik * il * time_s / (raised[j] * math.sqrt(least * whole))
         if effect > negligible:
             chosen[count] = i
+            if effect > STRONG and strong < len(kappa):
+                chosen[count], chosen[strong] = chosen[strong], i
+                strong += 1
             count += 1
-    return count
+    return count, strong
 
 
 @njit(**COMPILED)
@@ -329,7 +392,8 @@ def flow(
         np.empty((2, modes)),
     )
     actions, third = np.empty(modes), np.empty(modes)
-    moving, count, frame, node = modes, 0, 0, 0
+    matrices, kappa = np.empty((4, modes, modes)), np.empty((min(len(triads), MOST_STRONG), modes))
+    moving, count, strong, frame, node = modes, 0, 0, 0, 0
     for n in range(modes):
         actions[n] = w[0, n] ** 2 + w[1, n] ** 2
     s = mean_stretch(actions, frequencies, stiffening, stretch, 0.0)
@@ -354,7 +418,22 @@ def flow(
             )
             weigh_triads(triads, c, raised, b, tau)
             left_s = steps / rate_hz - begin_s
-            count = choose(triads, tau, actions[:moving], raised[:moving], left_s, negligible, chosen)
+            count, strong = choose(triads, tau, actions[:moving], raised[:moving], left_s, negligible, chosen, kappa)
+            if strong > 0:
+                part = matrices[:, :moving, :moving]
+                pair_matrices(raised[:moving], b[:moving], v[:moving, :moving], part[0], part[1], part[2], part[3])
+                for i in range(strong):
+                    third_order_triad(
+                        triads[chosen[i]],
+                        c,
+                        raised[:moving],
+                        b[:moving],
+                        part[0],
+                        part[1],
+                        part[2],
+                        part[3],
+                        kappa[i, :moving],
+                    )
         mo = moving
         fr, st, sr = frequencies[:mo], stiffening[:mo], stretch[:mo]
         vv = v[:mo, :mo]
@@ -404,6 +483,8 @@ def flow(
                 tau,
                 chosen,
                 count,
+                strong,
+                kappa,
                 speed[slot, :mo],
                 pull[:, :mo],
                 flight[:, :mo],
