@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 Triads = NDArray[np.int32]
 
 NEWTON_STEPS = 12  # at most; S̄ is a concave equation of one unknown, three or four suffice
-STRONG = 1e-4  # effect of a triad from which on its third order counts
-MOST_STRONG = 400
+STRONG = 1e-5  # effect of a triad from which on its third order counts
+MOST_STRONG = 2000
 NODES_A_CHOICE = 16  # between two choices of the modes and triads that still count
 
 
