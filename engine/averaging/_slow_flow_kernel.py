@@ -18,9 +18,13 @@ Array = NDArray[np.float64]
 Triads = NDArray[np.int32]
 
 NEWTON_STEPS = 12  # at most; S̄ is a concave equation of one unknown, three or four suffice
-STRONG = 1e-5  # effect of a triad from which on its third order counts
-MOST_STRONG = 2000
+STRONG = 1e-5  # of a triad's effect, as `slow_flow.NEGLIGIBLE` counts it: from here on its third order is there, too
+HORIZON_S = 1.0  # time in which what a triad does adds up, if its phase does not turn before
+MOST_STRONG = 2000  # triads
+LOUDEST = 20  # modes, of which quartets are looked for
+MOST_QUARTETS = 2000
 NODES_A_CHOICE = 16  # between two choices of the modes and triads that still count
+NODES_A_QUARTETS_CHOICE = 64
 
 
 @njit(**COMPILED)
@@ -147,6 +151,10 @@ def velocities(
     count: int,
     strong: int,
     kappa: Array,
+    quartets: NDArray[np.int64],
+    signs: Array,
+    of_quartets: Array,
+    quartet_count: int,
     speed: Array,
     pull: Array,
     work: Array,
@@ -213,6 +221,7 @@ def velocities(
         through = -2.5 * c * level / (whole + 1e-300) * energy / (1 + slope)
         for n in range(modes):
             speed[n] += b[n] * through
+        pull_quartets(sx, sy, quartets, signs, of_quartets, quartet_count, pull)
     return s
 
 
@@ -279,7 +288,7 @@ def third_order(re: Array, im: Array, c: float, raised: Array, b: Array, v: Arra
 def third_order_triad(
     triad: NDArray[np.int32], c: float, raised: Array, b: Array, r: Array, x: Array, y: Array, w: Array, found: Array
 ) -> None:
-    """Writes κ_m of a triad's third order, 2 Σ κ_m a_m Re(z_j² z_k² z̄_l²), (modes,); matrices as `third_order` has them."""
+    """Writes κ_m of a triad's third order, 2 Σ κ_m a_m Re(z_j² z_k² z̄_l²), (modes,), from `pair_matrices`."""
     modes = len(raised)
     scale = (c / 4) ** 3 * b[triad[0]] * b[triad[1]] * b[triad[2]] * (0.5 if triad[0] == triad[1] else 1.0)
     for m in range(modes):
@@ -311,7 +320,7 @@ def third_order_triad(
 
 @njit(**COMPILED)
 def pair_matrices(raised: Array, b: Array, v: Array, r: Array, x: Array, y: Array, w: Array) -> None:
-    """Writes R of χ = (c/4) Σ R_mn Y_m X_n; x and y of {S̄, χ} ~ Σ x_mn X_m X_n + Σ y_mn Y_m Y_n; w = y - 2 Σ b Y Y/Ω."""
+    """Writes R of χ = (c/4) Σ R_mn Y_m X_n, x and y of {S̄, χ} ~ Σ x_mn X_m X_n + Σ y_mn Y_m Y_n, and w = y - 2bYY/Ω."""
     modes = len(raised)
     for m in range(modes):
         for n in range(modes):
@@ -324,17 +333,120 @@ def pair_matrices(raised: Array, b: Array, v: Array, r: Array, x: Array, y: Arra
 
 
 @njit(**COMPILED)
+def weigh_quartet(
+    modes: NDArray[np.int64], signs: Array, c: float, raised: Array, b: Array, r: Array, x: Array, y: Array, w: Array
+) -> float:
+    """τ of 2τ Re Π z² of four modes, some of them conjugated (sign -1), in third order."""
+    total = 0.0
+    for p in range(4):
+        for q in range(4):
+            if q == p:
+                continue
+            for t in range(4):
+                if t in (p, q):
+                    continue
+                u = 6 - p - q - t
+                i, j, k, n = modes[p], modes[q], modes[t], modes[u]
+                ij, jk, kn, ni = signs[p] * signs[q], signs[q] * signs[t], signs[t] * signs[u], signs[u] * signs[p]
+                of_kn = x[k, n] - kn * y[k, n]
+                value = (x[i, j] - ij * y[i, j]) * of_kn
+                value += 4 / 3 * (ij * b[i] / raised[j] - b[j] / raised[j]) * of_kn
+                value += 4 / 3 * ni * b[i] / raised[n] * (x[j, k] - jk * w[j, k])
+                value -= 8 / 3 * kn / raised[n] * (b[j] * w[j, k] - x[j, k] * b[k])
+                form = -2 / 3 * (r[i, j] + r[i, k])
+                if i == j:
+                    form -= (r[j, k] + jk * r[k, j]) / 6
+                if i == k:
+                    form -= (r[k, j] + jk * r[j, k]) / 6
+                value -= 2 * b[i] * b[i] * (r[i, n] + ni * r[n, i]) * form
+                total += value
+    equal = 0
+    for p in range(4):
+        for q in range(p):
+            equal += modes[p] == modes[q]
+    many = 1.0 if equal == 0 else 0.5 if equal == 1 else 1 / 6
+    return (c / 4) ** 3 * total / 16 * many * b[modes[0]] * b[modes[1]] * b[modes[2]] * b[modes[3]]
+
+
+@njit(**COMPILED)
+def choose_quartets(
+    actions: Array,
+    c: float,
+    raised: Array,
+    b: Array,
+    matrices: Array,
+    negligible: float,
+    quartets: NDArray[np.int64],
+    signs: Array,
+    tau: Array,
+) -> int:
+    """Writes which quartets of the loudest modes count, j + k = l + m and j + k + l = m; returns how many."""
+    modes = len(actions)
+    squares = np.empty(modes)
+    for n in range(modes):
+        squares[n] = actions[n] / raised[n]
+    whole = squares.sum()
+    loudest = np.sort(np.argsort(-squares)[:LOUDEST])
+    r, x, y, w = matrices[0], matrices[1], matrices[2], matrices[3]
+    members, of, sign = len(loudest), np.empty(4, np.int64), np.ones(4)
+    sign[3] = -1.0
+    count = 0
+    for i in range(members):
+        for j in range(i, members):
+            for k in range(members):
+                for n in range(members):
+                    of[0], of[1], of[2], of[3] = loudest[i], loudest[j], loudest[k], loudest[n]
+                    for kind in range(2):
+                        sign[2] = 1.0 if kind == 0 else -1.0
+                        if kind == 0 and (k < j or n in (i, j, k)):
+                            continue
+                        if kind == 1 and (k > n or k in (i, j) or n in (i, j) or k < i):
+                            continue
+                        detuning = raised[of[0]] + raised[of[1]] + sign[2] * raised[of[2]] - raised[of[3]]
+                        if abs(detuning) >= raised[0] or count == len(tau):
+                            continue
+                        product, least = 1.0, whole
+                        for e in range(4):
+                            product *= actions[of[e]]
+                            least = min(least, squares[of[e]])
+                        strength = weigh_quartet(of, sign, c, raised, b, r, x, y, w)
+                        time_s = min(HORIZON_S, 0.5 / (abs(detuning) + 1e-300))
+                        effect = (
+                            2 * abs(strength) * product * time_s / (raised[0] * math.sqrt(least * whole) + 1e-300)
+                        )
+                        if effect > negligible:
+                            quartets[count], signs[count], tau[count] = of, sign, strength
+                            count += 1
+    return count
+
+
+@njit(**COMPILED)
+def pull_quartets(
+    sx: Array, sy: Array, quartets: NDArray[np.int64], signs: Array, tau: Array, count: int, pull: Array
+) -> None:
+    """Adds g of żₙ = i g z̄ₙ of the first `count` quartets, for z² in real and imaginary parts."""
+    for i in range(count):
+        for own in range(4):
+            re, im = 2 * tau[i], 0.0
+            for e in range(4):
+                if e != own:
+                    p, q = sx[quartets[i, e]], signs[i, e] * sy[quartets[i, e]]
+                    re, im = re * p - im * q, re * q + im * p
+            pull[0, quartets[i, own]] += re
+            pull[1, quartets[i, own]] -= signs[i, own] * im
+
+
+@njit(**COMPILED)
 def choose(
     triads: Triads,
     tau: Array,
     actions: Array,
     raised: Array,
-    left_s: float,
     negligible: float,
     chosen: NDArray[np.int64],
     kappa: Array,
 ) -> tuple[int, int]:
-    """Writes which triads among the modes that move count in the time that is left; returns how many."""
+    """Writes which triads among the modes that move count in the time to come; returns how many."""
     modes = len(actions)
     whole = 0.0
     for n in range(modes):
@@ -347,7 +459,7 @@ def choose(
         ij, ik, il = actions[j], actions[k], actions[last]
         least = min(ij / raised[j], ik / raised[k], il / raised[last]) + 1e-300
         detuning = 2 * abs(raised[j] + raised[k] - raised[last])
-        time_s = min(left_s, 1 / (detuning + 1e-300))
+        time_s = min(HORIZON_S, 1 / (detuning + 1e-300))
         effect = 2 * abs(tau[i]) * ij * ik * il * time_s / (raised[j] * math.sqrt(least * whole))
         if effect > negligible:
             chosen[count] = i
@@ -393,6 +505,8 @@ def flow(
     )
     actions, third = np.empty(modes), np.empty(modes)
     matrices, kappa = np.empty((4, modes, modes)), np.empty((min(len(triads), MOST_STRONG), modes))
+    quartets, signs = np.empty((MOST_QUARTETS, 4), np.int64), np.empty((MOST_QUARTETS, 4))
+    of_quartets, quartet_count = np.empty(MOST_QUARTETS), 0
     moving, count, strong, frame, node = modes, 0, 0, 0, 0
     for n in range(modes):
         actions[n] = w[0, n] ** 2 + w[1, n] ** 2
@@ -417,21 +531,41 @@ def flow(
                 v[:moving, :moving],
             )
             weigh_triads(triads, c, raised, b, tau)
-            left_s = steps / rate_hz - begin_s
-            count, strong = choose(triads, tau, actions[:moving], raised[:moving], left_s, negligible, chosen, kappa)
+            count, strong = choose(triads, tau, actions[:moving], raised[:moving], negligible, chosen, kappa)
+            left = 0 if node % NODES_A_QUARTETS_CHOICE == 0 else quartet_count
+            quartet_count = 0
+            for i in range(left):  # those whose modes still move
+                if quartets[i].max() < moving:
+                    quartets[quartet_count], signs[quartet_count] = quartets[i], signs[i]
+                    of_quartets[quartet_count] = of_quartets[i]
+                    quartet_count += 1
             if strong > 0:
-                part = matrices[:, :moving, :moving]
-                pair_matrices(raised[:moving], b[:moving], v[:moving, :moving], part[0], part[1], part[2], part[3])
+                pairs = matrices[:, :moving, :moving]
+                pair_matrices(
+                    raised[:moving], b[:moving], v[:moving, :moving], pairs[0], pairs[1], pairs[2], pairs[3]
+                )
+                if node % NODES_A_QUARTETS_CHOICE == 0:
+                    quartet_count = choose_quartets(
+                        actions[:moving],
+                        c,
+                        raised[:moving],
+                        b[:moving],
+                        pairs,
+                        STRONG,
+                        quartets,
+                        signs,
+                        of_quartets,
+                    )
                 for i in range(strong):
                     third_order_triad(
                         triads[chosen[i]],
                         c,
                         raised[:moving],
                         b[:moving],
-                        part[0],
-                        part[1],
-                        part[2],
-                        part[3],
+                        pairs[0],
+                        pairs[1],
+                        pairs[2],
+                        pairs[3],
                         kappa[i, :moving],
                     )
         mo = moving
@@ -485,6 +619,10 @@ def flow(
                 count,
                 strong,
                 kappa,
+                quartets,
+                signs,
+                of_quartets,
+                quartet_count,
                 speed[slot, :mo],
                 pull[:, :mo],
                 flight[:, :mo],
@@ -493,10 +631,10 @@ def flow(
                 speed[slot, n] += third[n]
             for n in range(mo):  # ẇ = i g z̄ e^{σt - iΦ}
                 growth = math.exp(decays[n] * time_s)
-                x, y = pull[0, n] * z[0, n] + pull[1, n] * z[1, n], pull[1, n] * z[0, n] - pull[0, n] * z[1, n]
+                re, im = pull[0, n] * z[0, n] + pull[1, n] * z[1, n], pull[1, n] * z[0, n] - pull[0, n] * z[1, n]
                 cosine, sine = growth * math.cos(stage_phase[n]), growth * math.sin(stage_phase[n])
-                drift[slot, 0, n] = -y * cosine + x * sine
-                drift[slot, 1, n] = x * cosine + y * sine
+                drift[slot, 0, n] = -im * cosine + re * sine
+                drift[slot, 1, n] = re * cosine + im * sine
         while frame < steps and (frame + 1) / rate_hz <= (node + 1) * node_s * (1 + 1e-12):
             time_s = (frame + 1) / rate_hz
             t = time_s / node_s - node

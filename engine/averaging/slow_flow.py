@@ -10,10 +10,15 @@ With k_n = c η_n² the motion of `engine.resonators.base` without damping has t
 3. Second order, with V_mn = 1/(Ω_m² - Ω_n²): K₂ = -(c²/64) [Σ a_n³ b_n/Ω_n + 4 Σ_{m≠n} η_m² V_mn a_m a_n²].
 4. Triads. In second order there is also, for all j ≤ k < l with |ω_j + ω_k - ω_l| < ω_1, 2τ Re(z_j² z_k² z̄_l²) of
    z = √I e^{iθ}: τ = -(c²/32) b_j b_k b_l [(b_j + b_k)/Ω_l - (b_j - b_l)/Ω_k - (b_k - b_l)/Ω_j], half for j = k.
-5. Flow: ż_n = i ∂K/∂z̄_n - σ_n z_n, where K₁ and K₂ are differentiated through S̄, too.
-6. Back: (I, θ') is the averaged one moved by χ = (c/4) Σ_{m≠n} Ω_m V_mn Y_m X_n + (c/16) Σ X_n Y_n/Ω_n, where
-   X_n = a_n cos 2θ_n and Y_n = a_n sin 2θ_n: θ + ∂χ/∂I, I - ∂χ/∂θ. A start,
-   which decides all later phases, is moved in second order.
+5. Third order, of one definition: K₃ = Res [{{S²,χ},χ}/3 + {{K₁,χ},χ}/6] c/4 with χ of 7 and S = S̄ + Σ a_n cos 2θ_n.
+   Its mean is a sum over pairs and chains of three modes (`third_order` in the kernel), it corrects the triads that
+   count by what every other mode's energy adds to τ (`third_order_triad`), and it has resonances of four,
+   j + k = l + m and j + k + l = m (`weigh_quartet`), of which those of the loudest modes are kept.
+6. Flow: ż_n = i ∂K/∂z̄_n - σ_n z_n. K₁ and K₂ are differentiated through S̄, too, K₃ and triads nearly so: as if all
+   frequencies rose alike, which they do but for the stiffness.
+7. Back: (I, θ') is the averaged one moved by χ = (c/4) Σ_{m≠n} Ω_m V_mn Y_m X_n + (c/16) Σ X_n Y_n/Ω_n, where
+   X_n = a_n cos 2θ_n and Y_n = a_n sin 2θ_n: θ + ∂χ/∂I, I - ∂χ/∂θ. A start, which decides all later phases, is moved
+   in second order; frames in first, which is most of what is wrong with the first periods of a hard pluck.
 
 Damping. (q, p = q̇ + σq) obeys the same Hamiltonian with ω² - σ² in place of ω², beside a decay of both by σ: a quiet
 resonator is the damped linear one exactly.
