@@ -320,7 +320,7 @@ def third_order_triad(
 
 @njit(**COMPILED)
 def pair_matrices(raised: Array, b: Array, v: Array, r: Array, x: Array, y: Array, w: Array) -> None:
-    """Writes R of χ = (c/4) Σ R_mn Y_m X_n, x and y of {S̄, χ} ~ Σ x_mn X_m X_n + Σ y_mn Y_m Y_n, and w = y - 2bYY/Ω."""
+    """Writes R of χ = (c/4) Σ R_mn Y_m X_n, x, y of {S̄, χ} ~ Σ x_mn X_m X_n + Σ y_mn Y_m Y_n, and w = y - 2bYY/Ω."""
     modes = len(raised)
     for m in range(modes):
         for n in range(modes):
