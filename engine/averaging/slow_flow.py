@@ -10,7 +10,8 @@ With k_n = c η_n² the motion of `engine.resonators.base` without damping has t
 3. Second order, with V_mn = 1/(Ω_m² - Ω_n²): K₂ = -(c²/64) [Σ a_n³ b_n/Ω_n + 4 Σ_{m≠n} η_m² V_mn a_m a_n²].
 4. Triads. In second order there is also, for all j ≤ k < l with |ω_j + ω_k - ω_l| < ω_1, 2τ Re(z_j² z_k² z̄_l²) of
    z = √I e^{iθ}: τ = -(c²/32) b_j b_k b_l [(b_j + b_k)/Ω_l - (b_j - b_l)/Ω_k - (b_k - b_l)/Ω_j], half for j = k.
-5. Third order, of one definition: K₃ = Res [{{S²,χ},χ}/3 + {{K₁,χ},χ}/6] c/4 with χ of 7 and S = S̄ + Σ a_n cos 2θ_n.
+5. Third order. With Ω and S̄ held, H₁ = (c/4)(S - S̄)² is a polynomial, {K₀, χ₁} = K₁ - H₁ defines its generator, and
+   K₃ = Res ({{H₁, χ₁}, χ₁}/3 + {{K₁, χ₁}, χ₁}/6), where S̄ becomes Σ a_n again.
    Its mean is a sum over pairs and chains of three modes (`third_order` in the kernel), it corrects the triads that
    count by what every other mode's energy adds to τ (`third_order_triad`), and it has resonances of four,
    j + k = l + m and j + k + l = m (`weigh_quartet`), of which those of the loudest modes are kept.
