@@ -65,7 +65,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.inputs import InputKind, input_size, join_input
 
@@ -174,7 +174,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
+class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -251,6 +251,13 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             done += block.shape[1]
         return torch.cat(blocks, dim=1), state
 
+    def sample(
+        self, state: IntegratedPhaseState, frames: Tensor, steps: int, readout: Tensor | None = None
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        end = state.time + steps
+        latents, integral = self._latents_at(state, frames, end)
+        return self.decode(latents, readout), IntegratedPhaseState(state.origin, end, integral)
+
     def at(self, state: IntegratedPhaseState, times: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (batch, times, points) at `times` (times,), in samples from the state's own time.
 
@@ -259,11 +266,12 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         """
         if bool((times < 0).any()):
             raise ValueError("times must not be before the state's own; encode again, or keep an earlier state")
-        return self.decode(self._latents_at(state, times), readout)
+        return self.decode(self._latents_at(state, times, state.time)[0], readout)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z of any frames ≥ 0 (whole or not, any order), complex (batch, frames, state_size)."""
-        return self._latents_at(_at_rest(origin), frames)
+        start = _at_rest(origin)
+        return self._latents_at(start, frames, start.time)[0]
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
@@ -277,13 +285,13 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             coupling = coupling * self.energy_units[:, None]
         return _Rates(sigma, self.theta_log.exp(), coupling * self._rate_units)
 
-    def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor) -> Tensor:
-        """z at times (times,) after the state's, complex (batch, times, state_size)."""
+    def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor, end: Fraction) -> tuple[Tensor, Tensor]:
+        """z at times (times,) after the state's, complex (batch, times, state_size), and the integral at `end`."""
         rates = self._rates()
         times = ahead.double() + float(state.time)
-        motion, _ = self._move(state, rates, times, state.time)
+        motion, integral = self._move(state, rates, times, end)
         factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
-        return (state.origin[:, None] * factor).to(state.origin.dtype)
+        return (state.origin[:, None] * factor).to(state.origin.dtype), integral
 
     def _render(
         self, state: IntegratedPhaseState, rates: _Rates, count: int, step: Fraction, readout: Tensor | None

@@ -16,6 +16,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetInfo, read_info
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource, project
+from engine.voices import Ear
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def take_of(
     info: PresetInfo, pluck: Pluck, gains: list[float], sharp_cents: float = 0.0, seconds: float = 0.5
 ) -> Take:
     """A linear string, and beside it one with modes of other levels and, where asked, a higher tension."""
-    take = Take("take", info, pluck, seconds)
+    take = Take("take", info, pluck, seconds, Ear((0.5,)))
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
     tighter = replace(info.string, tension_n=info.string.tension_n * 2 ** (2 * sharp_cents / 1200))
     motions = []
