@@ -1,6 +1,6 @@
 """Displacement over time and place as a picture, at any zoom without aliasing.
 
-Where a pixel's column is less than a frame, every frame is drawn. Where it is many, but a small part of a period,
+Where a pixel's column is less than a picture, every picture is drawn. Where it is many, but a small part of a period,
 each place shows its extreme in the column. Where it is more, signs would be moiré: each place shows its largest
 magnitude, from envelopes that were computed once.
 """
@@ -28,7 +28,7 @@ class Picture:
     """Displacement in m, float32 (places, columns), of the times start_s … stop_s.
 
     Attributes:
-        detail: what a column is: a frame, the extreme of its frames, or the largest magnitude of its frames.
+        detail: what a column is: a picture, the extreme of its pictures, or their largest magnitude.
     """
 
     displacement_m: NDArray[np.float32]
@@ -51,7 +51,7 @@ class Picture:
 
 
 def motion_of(take: Take, quantity: str, first: int, last: int) -> NDArray[np.float32]:
-    """Frames first … last (frames, places) of "model", "truth" or "error": model − truth, in m."""
+    """Pictures first … last (pictures, places) of "model", "truth" or "error": model − truth, in m."""
     if quantity == "error":
         return take.motion_m("model")[first:last] - take.motion_m("truth")[first:last]
     return take.motion_m(quantity)[first:last]

@@ -29,6 +29,9 @@ class Job:
     Args:
         load: a preset's model and truth.
         helper: another thread, so that two sources are rendered at the same time.
+
+    Attributes:
+        take: what it makes; None before the first block.
     """
 
     def __init__(
@@ -37,7 +40,7 @@ class Job:
         self.request = request
         self._load, self._listener, self._helper = load, listener, helper
         self._lines: dict[str, Line] = {}
-        self._take: Take | None = None
+        self.take: Take | None = None
         self._strobe: Strobe | None = None
         self._errors = ErrorSums(0)
         self._measured = 1  # pictures; the first is no prediction
@@ -55,12 +58,12 @@ class Job:
 
     @property
     def rendered_s(self) -> float:
-        return 0.0 if self._take is None else self._take.ready_frames / self._take.picture_hz
+        return 0.0 if self.take is None else self.take.ready_frames / self.take.picture_hz
 
     @property
     def idle(self) -> bool:
         """Whether there is nothing left to do."""
-        take = self._take
+        take = self.take
         return (
             self._finished
             and take is not None
@@ -75,8 +78,8 @@ class Job:
         Raises:
             PresetError: the preset cannot be used.
         """
-        begins = self._take is None
-        take = self._take = self._take or self._begin()
+        begins = self.take is None
+        take = self.take = self.take or self._begin()
         self._find_others(take)
         self._show_and_listen(take)
         self._advance_lines(take)

@@ -20,7 +20,7 @@ from engine.sources import StringSource
 from engine.voices import Ear
 
 SOURCES = ("model", "truth")
-PICTURE_HZ = 4_000  # of a motion, at most: a dozen pictures a period of the highest string, sixteen of a B
+PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures a period of a B at 247 Hz
 _TINY = 1e-6  # of a frame
 
 

@@ -122,8 +122,8 @@ class Performance(QObject):
 
     @property
     def settled(self) -> bool:
-        """Whether the motion that is shown is whole, so that views may rest."""
-        return self.take is None or self.take.complete
+        """Whether what is shown is whole, so that views may rest."""
+        return self.take is None or (self.take.complete and self.take.listened.complete)
 
     @property
     def match(self) -> Mapping[str, float] | None:

@@ -254,9 +254,17 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     def sample(
         self, state: IntegratedPhaseState, frames: Tensor, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, IntegratedPhaseState]:
-        end = state.time + steps
-        latents, integral = self._latents_at(state, frames, end)
-        return self.decode(latents, readout), IntegratedPhaseState(state.origin, end, integral)
+        """See the contract. Segments are as long as in `_listen`: here too their ends are what costs."""
+        rates, spacing = self._rates(), self.configuration.node_spacing
+        early = min(steps, max(0, math.ceil(SETTLED * spacing - state.time)))
+        blocks, done = [], 0
+        for count, samples in ((early, SEGMENT), (steps - early, spacing)):
+            if count:
+                here = frames[(frames > done) & (frames <= done + count)] - done
+                block, state = self._pick(state, rates, here, count, samples, readout)
+                blocks.append(block)
+                done += count
+        return torch.cat(blocks, dim=1), state
 
     def at(self, state: IntegratedPhaseState, times: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (batch, times, points) at `times` (times,), in samples from the state's own time.
@@ -266,12 +274,11 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         """
         if bool((times < 0).any()):
             raise ValueError("times must not be before the state's own; encode again, or keep an earlier state")
-        return self.decode(self._latents_at(state, times, state.time)[0], readout)
+        return self.decode(self._latents_at(state, times), readout)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z of any frames ≥ 0 (whole or not, any order), complex (batch, frames, state_size)."""
-        start = _at_rest(origin)
-        return self._latents_at(start, frames, start.time)[0]
+        return self._latents_at(_at_rest(origin), frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
@@ -285,13 +292,13 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
             coupling = coupling * self.energy_units[:, None]
         return _Rates(sigma, self.theta_log.exp(), coupling * self._rate_units)
 
-    def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor, end: Fraction) -> tuple[Tensor, Tensor]:
-        """z at times (times,) after the state's, complex (batch, times, state_size), and the integral at `end`."""
+    def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor) -> Tensor:
+        """z at times (times,) after the state's, complex (batch, times, state_size)."""
         rates = self._rates()
         times = ahead.double() + float(state.time)
-        motion, integral = self._move(state, rates, times, end)
+        motion, _ = self._move(state, rates, times, state.time)
         factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
-        return (state.origin[:, None] * factor).to(state.origin.dtype), integral
+        return (state.origin[:, None] * factor).to(state.origin.dtype)
 
     def _render(
         self, state: IntegratedPhaseState, rates: _Rates, count: int, step: Fraction, readout: Tensor | None
@@ -304,9 +311,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         """
         length = self._segment_length(SEGMENT, step)
         segments, later = self._segments(state, rates, count, step, length)
-        alive = segments.alive
-        if self.multiplier is not None or self.decoder_residual is not None:
-            alive = torch.arange(len(rates.sigma), device=alive.device)  # their networks take every latent
+        alive = self._decoded(segments)
         ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
@@ -314,6 +319,33 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
         frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
         return frames[:, segments.begin : segments.begin + count], later
+
+    def _pick(
+        self,
+        state: IntegratedPhaseState,
+        rates: _Rates,
+        frames: Tensor,
+        count: int,
+        samples: int,
+        readout: Tensor | None,
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        """Some of the next `count` frames, from segments of at most `samples`, and the state after all of them."""
+        step = Fraction(1)
+        length = self._segment_length(samples, step)
+        segments, later = self._segments(state, rates, count, step, length)
+        alive = self._decoded(segments)
+        number, offset = (segments.begin + frames - 1) // length, (segments.begin + frames - 1) % length
+        basis = hermite(length, segments.ends)[offset]
+        log_radius, phase = torch.einsum("fk,kpbfn->pbfn", basis, segments.ends[..., alive][:, :, :, number])
+        dtype = self.decoder.weight.dtype
+        radius, phase = torch.exp(log_radius.to(dtype)), torch.remainder(phase, 2 * math.pi).to(dtype)
+        return self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive), later
+
+    def _decoded(self, segments: _Segments) -> Tensor:
+        """The latents that a decoder is given: those that count, or all where networks take them."""
+        if self.multiplier is None and self.decoder_residual is None:
+            return segments.alive
+        return torch.arange(self.configuration.state_size, device=segments.alive.device)
 
     def _can_listen(self, state: IntegratedPhaseState, readout: Tensor) -> bool:
         """Whether `_listen` applies: a linear decoder at a few points, on a processor, and no gradients asked for."""

@@ -16,7 +16,7 @@ from app.views.plots.waveform_view import WaveformView
 from app.window.panels.base import Moment, Panel
 
 EVERY = 2  # moments
-MOST_FRAMES = 32_768  # at a time: what is new after the listening point has moved comes in a few steps
+MOST_FRAMES = 262_144  # at a time: a millisecond
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
 

@@ -17,6 +17,7 @@ from app.audio.output import Output
 from app.audio.sound import Sound
 from app.playing.notes import Note
 from app.session.choices import Choices
+from app.session.ears import heard_ear
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.performance import Performance
@@ -225,6 +226,21 @@ def test_the_picture_follows_the_latest_note(qtbot: QtBot, window: Controller, p
     third = pluck(qtbot, performance)  # the same again: its motion is there
     assert performance._shown.note is third
     assert ringing(performance) == [first, second, third]
+
+
+def test_another_listening_point_and_speed_are_of_the_same_take(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    """Nothing that is seen of it is rendered again; signals and slow motion follow."""
+    session, take = window.session, performance.take
+    assert take is not None
+    pictures = take.motion_m("truth").copy()
+    for choices in ({"listen": 0.8}, {"pickup": "velocity", "stereo": True}, {"solo": 2}, {"speed": 0.1}):
+        session.update(**choices)
+        qtbot.waitUntil(lambda: take.listened.ear == heard_ear(session.choices) and take.listened.complete)
+    qtbot.waitUntil(lambda: take.motion("model").flashes.strobe.speed == 0.1)
+    assert performance.take is take
+    assert (take.motion_m("truth") == pictures).all()
 
 
 def test_a_note_of_an_instrument_is_in_the_mixer_before_the_window_knows(

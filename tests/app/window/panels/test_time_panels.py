@@ -97,7 +97,7 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
     view = panel.view
     watch(qtbot, panel, take, lambda: panel._envelopes is not None and panel._envelopes.complete)
     view.plot.show_times(0.0, 0.02)
-    watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
+    watch(qtbot, panel, take, lambda: view.readout.text() == "every picture")
     assert view._image.image.shape[0] == 101
     assert view._image.image.max() == pytest.approx(1.01 * 4, rel=1e-3)
     assert view._bar.levels() == (-4, 4)
@@ -120,7 +120,7 @@ def test_bar_colours_and_readout_agree_on_the_sign(qtbot: QtBot, make: Make, tak
     assert view.readout.text().endswith(f"peak {panel._picture.at(0.3, 0.5) * 1000:.4g} mm")
     view.plot.show_times(0.0, 0.02)
     panel._tell(float("nan"), 0.5)
-    watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
+    watch(qtbot, panel, take, lambda: view.readout.text() == "every picture")
     assert view._bar.levels() == (-view.scale_mm, view.scale_mm)
 
 
