@@ -18,6 +18,7 @@ from app.shared.vocabulary import OTHER
 from engine.metrics import ErrorSums
 from engine.presets import PresetError
 from engine.sources import ModelSource
+from engine.voices import Ear
 
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; each block is twice as long as the last, up to this: another pluck waits for no more
@@ -42,6 +43,7 @@ class Job:
         self._lines: dict[str, Line] = {}
         self.take: Take | None = None
         self._strobe: Strobe | None = None
+        self._coming: Listened | None = None  # what is heard elsewhere, until all of it is there
         self._errors = ErrorSums(0)
         self._measured = 1  # pictures; the first is no prediction
         self._finished = False  # and told
@@ -67,6 +69,7 @@ class Job:
         return (
             self._finished
             and take is not None
+            and self._coming is None
             and take.listened.ear == self.request.ear
             and self._strobe == self._wanted_strobe(take)
             and all(name in self._lines and self._lines[name].complete for name in self._wanted())
@@ -81,7 +84,8 @@ class Job:
         begins = self.take is None
         take = self.take = self.take or self._begin()
         self._find_others(take)
-        self._show_and_listen(take)
+        self._show(take)
+        self._listen(take)
         self._advance_lines(take)
         self._measure(take)
         if begins:
@@ -101,7 +105,7 @@ class Job:
             motion = take.motion(name)
             self._lines[name] = Line(source, program, info, request.pluck, motion, request.seconds, stride)
         self._errors = ErrorSums(take.frames - 1)
-        self._listen(take)
+        take.listened = self._listened(request.ear)
         return take
 
     def _find_others(self, take: Take) -> None:
@@ -121,21 +125,36 @@ class Job:
             line = self._lines[name] = Line(source, program, info, take.pluck, motion, take.seconds, stride)
             if self._strobe is not None:
                 line.show(self._strobe)
-            take.listened.signals[name] = line.listen(take.listened.ear)
+            listened = self._coming or take.listened
+            listened.signals[name] = line.listen(listened.ear)
             take.others[name] = motion
 
-    def _show_and_listen(self, take: Take) -> None:
-        """Begins anew what depends on the slow motion and on the listening points, where they are others."""
+    def _show(self, take: Take) -> None:
+        """Begins the flashes anew, where the slow motion is another."""
         if self._strobe != (strobe := self._wanted_strobe(take)):
             self._strobe = strobe
             for line in self._lines.values():
                 line.show(strobe)
-        if take.listened.ear != self.request.ear:
-            self._listen(take)
 
     def _listen(self, take: Take) -> None:
+        """Listens elsewhere, where that is asked for.
+
+        What is whole stays until the other is: a point that is dragged is drawn as often as all of it is rendered.
+        """
         ear = self.request.ear
-        take.listened = Listened(ear, {name: line.listen(ear) for name, line in self._lines.items()})
+        if self._coming is not None and self._is_whole(self._coming):
+            take.listened, self._coming = self._coming, None
+        if self._coming is None and take.listened.ear != ear:
+            if self._is_whole(take.listened):
+                self._coming = self._listened(ear)
+            elif not take.complete:
+                take.listened = self._listened(ear)
+
+    def _listened(self, ear: Ear) -> Listened:
+        return Listened(ear, {name: line.listen(ear) for name, line in self._lines.items()})
+
+    def _is_whole(self, listened: Listened) -> bool:
+        return all(listened.signals[name].complete for name in self._wanted() if name in listened.signals)
 
     def _wanted_strobe(self, take: Take) -> Strobe:
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)

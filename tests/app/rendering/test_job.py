@@ -148,6 +148,20 @@ def test_a_listening_point_that_moves_hears_what_one_there_would_have_heard(
         finished(moved)
 
 
+def test_while_a_point_is_dragged_what_is_drawn_is_whole(job: Render) -> None:
+    """And it follows, though no point stays long enough."""
+    made = job(NETWORK)
+    take = finished(made)
+    seen = []
+    for number in range(40):
+        made.ask_again(replace(made.request, ear=Ear((0.1 + 0.02 * number,))))
+        made.advance()
+        assert take.listened.complete
+        seen.append(take.listened.ear.points[0])
+    assert len(set(seen)) > 5
+    assert finished(made).listened.ear == Ear((0.1 + 0.02 * 39,))
+
+
 @PRESETS
 def test_another_speed_shows_what_it_would_have_shown(preset: Any, job: Render) -> None:
     there = finished(job(preset, speed=0.02))
