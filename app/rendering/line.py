@@ -47,7 +47,7 @@ class Line:
         self._initial = _initial_m(pluck, info.grid_points, info.modes)
         self._pictures = _Frames(source, self._initial)
         self._shown: _Frames | None = None  # of flashes that are behind the pictures
-        self._listening: Listening | None = None
+        self._listening: Listening | None = None  # until its signal is whole
 
     @property
     def done(self) -> int:
@@ -55,11 +55,7 @@ class Line:
 
     @property
     def complete(self) -> bool:
-        return (
-            self.done == self.frames
-            and self._shown is None
-            and (self._listening is None or self._listening.signal.complete)
-        )
+        return self.done == self.frames and self._shown is None and self._listening is None
 
     @property
     def ends_s(self) -> float | None:
@@ -106,8 +102,10 @@ class Line:
             self.motion.append(frames if len(wanted) == len(numbers) else frames[np.searchsorted(wanted, numbers)])
         if self._shown is not None and flashes is not None:
             self._catch_up(self._shown, flashes, max(samples, 2048 * self.stride))
-        if self._listening is not None and not self._listening.signal.complete:
+        if self._listening is not None:
             self._listening.advance()
+            if self._listening.signal.complete:
+                self._listening = None
 
     def _catch_up(self, shown: _Frames, flashes: Flashes, most: int) -> None:
         stop = min(shown.done + most, self.done)

@@ -16,7 +16,8 @@ from engine.pluck import FULL_SCALE_M
 from engine.sources import Runaway, SourceState, StringSource
 from engine.voices import Ear, OfflineVoice, Program
 
-BLOCK_FRAMES = 32_768  # of a compiled voice: a few milliseconds
+FIRST_FRAMES = 2_048  # of a compiled voice; each block is twice as long as the last, up to the next
+BLOCK_FRAMES = 32_768
 RENDERED_FRAMES = 2_048
 BEHIND = 4 * QUANTUM  # a voice whose samples are rendered reads so far ahead at most
 MIRRORED = 2 * REACH + 2 * QUANTUM  # samples behind the end, for the slope there
@@ -51,7 +52,7 @@ class Listening:
     def advance(self) -> None:
         """A block of it, or what there is."""
         signal = self.signal
-        readable = signal.ready_frames + BLOCK_FRAMES
+        readable = signal.ready_frames + min(max(FIRST_FRAMES, signal.ready_frames), BLOCK_FRAMES)
         try:
             if self._program.rendered:
                 self._give(self._more())

@@ -58,6 +58,7 @@ class Flashes:
         after = np.minimum(before + 1, frames - 1)
         share = places - before
         self._parts = [(before, 1 - share), (after, share)]
+        self._needed = np.unique(np.concatenate([before, after]))
         self._last = after
         self._shapes_m = np.zeros((len(places), grid_points), np.float32)
         self.ready = 0
@@ -68,8 +69,7 @@ class Flashes:
 
     def needed(self, first: int, stop: int) -> NDArray[np.int64]:
         """The frames first … stop - 1 that flashes show, ascending."""
-        frames = np.unique(np.concatenate([frames for frames, _ in self._parts]))
-        return frames[np.searchsorted(frames, first) : np.searchsorted(frames, stop)]
+        return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]
 
     def take(self, stop: int, numbers: NDArray[np.int64], frames_m: NDArray[np.float32]) -> None:
         """Frames of these ascending numbers, (frames, grid_points), among them all that are needed before `stop`."""

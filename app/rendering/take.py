@@ -43,7 +43,7 @@ class Motion:
         self.frames = int(seconds * rate_hz + _TINY) + 1
         self.ready_frames = 0
         self.flashes: Flashes | None = None
-        self._m = np.zeros((self.frames, grid_points), np.float32)
+        self._m = np.empty((self.frames, grid_points), np.float32)
 
     @property
     def complete(self) -> bool:
@@ -85,7 +85,7 @@ class Signal:
         self.rate_hz = rate_hz
         self.frames = int(seconds * rate_hz + _TINY) + 1
         self.ready_frames = 0
-        self._samples = np.zeros((self.frames, points), np.float32)
+        self._samples = np.empty((self.frames, points), np.float32)
 
     @property
     def complete(self) -> bool:
@@ -102,6 +102,7 @@ class Signal:
         self.ready_frames = stop
 
     def end_in_silence(self) -> None:
+        self._samples[self.ready_frames :] = 0.0
         self.ready_frames = self.frames
 
     def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
