@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering import SOURCES, Take
+from app.rendering.strobe import Strobe
 from app.rendering.take import Listened, Motion, Signal
 from app.shared.vocabulary import DIFFERENCE
 
@@ -58,9 +59,9 @@ class HeardMotion:
         """The string (grid_points,) in m that slow motion shows at the playhead."""
         return _combined([motion.shape_m(position_s) for motion in self._motions], self.gain)
 
-    def flashed(self, position_s: float) -> bool:
-        """Whether that is a flash of it, and no picture nearby."""
-        return all(motion.flash_m(position_s) is not None for motion in self._motions)
+    def strobes(self, position_s: float) -> list[Strobe | None]:
+        """Whose flashes that is made of; None: of a picture nearby."""
+        return [motion.strobe_at(position_s) for motion in self._motions]
 
     @cached_property
     def _motions(self) -> list[Motion]:

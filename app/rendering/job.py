@@ -130,8 +130,9 @@ class Job:
             take.others[name] = motion
 
     def _show(self, take: Take) -> None:
-        """Begins the flashes anew, where the slow motion is another."""
-        if self._strobe != (strobe := self._wanted_strobe(take)):
+        """Begins the flashes anew, where the slow motion is another; those on their way are finished first."""
+        behind = any(self._lines[name].behind for name in self._wanted() if name in self._lines)
+        if self._strobe != (strobe := self._wanted_strobe(take)) and not behind:
             self._strobe = strobe
             for line in self._lines.values():
                 line.show(strobe)

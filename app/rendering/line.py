@@ -46,7 +46,8 @@ class Line:
         self._seconds, self._source, self._program = seconds, source, program
         self._initial = _initial_m(pluck, info.grid_points, info.modes)
         self._pictures = _Frames(source, self._initial)
-        self._shown: _Frames | None = None  # of flashes that are behind the pictures
+        self._flashes: Flashes | None = None
+        self._shown: _Frames | None = None  # what shows them, where they are behind the pictures
         self._listening: Listening | None = None  # until its signal is whole
 
     @property
@@ -56,6 +57,11 @@ class Line:
     @property
     def complete(self) -> bool:
         return self.done == self.frames and self._shown is None and self._listening is None
+
+    @property
+    def behind(self) -> bool:
+        """Whether flashes that were asked for later than the pictures are on their way."""
+        return self._shown is not None
 
     @property
     def ends_s(self) -> float | None:
@@ -68,13 +74,13 @@ class Line:
         return max(0, min(self.frames, int(np.ceil(time_s * self.rate_hz))) - self.done)
 
     def show(self, strobe: Strobe) -> None:
-        """Shows the flashes of another strobe."""
-        flashes = Flashes(strobe, self.rate_hz, self.frames, self._initial.shape[1])
-        if self.stride == 1:  # all frames are kept
-            numbers = flashes.needed(0, self.done)
-            flashes.take(self.done, numbers, self.motion.read()[numbers])
-        elif self.done:
+        """Shows the flashes of another strobe, when all that there can be are there."""
+        flashes = self._flashes = Flashes(strobe, self.rate_hz, self.frames, self._initial.shape[1])
+        if self.stride > 1 and self.done:
             self._shown = _Frames(self._source, self._initial)
+            return
+        numbers = flashes.needed(0, self.done)  # all frames are kept
+        flashes.take(self.done, numbers, self.motion.read()[numbers])
         self.motion.flashes = flashes
 
     def listen(self, ear: Ear) -> Signal:
@@ -90,7 +96,7 @@ class Line:
 
     def advance(self, samples: int) -> None:
         """Renders pictures and flashes of the next samples, what flashes are behind, and a block of the signal."""
-        first, stop, flashes = self.done, self.done + samples, self.motion.flashes
+        first, stop, flashes = self.done, self.done + samples, self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
             wanted, joint = numbers, flashes is not None and self._shown is None
@@ -112,7 +118,7 @@ class Line:
         numbers = flashes.needed(shown.done, stop)
         flashes.take(stop, numbers, shown.take(numbers, stop))
         if stop == self.done:
-            self._shown = None
+            self._shown, self.motion.flashes = None, flashes
 
 
 class _Frames:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from app.rendering.strobe import Flashes
+from app.rendering.strobe import Flashes, Strobe
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.sources import StringSource
@@ -71,6 +71,11 @@ class Motion:
             nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
             shown = self.read(nearest, nearest + 1)[0]
         return shown
+
+    def strobe_at(self, position_s: float) -> Strobe | None:
+        """Whose flash `shape_m` is; None: a picture."""
+        flashes = self.flashes
+        return None if flashes is None or self.flash_m(position_s) is None else flashes.strobe
 
     def flash_m(self, position_s: float) -> NDArray[np.float32] | None:
         """As `shape_m`; None where its flash is not there yet."""

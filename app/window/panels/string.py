@@ -97,8 +97,8 @@ class StringPanel(Panel):
         there = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motion, and one motion ahead of another: all are of one moment
         position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
-        flashed = [motion.flashed(position_s) for motion in there]
-        shown = (take, position_s, flashed, choices.speed, choices.envelope, choices.solo)
+        strobes = [motion.strobes(position_s) for motion in there]
+        shown = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
         if not moment.playing and shown == self._shown:
             return
         self._shown = shown

@@ -163,14 +163,21 @@ def test_while_a_point_is_dragged_what_is_drawn_is_whole(job: Render) -> None:
 
 
 @PRESETS
-def test_another_speed_shows_what_it_would_have_shown(preset: Any, job: Render) -> None:
+@pytest.mark.parametrize("blocks", [2, 1_000])
+def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, job: Render) -> None:
+    """Half-way and afterwards."""
     there = finished(job(preset, speed=0.02))
     slower = job(preset)
-    for _ in range(3):
+    while not slower.idle and blocks:
         slower.advance()
+        blocks -= 1
+    assert slower.take is not None
     for speed in (1.0, 0.02):
         slower.ask_again(replace(slower.request, speed=speed))
         slower.advance()
+        for name in SOURCES:  # what was shown is, until the other is there
+            motion = slower.take.motion(name)
+            assert motion.strobe_at(0.5 * motion.ready_frames / motion.rate_hz) is not None
     take = finished(slower)
     for name in SOURCES:
         near = 1e-6 * np.abs(there.motion_m(name)).max()
