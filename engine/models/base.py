@@ -118,7 +118,10 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
 
 class AnyFrameModel(StringModel[State]):
-    """A model of which any frame can be had without those before it."""
+    """A model of which some frames can be had for little more than their own cost.
+
+    Any can be had without those before it, or it is the frames' shapes that cost, not the way to them.
+    """
 
     @abstractmethod
     def sample(self, state: State, frames: Tensor, steps: int, readout: Tensor | None = None) -> tuple[Tensor, State]:

@@ -35,7 +35,7 @@ def test_bench_render_measures_every_model(run, monkeypatch: pytest.MonkeyPatch)
 
 def test_bench_take_measures_the_studio_strings(run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.commands.benchmarks.take.SECONDS", 0.1)
-    monkeypatch.setattr("app.commands.benchmarks.take.PREFIX", "studio_nylon_b3")
+    monkeypatch.setattr("app.commands.benchmarks.take.PRESETS", ("studio_nylon_b3",))
     (found,) = json.loads(run("bench", "take", "--json").out)["takes"]
     assert (found["preset"], found["picture_hz"]) == ("studio_nylon_b3", 6000)
     # 601 pictures, 13 flashes of 101 points and 4,801 samples of one point, four bytes each
