@@ -9,6 +9,7 @@ from pathlib import Path
 from psygnal import Signal
 
 from app.presets.folders import user_folder
+from engine.plain_text import one_line
 from engine.presets import (
     SHIPPED,
     PresetError,
@@ -105,6 +106,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                 problems.append(str(error))
             except OSError as error:  # taken away meanwhile
                 problems.append(f"{path}: cannot be read ({error.strerror})")
+            except Exception as error:  # whatever one file brings about, the others are listed
+                problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
     return [entries[name] for name in sorted(entries)], problems
 
 

@@ -17,6 +17,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from engine.presets.file import check_header
+from engine.schema import parse_json
 from engine.whole_file import whole_file
 
 
@@ -56,8 +58,9 @@ class Checkpoint:
         average: dict[str, Tensor] = {}
         optimiser: dict[str, dict[str, Tensor]] = {}
         try:
+            check_header(path)
             with safe_open(path, framework="pt") as file:
-                facts = json.loads(file.metadata()["facts"])
+                facts = parse_json(file.metadata()["facts"], "facts")
                 for key in file.keys():  # noqa: SIM118 - not a mapping
                     part, _, name = key.partition("/")
                     if part == "optimiser":
