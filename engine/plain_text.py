@@ -5,6 +5,11 @@ from __future__ import annotations
 LONGEST_MESSAGE = 500  # characters
 
 
+def printable(text: str) -> str:
+    """The text with its lines, and without anything that commands a terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+
+
 def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
     """The text in one line of printable characters, its middle left out where it is longer than `most`.
 

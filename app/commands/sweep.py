@@ -15,6 +15,7 @@ import typer
 from app.commands.arguments import Cache, Json
 from app.commands.console import Failure, number, print_json, print_table, say
 from app.shared.durations import duration
+from engine.plain_text import one_line
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -143,7 +144,7 @@ def measure(
         whole = filled(row, path, cache)
         add_rows(file, [whole])
         gained = sum(old is None and new is not None for old, new in zip(astuple(row), astuple(whole), strict=True))
-        print(f"{row.name}: {gained} figures added")
+        print(one_line(f"{row.name}: {gained} figures added"))
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:

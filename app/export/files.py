@@ -5,6 +5,7 @@ The window and the command line write the same files through this module.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -34,6 +35,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetError
 
 END_OF_TRAINING = "end of training"  # the marker's name
+LONGEST_NAME = 150  # characters of a preset in a file's name
 DECAY_FADE_S = 0.05  # where a sound ends by its decay
 
 
@@ -165,7 +167,8 @@ def write_wav(
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
-    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`."""
+    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`: one name, never a path, whatever `preset` is."""
+    preset = re.sub(r"[^\w .+-]", "_", preset[:LONGEST_NAME]).lstrip(". -") or "preset"
     place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
     return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
 
