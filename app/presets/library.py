@@ -22,6 +22,7 @@ from engine.presets import (
 from training.heard_file import Heard, read_heard
 
 FIRST = "studio_any_string"
+LONGEST_TITLE = 120  # characters in a list
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class PresetEntry:
     @property
     def title(self) -> str:
         """As it is listed: a copy in the user's folder is told from the shipped one."""
-        return f"{self.info.title} (yours)" if self.own else self.info.title
+        title = one_line(self.info.title, LONGEST_TITLE)
+        return f"{title} (yours)" if self.own else title
 
 
 class Library:
