@@ -57,6 +57,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
+FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
 WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
@@ -184,6 +185,10 @@ class MainWindow(QMainWindow):
         self._stage.setSizes([310, 0, 300])
         self._set_alive(True)
         view.setFocus()
+
+    def show_failed(self) -> None:
+        """Says, where the string would be, that it cannot be had."""
+        self._loading.setText(FAILED)
 
     def order_tabs(self) -> None:
         """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""

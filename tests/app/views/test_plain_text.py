@@ -37,7 +37,7 @@ def entry(small_preset: Path) -> PresetEntry:
 
 
 def formatted(root: QWidget) -> Iterator[str]:
-    """Every text beneath a widget that Qt would take for HTML: labels, editors, tips of widgets, items and actions."""
+    """Every text beneath a widget that Qt would take for HTML: labels, editors, tips."""
     for label in [*root.findChildren(QLabel), *([root] if isinstance(root, QLabel) else [])]:
         rich = label.textFormat() == Qt.TextFormat.RichText
         if rich or (label.textFormat() == Qt.TextFormat.AutoText and GuiQt.mightBeRichText(label.text())):
