@@ -28,6 +28,9 @@ class Report(Protocol):
 class Failure(Exception):
     """A command cannot be done. The message is one line: what is wrong, where, and the remedy."""
 
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
 
 def say(text: str) -> None:
     """One line on standard error, whatever a file's text holds."""

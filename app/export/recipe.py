@@ -126,7 +126,7 @@ def read_recipe(path: Path) -> Recipe:
         first = error.errors()[0]
         field = ".".join(map(str, first["loc"])) or "the text"
         raise _unusable(path, f"{field}: {first['msg']}") from error
-    except ValueError as error:  # of a number that is longer than any
+    except (ValueError, OverflowError) as error:  # of a number that is longer than any
         raise _unusable(path, str(error)) from error
 
 

@@ -79,7 +79,7 @@ def faults_logged(told: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def crashes_written() -> Iterator[None]:
-    """Within, what ends the process from within writes where its threads were into the file `.crash` beside the log."""
+    """Within, what ends the process writes where its threads were into the file `.crash` beside the log."""
     path = log_file().with_suffix(".crash")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -62,17 +62,19 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         return Settings(), one_line(f"The settings {path} cannot be read ({told}); starting with defaults.")
     try:
         return Settings.model_validate_json(text), ""
-    except ValidationError as error:
-        first = error.errors()[0]
+    except (ValidationError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
             path.replace(aside)
         except OSError:
             aside = path
-        field = ".".join(map(str, first["loc"])) or "the file"
-        kept = _without(text, error)
+        kept, why = None, str(error)
+        if isinstance(error, ValidationError):
+            first = error.errors()[0]
+            why = f"{'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}"
+            kept = _without(text, error)
         told = (
-            f"{'Some' if kept else 'The'} settings were not usable ({field}: {first['msg']}) and have their defaults "
+            f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
         )
         return kept or Settings(), one_line(told)
@@ -82,7 +84,7 @@ def read_settings(path: Path) -> Settings | None:
     """Those of a file as it is; None where there is none that can be used as a whole."""
     try:
         return Settings.model_validate_json(_bytes(path))
-    except (OSError, ValueError):
+    except (OSError, ValueError, OverflowError):
         return None
 
 
@@ -122,7 +124,7 @@ def _without(text: bytes, error: ValidationError) -> Settings | None:
         for field in fields:
             _drop(data, field)
         return Settings.model_validate(data)
-    except (ValidationError, SchemaError):
+    except (ValidationError, SchemaError, OverflowError):
         return None
 
 
