@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,21 @@ def render_voice(
     advanced: Callable[[float], None] = lambda share: None,
     until_db: float | None = None,
 ) -> NDArray[np.float32]:
-    """The first seconds of a pluck, (frames, points), ±1 being full scale; no limiter.
+    """All of `voice_blocks` at once, (frames, points)."""
+    return np.concatenate(list(voice_blocks(program, source, info, pluck, ear, seconds, advanced, until_db)))
+
+
+def voice_blocks(
+    program: Program,
+    source: ModelSource | None,
+    info: PresetInfo,
+    pluck: Pluck,
+    ear: Ear,
+    seconds: float,
+    advanced: Callable[[float], None] = lambda share: None,
+    until_db: float | None = None,
+) -> Iterator[NDArray[np.float32]]:
+    """The first seconds of a pluck in blocks (frames, points), ±1 being full scale; no limiter.
 
     Args:
         source: what renders the samples of a program that is not compiled.
@@ -51,20 +65,19 @@ def render_voice(
     voice.never_ends()
     mixer = Mixer(program.rate_hz, limited=False)
     mixer.add(voice)
-    frames = max(1, round(seconds * program.rate_hz))
-    out = np.zeros((frames, len(ear.points)), np.float32)
+    frames, points = max(1, round(seconds * program.rate_hz)), len(ear.points)
     loudest_db = -math.inf
     for first in range(0, frames, BLOCK_FRAMES):
         block = mixer.render(min(BLOCK_FRAMES, frames - first))
         if voice.ran_away:
             raise Runaway(voice.seconds)
-        out[first : first + len(block)] = block[:, : len(ear.points)]
-        share = (first + len(block)) / frames
-        advanced(FILLING + (1 - FILLING) * share if program.rendered else share)
+        yield block[:, :points].astype(np.float32)
+        done = first + len(block)
+        advanced(FILLING + (1 - FILLING) * done / frames if program.rendered else done / frames)
         loudest_db = max(loudest_db, voice.level_db)
         if until_db is not None and voice.level_db < loudest_db - until_db:
-            return out[: first + len(block) + round(SILENCE_S * program.rate_hz)]
-    return out
+            yield np.zeros((min(round(SILENCE_S * program.rate_hz), frames - done), points), np.float32)
+            return
 
 
 def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanced: Callable[[float], None]) -> None:
