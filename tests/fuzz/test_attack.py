@@ -25,7 +25,15 @@ from app.export.wav import WavSettings
 from app.presets.library import list_presets
 from app.window.settings import Settings, load_settings
 from engine.pluck import Pluck
-from engine.presets import SHIPPED, PresetError, described_parameters, load_preset, outside_training
+from engine.presets import (
+    SHIPPED,
+    STRINGS,
+    PresetError,
+    described_parameters,
+    load_preset,
+    outside_training,
+    read_string,
+)
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource, Runaway, TruthSource, project
 from engine.voices import Ear, model_program, render_voice, truth_program
@@ -69,10 +77,11 @@ def use(path: Path) -> None:
         return
 
 
-@pytest.mark.parametrize("name", ["small", "nylon_nonlinear_4k", "dmd"])
+@pytest.mark.parametrize("name", ["small", "nylon_nonlinear_4k", "dmd", "any_string"])
 def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
     shipped = {
         "nylon_nonlinear_4k": SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors",
+        "any_string": SHIPPED / "studio_any_string.safetensors",
         "dmd": SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors",
     }
     whole = shipped.get(name, small_preset).read_bytes()
@@ -88,7 +97,7 @@ def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, see
         entries, problems = list_presets(tmp_path)
         assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
 
-    attacked(f"presets ({name})", rounds // 3, seed, attack)
+    attacked(f"presets ({name})", rounds // 4, seed, attack)
 
 
 @dataclass(frozen=True)
@@ -207,6 +216,9 @@ TARGETS = (
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
     Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
     Target("run.toml", lambda p: CONFIGURATION, lambda p: load(str(p)), (SchemaError,), toml_or_bytes),
+    Target(
+        "string.toml", lambda p: (STRINGS / "steel_e4.toml").read_bytes(), read_string, (SchemaError,), toml_or_bytes
+    ),
     Target("rows.csv", row_file, read_results, (SchemaError,)),
     Target("heard.csv", lambda p: HEARD, heard, ()),
     Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),

@@ -30,7 +30,7 @@ def test_silence_at_the_end_of_time(path: Path) -> None:
         state = replace(state, inner=replace(state.inner, step=frame), frame=frame)
     else:  # a recurrence cannot jump: finite, or told
         try:
-            frames, _ = source.advance(state, 2_000)
+            frames, _ = source.advance(state, 300)
         except Runaway:
             return
         assert bool(torch.isfinite(frames).all())
