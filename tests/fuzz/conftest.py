@@ -22,7 +22,7 @@ settings.load_profile("attack")
 @pytest.fixture(scope="session")
 def rounds() -> int:
     """Damaged files of each kind."""
-    return 5_000 if LONG else 150
+    return int(os.environ.get("LEARNED_STRINGS_FUZZ_FILES", 5_000)) if LONG else 150
 
 
 @pytest.fixture(scope="session")
