@@ -78,6 +78,7 @@ class Controller(QObject):
         self._settings_path = settings_path
         self._audio_mail = _AudioMail()
         self.sound = make_sound(self._audio_mail.told.emit)
+        window.closing.connect(self.sound.close)  # should the rest fail
         self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
         self._audio_mail.told.connect(self.audio.tell)
         self.audio.open()  # it is opened while all else is made
@@ -125,6 +126,8 @@ class Controller(QObject):
         self.performance.choices_changed(everything)
         self._choices_shown(everything)
         self._timer.start()
+        window.closing.disconnect(self.sound.close)
+        window.closing.connect(self.close)
 
     # Connections
 
@@ -155,7 +158,6 @@ class Controller(QObject):
         window.help_asked.connect(self.show_help)
         window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
         window.all_modes_asked.connect(lambda: session.update(solo=0))
-        window.closing.connect(self.close)
 
     def _connect_history(self) -> None:
         window, session, history = self.window, self.session, self.history

@@ -28,6 +28,12 @@ class TrainedRange:
     peak_m: tuple[float, float]
     tension_rise: float | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("position", "width", "peak_m"):
+            low, high = getattr(self, name) or (0.0, 0.0)
+            if not 0 <= low <= high:
+                raise ValueError(f"{name} must be a range from 0 on, not {low:g} … {high:g}")
+
 
 @dataclass(frozen=True)
 class PresetInfo:

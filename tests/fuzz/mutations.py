@@ -55,7 +55,7 @@ def damaged_value(value: Any, draw: random.Random) -> Any:
         elif kind == 1 and isinstance(holder, dict) and holder is not whole:
             holder[draw.choice(("colour", "depth", "\x1b[2J", "y" * 5_000))] = draw.choice(HOSTILE)
         elif kind == 2 and isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
-            holder[key] = holder[key] * draw.choice((-1, 0, 2, 10, 1e3, 1e6, 10**9, 1e-9))
+            holder[key] = min(holder[key], 1e18) * draw.choice((-1, 0, 2, 10, 1e3, 1e6, 10**9, 1e-9))
         elif kind == 3:
             holder[key] = _nested(draw.choice((3, 40, 400)))
         else:
