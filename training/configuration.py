@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from engine import bounds
-from engine.models import MODELS, read_configuration
+from engine.models import MODELS, read_model_configuration
 from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
@@ -138,7 +138,7 @@ class TrainingConfiguration:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
         try:
-            model = read_configuration(self.model, self.model_configuration, "model_configuration")
+            model = read_model_configuration(self.model, self.model_configuration, "model_configuration")
         except SchemaError as error:
             raise ValueError(str(error)) from error  # whoever reads this knows the file
         if model.grid_points != self.data.grid_points:

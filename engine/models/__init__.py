@@ -38,10 +38,10 @@ def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> St
         SchemaError: a field is unknown, of another type, or refused by the configuration.
         KeyError: no such model.
     """
-    return MODELS[name][0](read_configuration(name, configuration or {}, "model_configuration"))
+    return MODELS[name][0](read_model_configuration(name, configuration or {}, "model_configuration"))
 
 
-def read_configuration(name: str, data: object, where: str) -> Any:
+def read_model_configuration(name: str, data: object, where: str) -> Any:
     """The configuration of a model from plain data, its sizes within `engine.bounds`.
 
     Raises:
@@ -78,5 +78,5 @@ __all__ = [
     "StringModel",
     "build_model",
     "count_parameters",
-    "read_configuration",
+    "read_model_configuration",
 ]

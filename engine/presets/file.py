@@ -20,7 +20,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from engine import bounds
-from engine.models import StringModel, build_model, count_parameters, read_configuration
+from engine.models import StringModel, build_model, count_parameters, read_model_configuration
 from engine.plain_text import one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
@@ -190,7 +190,7 @@ def _info_of(path: Path, file: Any) -> PresetInfo:
         raise PresetError(f"{path}: {error}") from error
     try:
         info = read(PresetInfo, data, "metadata")
-        read_configuration(info.model, info.model_configuration, "metadata.model_configuration")
+        read_model_configuration(info.model, info.model_configuration, "metadata.model_configuration")
     except SchemaError as error:
         raise PresetError(f"{path}: {error}; get the preset again or train it again") from error
     return info
