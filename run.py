@@ -3,6 +3,7 @@
 
 python3 run.py                 open the app
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
+python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones
 python3 run.py setup           only prepare
 python3 run.py -- render ...   the command line: everything after -- goes to learned-strings
 
@@ -128,6 +129,10 @@ def start(arguments: list[str]) -> int:
 
 def check(arguments: list[str]) -> int:
     """Run every lint, showing what the failed ones say, then pytest last; return non-zero if any failed."""
+    env = {"QT_QPA_PLATFORM": "offscreen", **os.environ}
+    if arguments[:1] == ["--fuzz"]:
+        env |= {"LEARNED_STRINGS_FUZZ": "long", "OMP_NUM_THREADS": "1"}
+        return subprocess.call([PYTHON, "-m", "pytest", "-s", "tests/fuzz", *arguments[1:]], cwd=ROOT, env=env)
     failed = []
     for name, command in LINTS.items():
         done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
@@ -135,7 +140,6 @@ def check(arguments: list[str]) -> int:
         if done.returncode:
             failed.append(name)
             os.write(1, done.stdout)
-    env = {"QT_QPA_PLATFORM": "offscreen", **os.environ}
     if not arguments:
         # A worker for each core and one numerical thread in each, or they fight over the cores.
         arguments = ["-n", str(min(os.cpu_count() or 1, 4)), "--dist", "loadfile"]

@@ -8,16 +8,54 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import math
 import types
 from collections.abc import Mapping
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from engine import bounds
+from engine.plain_text import one_line
+
 T = TypeVar("T")
 
 
 class SchemaError(ValueError):
-    """Data that does not fit its description."""
+    """Data that does not fit its description. The message is one line, whatever the data holds."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+def parse_json(text: str | bytes, where: str) -> Any:
+    """The plain data of a JSON text from anywhere; `where` names it in errors.
+
+    Raises:
+        SchemaError: not JSON, or longer or nested deeper than `engine.bounds` allows.
+    """
+    if len(text) > bounds.LARGEST_TEXT_BYTES:
+        raise SchemaError(f"{where}: longer than {bounds.LARGEST_TEXT_BYTES // 2**10} KiB")
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
+        raise SchemaError(f"{where}: not JSON that can be read ({error or type(error).__name__})") from error
+    check_nesting(data, where)
+    return data
+
+
+def check_nesting(data: object, where: str) -> None:
+    """Raises SchemaError where lists and tables lie deeper in each other than anything of ours."""
+    level = [data]
+    for _ in range(bounds.DEEPEST_NESTING):
+        level = [
+            inner
+            for outer in level
+            if isinstance(outer, dict | list)
+            for inner in (outer.values() if isinstance(outer, dict) else outer)
+        ]
+        if not level:
+            return
+    raise SchemaError(f"{where}: nested more than {bounds.DEEPEST_NESTING} deep")
 
 
 def read(kind: type[T], data: object, where: str) -> T:
@@ -45,6 +83,8 @@ def read(kind: type[T], data: object, where: str) -> T:
         raise
     except (ValueError, TypeError) as error:
         raise SchemaError(f"{where}: {error}") from error
+    except OverflowError as error:
+        raise SchemaError(f"{where}: a number is too large ({error})") from error
 
 
 @functools.cache
@@ -75,11 +115,13 @@ def _convert(hint: Any, data: Any, where: str) -> Any:
         return _convert(next(a for a in arguments if a is not type(None)), data, where)
     if origin is Literal:
         if data not in arguments:
-            raise SchemaError(f"{where}: {data!r} is not one of {', '.join(map(repr, arguments))}")
+            raise SchemaError(f"{where}: {bounds.brief(data)} is not one of {', '.join(map(repr, arguments))}")
         return data
     if origin is tuple:
         if not isinstance(data, list | tuple):
             raise SchemaError(f"{where}: expected a list, found {_describe(data)}")
+        if len(data) > bounds.MOST_ENTRIES:
+            raise SchemaError(f"{where}: has {len(data)} entries, at most {bounds.MOST_ENTRIES} may be given")
         if arguments[-1] is not Ellipsis and len(data) != len(arguments):
             raise SchemaError(f"{where}: expected {len(arguments)} entries, found {len(data)}")
         return tuple(_convert(arguments[0], entry, f"{where}[{i}]") for i, entry in enumerate(data))
@@ -92,16 +134,25 @@ def _convert(hint: Any, data: Any, where: str) -> Any:
 
 def _convert_scalar(hint: type, data: Any, where: str) -> Any:
     if hint is float and isinstance(data, int | float) and not isinstance(data, bool):
-        if not math.isfinite(data):
-            raise SchemaError(f"{where}: must be a finite number, not {data}")
-        return float(data)
+        try:
+            value = float(data)
+        except OverflowError:
+            value = math.inf
+        if not math.isfinite(value):
+            raise SchemaError(f"{where}: must be a finite number, not {bounds.brief(data)}")
+        return value
     if hint is int and isinstance(data, int) and not isinstance(data, bool):
+        if abs(data) > bounds.LARGEST_INTEGER:
+            raise SchemaError(f"{where}: must be a number of at most 64 bits, not {bounds.brief(data)}")
         return data
-    if hint in (bool, str) and isinstance(data, hint):
+    if hint is bool and isinstance(data, bool):
+        return data
+    if hint is str and isinstance(data, str):
+        if len(data) > bounds.LONGEST_STRING:
+            raise SchemaError(f"{where}: has {len(data)} characters, at most {bounds.LONGEST_STRING} may be given")
         return data
     raise SchemaError(f"{where}: expected {hint.__name__}, found {_describe(data)}")
 
 
 def _describe(data: object) -> str:
-    text = repr(data)
-    return f"{type(data).__name__} {text if len(text) <= 40 else text[:37] + '...'}"
+    return f"{type(data).__name__} {bounds.brief(data)}"

@@ -10,11 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from engine.models import MODELS
+from engine import bounds
+from engine.models import MODELS, read_model_configuration
 from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, read, write
+from engine.schema import SchemaError, check_nesting, read, write
 
 # models that can start from what the displacement shows (`fitting.phases`)
 FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
@@ -50,6 +51,15 @@ class DatasetConfiguration:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if self.steps % self.stride:
             raise ValueError(f"steps must be a multiple of stride, {self.stride}, not {self.steps}")
+        bounds.check_motion(self.string, self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
+        if self.substeps is not None:
+            bounds.check("substeps", self.substeps, (1, bounds.MOST_SUBSTEPS))
+        size_bytes = 4 * self.count * (self.steps // self.stride + 1) * self.modes
+        if size_bytes > bounds.LARGEST_DATASET_BYTES or self.count * self.steps > bounds.MOST_FRAMES:
+            raise ValueError(
+                f"count {self.count}, steps {self.steps} and modes {self.modes} would be {size_bytes / 2**30:.3g} GiB"
+                " of data; ask for less"
+            )
 
     @cached_property
     def resonator(self) -> Resonator:
@@ -127,6 +137,17 @@ class TrainingConfiguration:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        try:
+            model = read_model_configuration(self.model, self.model_configuration, "model_configuration")
+        except SchemaError as error:
+            raise ValueError(str(error)) from error  # whoever reads this knows the file
+        if model.grid_points != self.data.grid_points:
+            raise ValueError(
+                f"model_configuration.grid_points is {model.grid_points}, the data's are {self.data.grid_points}"
+            )
+        known = MODELS[self.model][0].initialisations
+        if self.recipe.initialisation and self.recipe.initialisation not in known:
+            raise ValueError(f"initialisation {self.recipe.initialisation!r} is not one of {', '.join(known)}")
         if self.recipe.blind and not self.recipe.latent_epochs and self.model not in FROM_PHASES:
             raise ValueError(f"blind needs latent_epochs, or one of {', '.join(FROM_PHASES)}, not {self.model!r}")
         if self.recipe.latents_per_mode and not (self.recipe.blind and self.model == "koopman_integrated"):
@@ -213,10 +234,16 @@ def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file.
 
     Raises:
-        SchemaError: not TOML.
+        SchemaError: not TOML, or larger or nested deeper than `engine.bounds` allows.
         OSError: it cannot be read.
     """
+    with path.open("rb") as file:
+        raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
+    if len(raw) > bounds.LARGEST_TEXT_BYTES:
+        raise SchemaError(f"{path}: larger than the {bounds.LARGEST_TEXT_BYTES // 2**10} KiB that it may have")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SchemaError(f"{path}: not valid TOML: {error}") from error
+        data = tomllib.loads(raw.decode("utf-8"))
+    except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
+        raise SchemaError(f"{path}: not valid TOML: {error or type(error).__name__}") from error
+    check_nesting(data, str(path))
+    return data

@@ -15,6 +15,7 @@ from typing import Any, Literal, get_type_hints
 
 from filelock import FileLock
 
+from engine import bounds
 from engine.schema import SchemaError, read
 from engine.whole_file import whole_file
 from training.knowledge import given_to
@@ -120,7 +121,11 @@ def read_results(path: Path) -> list[Row]:
     if not path.exists():
         return []
     try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+        with path.open("rb") as file:
+            raw = file.read(bounds.LARGEST_TABLE_BYTES + 1)
+        if len(raw) > bounds.LARGEST_TABLE_BYTES:
+            raise SchemaError(f"{path}: larger than the {bounds.LARGEST_TABLE_BYTES // 2**20} MiB that it may have")
+        lines = list(csv.reader(io.StringIO(raw.decode("utf-8"), newline="")))
     except (UnicodeDecodeError, csv.Error) as error:
         raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin anew") from error
     if not lines or "digest" not in lines[0]:
@@ -177,5 +182,5 @@ def _parse(columns: list[str], line: list[str], where: str) -> Row:
             try:
                 values[name] = kind(text)
             except ValueError:
-                raise SchemaError(f"{where}, column {name}: {text!r} is not a number") from None
+                raise SchemaError(f"{where}, column {name}: {bounds.brief(text)} is not a number") from None
     return read(Row, values, where)

@@ -20,5 +20,6 @@ def show(file: Annotated[Path, typer.Argument(metavar="FILE", help="A record tha
     """Check a record and print it in words."""
     from app.analysis.abx.record import load_record
     from app.analysis.abx.text import as_text
+    from engine.plain_text import printable
 
-    print(as_text(load_record(file)), end="")
+    print(printable(as_text(load_record(file))), end="")

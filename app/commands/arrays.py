@@ -12,6 +12,7 @@ from torch import Tensor
 
 from app.commands.console import Failure, Report
 from app.shared.whole_file import whole_file
+from engine.plain_text import one_line
 
 LARGEST_RESULT_BYTES = 4 * 2**30
 BYTES_AT_ONCE = 16 * 2**20  # of a result; the file does not depend on it
@@ -83,10 +84,11 @@ def _load(path: Path) -> np.ndarray:
         array = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a false header claims no memory
     except FileNotFoundError:
         raise Failure(f"{path}: no such file; give a NumPy .npy file of shape (batch, points) in m") from None
-    except (ValueError, EOFError) as error:
-        raise Failure(f"{path}: not a whole NumPy .npy file of numbers ({error}); save it with numpy.save") from error
     except OSError as error:
         raise Failure(f"{path}: cannot be read ({error.strerror or error}); give a NumPy .npy file") from error
+    except Exception as error:  # NumPy reads the header as Python's words, with all of their errors
+        told = one_line(str(error), 200)
+        raise Failure(f"{path}: not a whole NumPy .npy file of numbers ({told}); save it with numpy.save") from error
     if not isinstance(array, np.ndarray):
         raise Failure(f"{path}: an archive of arrays; save the one array with numpy.save")
     return array

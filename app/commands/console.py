@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import sys
@@ -11,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 from app.shared.durations import duration
+from engine.plain_text import one_line
 
 LINE_EVERY_S = 10.0  # of progress, where standard error is not a terminal
 WIDTH_WITHOUT_TERMINAL = 1000  # a line stays a line
@@ -26,14 +28,25 @@ class Report(Protocol):
 class Failure(Exception):
     """A command cannot be done. The message is one line: what is wrong, where, and the remedy."""
 
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
 
 def say(text: str) -> None:
-    """One line on standard error."""
-    print(f"learned-strings: {' '.join(text.split())}", file=sys.stderr, flush=True)
+    """One line on standard error, whatever a file's text holds."""
+    print(f"learned-strings: {one_line(text)}", file=sys.stderr, flush=True)
+
+
+def use_any_output() -> None:
+    """Output that is not UTF-8 shows what it can: other characters are written as their codes."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def print_json(value: Any) -> None:
-    print(json.dumps(_finite(value), indent=2, allow_nan=False, ensure_ascii=False))
+    text = json.dumps(_finite(value), indent=2, allow_nan=False, ensure_ascii=False)
+    print("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text))
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -109,7 +122,7 @@ def number(value: float | None) -> str:
 def _cell(value: object) -> str:
     if isinstance(value, float) or value is None:
         return number(value)
-    return f"{value:,}" if isinstance(value, int) else str(value)
+    return f"{value:,}" if isinstance(value, int) else one_line(str(value))
 
 
 def _finite(value: Any) -> Any:

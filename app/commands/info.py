@@ -9,6 +9,7 @@ import typer
 
 from app.commands.arguments import Json
 from app.commands.console import print_json, say
+from engine.plain_text import one_line
 
 
 def info(
@@ -33,6 +34,6 @@ def info(
     lines = {**{f"pluck {name}": value for name, value in pluck.items()}, **facts, "preset file": here}
     width = max(map(len, lines))
     for name, value in lines.items():
-        print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else value}")
+        print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")
     if recipe.source != "truth" and (recipe.decay_db is not None or recipe.seconds > recipe.horizon_s):
         say(f"note: from {recipe.horizon_s:g} s on, the model is past its training")

@@ -48,6 +48,8 @@ def presets(json: Json = False) -> None:
             found.append(_facts(path, known))
         except PresetError as error:
             say(str(error))
+        except Exception as error:  # whatever one file brings about, the others are listed
+            say(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file")
     if json:
         print_json(found)
     else:

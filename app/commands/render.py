@@ -136,7 +136,7 @@ def _given(name: str, value: Value | None) -> Value:
 
 def _render_again(file: Path, out: Path | None) -> None:
     from app.export.files import default_file_name
-    from app.export.recipe import changed_preset_notice, preset_of, read_recipe
+    from app.export.recipe import changed_preset_notice, preset_of, read_recipe, request_of
     from app.presets.folders import usable_files
     from app.shared.version import program_version
     from engine.presets import load_preset
@@ -144,10 +144,10 @@ def _render_again(file: Path, out: Path | None) -> None:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, usable_files())
     if out is None:
-        out = Path(default_file_name(recipe.preset, recipe.pluck, recipe.rate_hz, recipe.source))
+        out = Path(default_file_name(path.stem, recipe.pluck, recipe.rate_hz, recipe.source))
         if out.exists():
             raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
-    request = recipe.request(load_preset(path))
+    request = request_of(recipe, load_preset(path), file)
     if not exact:
         say(f"note: {changed_preset_notice(recipe)}")
     if recipe.version != program_version():

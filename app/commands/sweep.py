@@ -15,6 +15,7 @@ import typer
 from app.commands.arguments import Cache, Json
 from app.commands.console import Failure, number, print_json, print_table, say
 from app.shared.durations import duration
+from engine.plain_text import one_line
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -34,7 +35,10 @@ Results = Annotated[Path | None, typer.Option(help="The results file; default tr
 def sweep(
     plan: Annotated[str, typer.Argument(metavar="PLAN", help="A plan's name, or the path of its .toml file.")],
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler; default workers on this machine.")
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="A Dask scheduler, as tls://HOST:PORT; default workers on this machine."
+        ),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Runs at once; default one on each core, or --per-device on each GPU.")
@@ -62,7 +66,7 @@ def sweep(
     from training.sweeping.plan import load_plan
     from training.sweeping.sweep import Options, results_of, unfinished
     from training.sweeping.sweep import sweep as run  # this command has the name
-    from training.sweeping.workers import cluster_workers, fitted, local_workers
+    from training.sweeping.workers import cluster_workers, fitted, local_workers, open_to_anybody
 
     chosen = load_plan(plan)
     file = results or results_of(chosen, runs)
@@ -77,6 +81,11 @@ def sweep(
         opened = local_workers(layout)
     else:
         options = Options(file, runs, cache, device, threads, retries)
+        if open_to_anybody(scheduler):
+            say(
+                f"warning: {scheduler} asks nobody who they are and encrypts nothing: whoever reaches it can run code"
+                " on its workers; use tls:// with certificates, or a network of your own"
+            )
         opened = cluster_workers(scheduler, workers)
     say(f"{chosen.name}: {left} of {len(chosen.runs)} runs to do; rows go to {file}")
     rows = [row for row in known if row.digest in {run.digest for run in chosen.runs}]
@@ -143,7 +152,7 @@ def measure(
         whole = filled(row, path, cache)
         add_rows(file, [whole])
         gained = sum(old is None and new is not None for old, new in zip(astuple(row), astuple(whole), strict=True))
-        print(f"{row.name}: {gained} figures added")
+        print(one_line(f"{row.name}: {gained} figures added"))
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:

@@ -11,6 +11,7 @@ import typer
 from app.commands.arguments import check_range, open_preset
 from app.commands.console import Failure, progress, say
 from app.shared.whole_file import whole_file
+from engine.plain_text import printable
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def table(
     if into is not None:
         text, output = _before(into) + text, into
     if output is None:
-        print(text, end="")
+        print(printable(text), end="")
         return
     with whole_file(output) as file:
         file.write(text.encode())

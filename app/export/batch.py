@@ -6,21 +6,22 @@ anew after every pluck, so it is never behind the files.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import soundfile
-import torch
 
 from app.export.batch_index import INDEX, BatchIndex, BatchRow
 from app.export.files import ExportError, WavReport, default_file_name, export_sounds, settings_of
 from app.export.recipe import Recipe, RecipeError, read_recipe
+from app.export.recording import blocks
 from app.export.sound import Cancelled, ExportCancelled, SoundRequest, Voices
 from app.export.wav import WavSettings
 from app.shared.vocabulary import Pickup, Source
-from engine.metrics import relative_error
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, load_preset
 from engine.sources import Runaway
@@ -224,11 +225,23 @@ def _errors(preset: Preset, voices: Voices) -> tuple[float | None, float | None]
     """Within the training and in all; None where there is nothing to compare."""
     if len(voices.sounds) < 2:
         return None, None
-    model, truth = (torch.from_numpy(voices.sounds[name])[None, 1:] for name in ("model", "truth"))
-    ends = (preset.info.horizon_steps, truth.shape[1])
-    found = [relative_error(model[:, :end], truth[:, :end]).rel_mae if truth.shape[1] else None for end in ends]
-    trained, whole = (None if error is None else float(f"{error:.4g}") for error in found)
+    model, truth = voices.sounds["model"], voices.sounds["truth"]
+    sums = np.zeros((2, 2))  # of |error| and |truth|, within the training and past it
+    for first, true in blocks(truth):
+        error = np.abs(model[first : first + len(true)] - true)
+        frame = np.arange(first, first + len(true))
+        within = (frame >= 1) & (frame <= preset.info.horizon_steps)
+        for row, part in enumerate((within, frame > preset.info.horizon_steps)):
+            sums[row] += error[part].sum(), np.abs(true[part]).sum()
+    if len(truth) < 2:
+        return None, None
+    trained, whole = (_ratio(*found) for found in (sums[0], sums.sum(0)))
     return trained, whole
+
+
+def _ratio(error: float, truth: float) -> float:
+    """A silent truth matched by silence is no error, unmatched an infinite one."""
+    return float(f"{error / truth:.4g}") if truth else 0.0 if error == 0 else math.inf
 
 
 def _row(

@@ -9,8 +9,11 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Literal, get_args
 
+from filelock import FileLock
+
 from app.export.files import ExportError
-from app.shared.whole_file import WriteError, whole_file
+from app.shared.whole_file import WriteError, explain, whole_file
+from engine import bounds
 
 INDEX = "index.csv"
 Status = Literal["written", "kept", "failed"]
@@ -45,18 +48,23 @@ class BatchIndex:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.rows: dict[str, BatchRow] = {}
-        try:
-            with path.open(encoding="utf-8", newline="") as file:
-                self.rows = {row.file: row for row in map(_read_row, csv.DictReader(file))}
-        except (OSError, ValueError, KeyError, TypeError):
-            pass  # none yet, or not one of ours: it is written anew
+        self.rows = _read_rows(path)
 
     def add(self, rows: Sequence[BatchRow]) -> None:
-        """Without any row there is no file. Raises ExportError."""
-        self.rows |= {row.file: row for row in rows}
-        if not self.rows:
+        """Adds to what is there by now: another batch may write into the same folder. Raises ExportError.
+
+        Without any row there is no file.
+        """
+        if not rows:
             return
+        try:
+            with FileLock(self._path.with_name(f".{self._path.name}.lock")):
+                self.rows |= _read_rows(self._path) | {row.file: row for row in rows}
+                self._write()
+        except OSError as error:
+            raise ExportError(explain(self._path, error)) from error
+
+    def _write(self) -> None:
         text = io.StringIO()
         table = csv.DictWriter(text, [one.name for one in fields(BatchRow)], lineterminator="\n")
         table.writeheader()
@@ -66,6 +74,17 @@ class BatchIndex:
                 file.write(text.getvalue().encode())
         except WriteError as error:
             raise ExportError(str(error)) from error
+
+
+def _read_rows(path: Path) -> dict[str, BatchRow]:
+    """By file; none where there is no index, or one that is not ours: it is written anew."""
+    try:
+        if path.stat().st_size > bounds.LARGEST_TABLE_BYTES:
+            return {}
+        with path.open(encoding="utf-8", newline="") as file:
+            return {row.file: row for row in map(_read_row, csv.DictReader(file))}
+    except (OSError, ValueError, KeyError, TypeError, StopIteration, csv.Error):
+        return {}
 
 
 def _read_row(cells: dict[str, str]) -> BatchRow:

@@ -5,20 +5,26 @@ The window and the command line write the same files through this module.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import io
+import re
+import tempfile
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.export.recipe import Recipe
+from app.export.recording import Sound
 from app.export.sound import (
     LONGEST_S,
     SOURCES,
     Cancelled,
     ExportCancelled,
+    Mixed,
     Progress,
     SoundRequest,
     Source,
@@ -26,7 +32,8 @@ from app.export.sound import (
     render_sound,
     render_voices,
 )
-from app.export.wav import RATE_RANGE_HZ, EncodedWav, WavSettings, encode_wav
+from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, encode_wav
+from app.export.wav import write_wav as write_blocks
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import BITS, Bits
 from app.shared.whole_file import WriteError, explain, whole_file
@@ -34,6 +41,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetError
 
 END_OF_TRAINING = "end of training"  # the marker's name
+LONGEST_NAME = 150  # characters of a preset in a file's name
 DECAY_FADE_S = 0.05  # where a sound ends by its decay
 
 
@@ -116,27 +124,31 @@ def export_sounds(
         except PresetError as error:
             raise ExportError(str(error)) from error
         # opened first, so that a folder that refuses is told before the work
-        writers = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
+        opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
-        voices = render_voices(
-            request,
-            paths,
-            rate_hz,
-            all_voices=measured or settings.normalise,
-            progress=progress,
-            cancelled=cancelled,
-        )
-        sounds = {source: voices.samples(source, request.difference_gain_db) for source in paths}
-        beside = [*voices.sounds.values(), *sounds.values()] if settings.normalise else []
+        try:
+            voices = render_voices(
+                request,
+                paths,
+                rate_hz,
+                all_voices=measured or settings.normalise,
+                progress=progress,
+                cancelled=cancelled,
+            )
+        except OSError as error:  # the recordings lie in temporary files
+            raise ExportError(explain(Path(tempfile.gettempdir()), error)) from error
+        sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
+        beside: list[Sound] = [*voices.sounds.values(), *sounds.values()] if settings.normalise else []
         reports = []
-        for source, write in writers.items():
-            with _explained(paths[source]):
+        for source, file in opened.items():
+            path, sound = paths[source], sounds[source]
+            with _explained(path):
                 labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
-                wav = encode_wav(
-                    sounds[source], rate_hz, settings, _tags(info.title, recipes[source]), beside, labels
-                )
-            past_s = max(0.0, wav.frames / wav.rate_hz - info.horizon_s) if labels else 0.0
-            reports.append(replace(write(wav), past_training_s=past_s, decayed=voices.ended))
+                tags = _tags(info.title, recipes[source])
+                level = write_blocks(file, sound, rate_hz, settings, tags, beside, labels)
+            report = _report(path, file, len(sound), rate_hz, level)
+            past_s = max(0.0, report.seconds - info.horizon_s) if labels else 0.0
+            reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
     return reports, voices
 
 
@@ -160,12 +172,15 @@ def write_wav(
     Raises:
         ExportError: the file cannot be written, or a sample is not finite.
     """
-    with _written_whole(path) as write:
-        return write(encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title)))
+    with _written_whole(path) as file, _explained(path):
+        wav = encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title))
+        file.write(wav.data)
+        return _report(path, file, wav.frames, wav.rate_hz, wav.level)
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
-    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`."""
+    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`: one name, never a path, whatever `preset` is."""
+    preset = re.sub(r"[^\w .+-]", "_", preset[:LONGEST_NAME]).lstrip(". -") or "preset"
     place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
     return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
 
@@ -182,19 +197,15 @@ def _tags(title: str, recipe: Recipe | None = None) -> dict[str, str]:
 
 
 @contextmanager
-def _written_whole(path: Path) -> Iterator[Callable[[EncodedWav], WavReport]]:
-    """A function that writes the file at `path`, which appears when the block ends well."""
+def _written_whole(path: Path) -> Iterator[BinaryIO]:
+    """A file to write to, which appears at `path` when the block ends well."""
     with _explained(path), whole_file(path) as file:
+        yield file
 
-        def write(wav: EncodedWav) -> WavReport:
-            with _explained(path):
-                file.write(wav.data)
-            level = wav.level
-            return WavReport(
-                path, wav.frames, wav.rate_hz, len(wav.data), level.peak_db, level.clipped, level.gain_db
-            )
 
-        yield write
+def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level) -> WavReport:
+    size = file.seek(0, io.SEEK_END)
+    return WavReport(path, frames, rate_hz, size, level.peak_db, level.clipped, level.gain_db)
 
 
 @contextmanager

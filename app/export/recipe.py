@@ -13,13 +13,17 @@ from app.export.sound import LONGEST_S, SoundRequest
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import Bits, Pickup, Source
+from engine.plain_text import one_line
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, preset_digest
 from engine.sources import FULL_SCALE_M
 
 
 class RecipeError(Exception):
-    """A file without a usable recipe. The message names the file, what is wrong and the remedy."""
+    """A file without a usable recipe. The message names the file, what is wrong and the remedy, in one line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
 
 
 class Recipe(BaseModel):
@@ -30,7 +34,7 @@ class Recipe(BaseModel):
         full_scale_m: the displacement that is 0 dBFS.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format: Literal[1] = 1
     program: str
@@ -51,7 +55,7 @@ class Recipe(BaseModel):
     rate_hz: int = Field(ge=RATE_RANGE_HZ[0], le=RATE_RANGE_HZ[1])
     bits: Bits
     normalise: bool
-    fade_out_s: float = Field(0.010, ge=0)
+    fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
 
     @classmethod
     def of(cls, request: SoundRequest, settings: WavSettings) -> Recipe:
@@ -121,10 +125,23 @@ def read_recipe(path: Path) -> Recipe:
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(map(str, first["loc"])) or "the text"
-        raise RecipeError(
-            f"{path}: its recipe cannot be used ({field}: {first['msg']}); "
-            "it is damaged, of another program, or of a newer version"
-        ) from error
+        raise _unusable(path, f"{field}: {first['msg']}") from error
+    except (ValueError, OverflowError) as error:  # of a number that is longer than any
+        raise _unusable(path, str(error)) from error
+
+
+def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
+    """What the recipe of the file at `path` asks for. Raises RecipeError where its values do not go together."""
+    try:
+        return recipe.request(preset)
+    except ValueError as error:
+        raise _unusable(path, str(error)) from error
+
+
+def _unusable(path: Path, why: str) -> RecipeError:
+    return RecipeError(
+        f"{path}: its recipe cannot be used ({why}); it is damaged, of another program, or of a newer version"
+    )
 
 
 def preset_of(recipe: Recipe, presets: Iterable[Path]) -> tuple[Path, bool]:

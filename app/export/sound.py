@@ -13,11 +13,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
-from engine.voices import Ear, model_program, render_voice, truth_program
+from engine.voices import Ear, model_program, truth_program, voice_blocks
 
 Voice = Literal["model", "truth"]
 VOICES: tuple[Voice, ...] = get_args(Voice)
@@ -92,19 +93,42 @@ class Voices:
         ended: False where the decay was not over at the longest duration.
     """
 
-    sounds: Mapping[Voice, Samples]
+    sounds: Mapping[Voice, Sound]
     ended: bool = True
 
     def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
-        """What a source is made of: (frames,), or (frames, 2) in stereo and for both."""
-        sounds = self.sounds
-        if source == "both":
-            return np.concatenate([sounds["model"], sounds["truth"]], axis=1)
-        if source == "difference":
-            mixed = 10 ** (difference_gain_db / 20) * (sounds["model"] - sounds["truth"])
-        else:
-            mixed = sounds[source]
-        return mixed[:, 0] if mixed.shape[1] == 1 else mixed
+        """What a source is made of, all at once: (frames,), or (frames, 2) in stereo and for both."""
+        found = Mixed(self, source, difference_gain_db)[:]
+        return found[:, 0] if found.shape[1] == 1 else found
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """What a source is made of, (frames, channels), of which a slice can be had."""
+
+    voices: Voices
+    source: Source
+    difference_gain_db: float = 0.0
+
+    def __len__(self) -> int:
+        return min(map(len, self._parts))
+
+    def __getitem__(self, frames: slice) -> Samples:
+        parts = [part[frames].astype(np.float64) for part in self._parts]
+        if self.source == "both":
+            return np.concatenate(parts, axis=1)
+        if self.source == "difference":
+            return 10 ** (self.difference_gain_db / 20) * (parts[0] - parts[1])
+        return parts[0]
+
+    @property
+    def _parts(self) -> list[Sound]:
+        return [self.voices.sounds[voice] for voice in voices_of(self.source)]
+
+
+def voices_of(source: Source) -> tuple[Voice, ...]:
+    """What is rendered for a source."""
+    return ("model",) if source == "model" else ("truth",) if source == "truth" else VOICES
 
 
 def render_sound(
@@ -143,9 +167,9 @@ def render_voices(
         all_voices: both of them whatever the sources; a model that runs away is then left out if no source needs it.
     """
     sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
-    needed = {voice for source in sources for voice in (VOICES if source in ("difference", "both") else (source,))}
+    needed = {voice for source in sources for voice in voices_of(source)}
     wanted = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
-    sounds: dict[Voice, Samples] = {}
+    sounds: dict[Voice, Recording] = {}
     for place, voice in enumerate(wanted):
 
         def part(share: float, place: int = place) -> None:
@@ -158,25 +182,30 @@ def render_voices(
     ends = [decayed_frames(sound, rate_hz, request.decay_db) for sound in sounds.values()]
     frames = max(ends)
     ended = frames < round(request.seconds * rate_hz)
-    return Voices({voice: sound[:frames] for voice, sound in sounds.items()}, ended)
+    for sound in sounds.values():
+        sound.cut(frames)
+    return Voices(sounds, ended)
 
 
-def decayed_frames(sound: Samples, rate_hz: int, decay_db: float) -> int:
+def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
     """How many of the frames (frames, points) there are until the level stays `decay_db` below its loudest.
 
     The level is the mean square over windows of 50 ms and all points. All frames where it never falls so low; silence
     is one window.
     """
     window = max(1, round(LEVEL_WINDOW_S * rate_hz))
-    whole = np.zeros((-(-len(sound) // window) * window, sound.shape[1]))
-    whole[: len(sound)] = sound
-    power = np.square(whole).reshape(-1, window * sound.shape[1]).sum(1)
+    powers = []
+    for _, block in blocks(sound, window * max(1, BLOCK_FRAMES // window)):
+        whole = np.zeros((-(-len(block) // window) * window, block.shape[1]))
+        whole[: len(block)] = block
+        powers.append(np.square(whole).reshape(-1, window * block.shape[1]).sum(1))
+    power = np.concatenate(powers)
     loud = np.flatnonzero(power > power.max() * 10 ** (-decay_db / 10))
     last = int(loud[-1]) + 1 if len(loud) else 1
     return min(len(sound), last * window)
 
 
-def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progress, cancelled: Cancelled) -> Samples:
+def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progress, cancelled: Cancelled) -> Recording:
     """(frames, points), by the very voice that a device would play."""
     preset, info = request.preset, request.preset.info
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
@@ -187,7 +216,8 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progres
             raise ExportCancelled
         progress(share)
 
-    return render_voice(
+    recording = Recording(len(request.points))
+    for block in voice_blocks(
         program,
         ModelSource(preset) if program.rendered else None,
         info,
@@ -196,7 +226,9 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progres
         request.seconds,
         advanced,
         None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB,
-    ).astype(np.float64)
+    ):
+        recording.append(block)
+    return recording
 
 
 def _check(name: str, value: float | None, limits: tuple[float, float]) -> None:

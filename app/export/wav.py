@@ -6,15 +6,19 @@ libsndfile stores what it is given; whatever changes a number is done here, in N
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import BinaryIO
 
 import numpy as np
 import soundfile
 import soxr
 from numpy.typing import NDArray
 
-from app.export.wav_chunks import Marker, with_markers, without_time_stamp
+from app.export.recording import Sound, blocks
+from app.export.wav_chunks import Marker, finish
 from app.shared.vocabulary import BITS, Bits
 
 RATE_RANGE_HZ = (1_000, 384_000)
@@ -88,19 +92,105 @@ def encode_wav(
     Raises:
         ValueError: a sample is not finite, there are none, or a tag is too long.
     """
-    _check(samples, tags)
+    _check_tags(tags)
+    if len(samples) == 0:
+        raise ValueError("there are no samples to write; choose a longer duration")
     new_rate_hz = settings.rate_hz or rate_hz
     sound = resampled(samples.astype(np.float64), rate_hz, new_rate_hz)
-    sound = faded_out(sound, round(settings.fade_out_s * new_rate_hz))
-    peak = float(np.abs(sound).max())
-    loudest = max([peak, *(float(np.abs(resampled(other, rate_hz, new_rate_hz)).max()) for other in beside)])
-    gain = NORMALISED_PEAK / loudest if settings.normalise and loudest > 0 else 1.0
-    stored, clipped = quantised(sound * gain, settings.bits)
-    level = Level(_decibel(peak * gain), clipped, _decibel(gain))
-    places = {label: round(time_s * new_rate_hz) for label, time_s in (labels or {}).items()}
-    markers = [Marker(frame, label) for label, frame in places.items() if frame < len(sound)]
-    data = with_markers(_file(stored, new_rate_hz, settings.bits, tags), markers)
-    return EncodedWav(data, level, len(sound), new_rate_hz)
+    others = [resampled(other, rate_hz, new_rate_hz) for other in beside]
+    buffer = io.BytesIO()
+    level = write_wav(buffer, sound, new_rate_hz, settings, tags, others, labels)
+    return EncodedWav(buffer.getvalue(), level, len(sound), new_rate_hz)
+
+
+def write_wav(
+    file: BinaryIO,
+    sound: Sound,
+    rate_hz: int,
+    settings: WavSettings,
+    tags: Mapping[str, str],
+    beside: Sequence[Sound] = (),
+    labels: Mapping[str, float] | None = None,
+) -> Level:
+    """As `encode_wav`, of a sound of the file's own rate, block by block: memory does not grow with its length.
+
+    Args:
+        file: open for reading and writing, empty.
+
+    Raises:
+        ValueError: see there.
+    """
+    _check_tags(tags)
+    if len(sound) == 0:
+        raise ValueError("there are no samples to write; choose a longer duration")
+    fade_frames = round(settings.fade_out_s * rate_hz)
+    peak = max(_peak(_faded(_finite(block), first, len(sound), fade_frames)) for first, block in blocks(sound))
+    gain, clipped = 1.0, 0
+    if settings.normalise:
+        loudest = max([peak, *(_peak(block) for other in beside for _, block in blocks(other))])
+        gain = NORMALISED_PEAK / loudest if loudest > 0 else 1.0
+    channels = 1 if sound[:1].ndim == 1 else sound[:1].shape[1]
+    noting = _Noting(file)
+    with soundfile.SoundFile(noting, "w", rate_hz, channels, _SUBTYPES[settings.bits], format="WAV") as out:
+        for name, text in tags.items():
+            setattr(out, name, text)
+        for first, block in blocks(sound):
+            faded = _faded(block, first, len(sound), fade_frames)
+            stored, cut = quantised(faded * gain, settings.bits, first, len(sound))
+            with suppress(soundfile.SoundFileError, AssertionError):  # of a disk that is full: told next
+                out.write(stored)
+            noting.check()
+            clipped += cut
+    noting.check()
+    finish(file, [Marker(frame, label) for label, frame in _places(labels or {}, rate_hz) if frame < len(sound)])
+    return Level(_decibel(peak * gain), clipped, _decibel(gain))
+
+
+class _Noting:
+    """A file as libsndfile is given it, which cannot pass an error on: the first one is kept to be raised later."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._error: OSError | None = None
+        self.seek, self.tell, self.read = file.seek, file.tell, file.read
+
+    def write(self, data: bytes) -> int:
+        if self._error is None:
+            try:
+                return self._file.write(data)
+            except OSError as error:
+                self._error = error
+        return len(data)
+
+    def check(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+
+def _places(labels: Mapping[str, float], rate_hz: int) -> list[tuple[str, int]]:
+    return [(label, round(time_s * rate_hz)) for label, time_s in labels.items()]
+
+
+def _faded(block: NDArray[np.floating], first: int, total: int, frames: int) -> NDArray[np.float64]:
+    """A block that begins at frame `first` of `total`, with its part of the fade over the last `frames`."""
+    frames = min(frames, total)
+    begin = max(0, total - frames - first)  # in the block
+    faded: NDArray[np.float64] = block.astype(np.float64)
+    if begin < len(faded):
+        place = np.arange(first + begin, first + len(faded)) - (total - frames) + 1
+        fade = 0.5 + 0.5 * np.cos(np.pi * place / frames)
+        faded[begin:] *= fade.reshape(-1, *[1] * (faded.ndim - 1))
+    return faded
+
+
+def _peak(block: NDArray[np.floating]) -> float:
+    return float(np.abs(block).max(initial=0.0))
+
+
+def _finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
+    if not bool(np.isfinite(block).all()):
+        raise ValueError("the sound holds values that are not finite; choose another source or a shorter duration")
+    return block
 
 
 def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> NDArray[np.float64]:
@@ -114,53 +204,45 @@ def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> N
 
 def faded_out(samples: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
     """The last `frames` brought to zero along half a cosine."""
-    frames = min(frames, len(samples))
-    if frames == 0:
-        return samples
-    fade = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, frames + 1) / frames)
-    faded = samples.copy()
-    faded[-frames:] *= fade.reshape(-1, *[1] * (samples.ndim - 1))
-    return faded
+    return _faded(samples, 0, len(samples), frames)
 
 
-def quantised(samples: NDArray[np.float64], bits: Bits) -> tuple[NDArray[np.generic], int]:
+def quantised(
+    samples: NDArray[np.float64], bits: Bits, first: int = 0, total: int | None = None
+) -> tuple[NDArray[np.generic], int]:
     """The numbers that the file stores, as soundfile takes them, and how many were clipped.
 
     Triangular dither of ±1 step at 16 bits makes the rounding error a noise that does not follow the sound;
     at 24 bits the step lies 144 dB down, below any converter's own noise.
+
+    Args:
+        first, total: the samples are a block that begins at this frame of so many: the dither is that of the whole.
     """
     if bits == "32f":
         return samples.astype(np.float32), 0
     depth = int(bits)
     steps = samples * 2.0 ** (depth - 1)
     if depth == 16:
-        draw = np.random.default_rng(_DITHER_SEED).random((2, *samples.shape))
-        steps += draw[0] - draw[1]
+        channels = math.prod(samples.shape[1:])
+        whole = len(samples) if total is None else total
+        one, other = (_dither(samples.shape, (start + first) * channels) for start in (0, whole))
+        steps += one - other
     steps = np.rint(steps)
     largest = 2 ** (depth - 1) - 1
     clipped = int(((steps > largest) | (steps < -largest - 1)).sum())
-    whole = np.clip(steps, -largest - 1, largest).astype(np.int32)
-    return whole << (32 - depth), clipped  # soundfile takes the upper bits of an int32
+    rounded = np.clip(steps, -largest - 1, largest).astype(np.int32)
+    return rounded << (32 - depth), clipped  # soundfile takes the upper bits of an int32
 
 
-def _check(samples: NDArray[np.floating], tags: dict[str, str]) -> None:
-    if len(samples) == 0:
-        raise ValueError("there are no samples to write; choose a longer duration")
-    if not bool(np.isfinite(samples).all()):
-        raise ValueError("the sound holds values that are not finite; choose another source or a shorter duration")
+def _dither(shape: tuple[int, ...], first: int) -> NDArray[np.float64]:
+    """Numbers in 0 … 1 from the `first` on of one endless row."""
+    return np.random.Generator(np.random.PCG64(_DITHER_SEED).advance(first)).random(shape)
+
+
+def _check_tags(tags: Mapping[str, str]) -> None:
     for name, text in tags.items():
         if len(text.encode()) > LONGEST_TAG_BYTES:
             raise ValueError(f"the tag {name} is longer than {LONGEST_TAG_BYTES} bytes; shorten it")
-
-
-def _file(stored: NDArray[np.generic], rate_hz: int, bits: Bits, tags: dict[str, str]) -> bytes:
-    channels = 1 if stored.ndim == 1 else stored.shape[1]
-    buffer = io.BytesIO()
-    with soundfile.SoundFile(buffer, "w", rate_hz, channels, _SUBTYPES[bits], format="WAV") as file:
-        for name, text in tags.items():
-            setattr(file, name, text)
-        file.write(stored)
-    return without_time_stamp(buffer.getvalue())
 
 
 def _decibel(ratio: float) -> float:

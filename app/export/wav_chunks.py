@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import BinaryIO
+
+HEAD_BYTES = 2**16  # in which the chunks before the samples lie
 
 
 @dataclass(frozen=True)
@@ -17,8 +21,26 @@ class Marker:
 
 def with_markers(data: bytes, markers: Sequence[Marker]) -> bytes:
     """The WAV file with a "cue " chunk and the labels of its points (LIST adtl), as editors show them."""
+    file = io.BytesIO(data)
+    _append(file, markers)
+    return file.getvalue()
+
+
+def finish(file: BinaryIO, markers: Sequence[Marker]) -> None:
+    """A WAV file as libsndfile has left it, with markers and without the time of its making."""
+    file.seek(0)
+    head = file.read(HEAD_BYTES)
+    for name, start, _ in chunks(head):
+        if name == b"PEAK":
+            file.seek(start + 4)  # after the version
+            file.write(bytes(4))
+            break
+    _append(file, markers)
+
+
+def _append(file: BinaryIO, markers: Sequence[Marker]) -> None:
     if not markers:
-        return data
+        return
     points = b"".join(
         # number, place in the play order, chunk, start of the chunk, start of the block, sample
         struct.pack("<II4sIII", number, marker.frame, b"data", 0, 0, marker.frame)
@@ -29,7 +51,11 @@ def with_markers(data: bytes, markers: Sequence[Marker]) -> bytes:
         for number, marker in enumerate(markers, 1)
     )
     cue = _chunk(b"cue ", struct.pack("<I", len(markers)) + points)
-    return _sized(_padded(data) + cue + _chunk(b"LIST", b"adtl" + labels))
+    file.write(bytes(file.seek(0, io.SEEK_END) % 2))
+    file.write(cue + _chunk(b"LIST", b"adtl" + labels))
+    size = file.tell()
+    file.seek(4)
+    file.write(struct.pack("<I", size - 8))
 
 
 def read_markers(data: bytes) -> list[Marker]:
@@ -50,14 +76,6 @@ def read_markers(data: bytes) -> list[Marker]:
     return [Marker(frames[number], labels.get(number, "")) for number in sorted(frames)]
 
 
-def without_time_stamp(data: bytes) -> bytes:
-    """The same WAV with the time in its PEAK chunk, which libsndfile adds to floating point, set to zero."""
-    for name, start, _ in chunks(data):
-        if name == b"PEAK":
-            return data[: start + 4] + bytes(4) + data[start + 8 :]  # after the version
-    return data
-
-
 def chunks(data: bytes, position: int = 12) -> Iterator[tuple[bytes, int, int]]:
     """Name, first byte and size (as far as it is there) of each chunk, first those after "RIFF", size, "WAVE"."""
     while position + 8 <= len(data):
@@ -72,7 +90,3 @@ def _chunk(name: bytes, body: bytes) -> bytes:
 
 def _padded(data: bytes) -> bytes:
     return data + bytes(len(data) % 2)
-
-
-def _sized(data: bytes) -> bytes:
-    return data[:4] + struct.pack("<I", len(data) - 8) + data[8:]

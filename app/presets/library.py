@@ -9,6 +9,7 @@ from pathlib import Path
 from psygnal import Signal
 
 from app.presets.folders import user_folder
+from engine.plain_text import one_line
 from engine.presets import (
     SHIPPED,
     PresetError,
@@ -21,6 +22,7 @@ from engine.presets import (
 from training.heard_file import Heard, read_heard
 
 FIRST = "studio_any_string"
+LONGEST_TITLE = 120  # characters in a list
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class PresetEntry:
     @property
     def title(self) -> str:
         """As it is listed: a copy in the user's folder is told from the shipped one."""
-        return f"{self.info.title} (yours)" if self.own else self.info.title
+        title = one_line(self.info.title, LONGEST_TITLE)
+        return f"{title} (yours)" if self.own else title
 
 
 class Library:
@@ -105,6 +108,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                 problems.append(str(error))
             except OSError as error:  # taken away meanwhile
                 problems.append(f"{path}: cannot be read ({error.strerror})")
+            except Exception as error:  # whatever one file brings about, the others are listed
+                problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
     return [entries[name] for name in sorted(entries)], problems
 
 

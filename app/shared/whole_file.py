@@ -39,7 +39,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         target = path.resolve()  # through a link, to the file that it names
         if target.exists() and not target.is_file():  # a folder, or a device that must not be replaced
             raise WriteError(f"{path}: not a file that can be replaced; choose another name")
-        with engine_files.whole_file(target) as unfinished, unfinished.open("wb") as file:
+        with engine_files.whole_file(target) as unfinished, unfinished.open("w+b") as file:
             yield file
     except OSError as error:
         raise WriteError(explain(path, error)) from error

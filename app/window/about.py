@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from app.presets.folders import user_folder
+from app.shared.log import log_file
 from app.shared.version import PROGRAM, program_version
 from app.views.dialogs.help_text import CITATION
 
@@ -43,6 +44,7 @@ def about_text(settings: Path, presets: Path) -> str:
             f"Settings: {settings}",
             f"Shipped presets: {presets}",
             f"Your own presets: {user_folder()}",
+            f"Log: {log_file()}",
             "",
             f"Python {platform.python_version()} on {platform.platform()}, {sys.maxsize.bit_length() + 1} bit",
             *(f"{name} {number}" for name, number in library_versions().items()),

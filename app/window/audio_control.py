@@ -14,6 +14,7 @@ from app.audio.choices import Buffer, DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice, output_devices
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.sound import Sound, SoundStatus
+from app.views.controls.plain import plain_tip
 from app.views.dialogs.audio_dialog import AudioDialog, AudioState
 from app.window.main_window import MainWindow
 
@@ -126,7 +127,7 @@ class AudioControl(QObject):
         if label.text() != text:
             label.setText(text)
             label.setToolTip(
-                f"{status.problem or 'No sound output'}\nAudio settings: Ctrl+,"
+                plain_tip(f"{status.problem or 'No sound output'}\nAudio settings: Ctrl+,")
                 if fault
                 else "The model's rate, converted to the sound device's rate"
             )

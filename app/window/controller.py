@@ -42,7 +42,8 @@ from app.window.panels import Moment, StringPanel
 from app.window.panels.rack import fill
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
-from app.window.settings import Settings, save_settings
+from app.window.remembering import Keeper
+from app.window.settings import Settings
 from engine.presets import SHIPPED, PresetError
 
 FRAME_MS = 16
@@ -77,6 +78,7 @@ class Controller(QObject):
         self._settings_path = settings_path
         self._audio_mail = _AudioMail()
         self.sound = make_sound(self._audio_mail.told.emit)
+        window.closing.connect(self.sound.close)  # should the rest fail
         self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
         self._audio_mail.told.connect(self.audio.tell)
         self.audio.open()  # it is opened while all else is made
@@ -116,12 +118,16 @@ class Controller(QObject):
         self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
+        self.keeper = Keeper(settings_path, settings, self.settings, self)
+        self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
             self.window.notices.tell(problem)
         everything = frozenset(type(self.session.choices).model_fields)
         self.performance.choices_changed(everything)
         self._choices_shown(everything)
         self._timer.start()
+        window.closing.disconnect(self.sound.close)
+        window.closing.connect(self.close)
 
     # Connections
 
@@ -152,7 +158,6 @@ class Controller(QObject):
         window.help_asked.connect(self.show_help)
         window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
         window.all_modes_asked.connect(lambda: session.update(solo=0))
-        window.closing.connect(self.close)
 
     def _connect_history(self) -> None:
         window, session, history = self.window, self.session, self.history
@@ -256,7 +261,16 @@ class Controller(QObject):
             self._abx.abandon()
         self._timer.stop()
         self._deck_timer.stop()
-        self._settings = self._settings.model_copy(
+        self.keeper.close()
+        self.instruments.close()
+        for panel in self.panels:
+            panel.close()
+        self.performance.close()
+        self.sound.close()
+
+    def settings(self) -> Settings:
+        """What is to be remembered, as it is now."""
+        return self._settings.model_copy(
             update={
                 "choices": self.session.choices,
                 "device": self.audio.device,
@@ -267,15 +281,6 @@ class Controller(QObject):
                 "window_geometry": self.window.geometry_text(),
             }
         )
-        try:
-            save_settings(self._settings_path, self._settings)
-        except OSError as error:
-            self.window.notices.tell(f"The settings {self._settings_path} cannot be written ({error.strerror}).")
-        self.instruments.close()
-        for panel in self.panels:
-            panel.close()
-        self.performance.close()
-        self.sound.close()
 
     # Session → everything
 

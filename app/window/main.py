@@ -18,7 +18,10 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.shared.heap import collect_between_events, return_large_blocks
+from app.shared.log import crashes_written, faults_logged, log_fault
 from app.views.theme import apply_theme
+from app.window.display import check_display
+from app.window.faults import Faults
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings, settings_file
 
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 
 
 Alive = Callable[["Controller"], None]
+CANNOT_START = "The models cannot be loaded: the program cannot be used like this."
 
 
 class _Start(QObject):
@@ -34,8 +38,11 @@ class _Start(QObject):
 
     _loaded = Signal()
 
-    def __init__(self, window: MainWindow, settings: Settings, path: Path, notice: str, alive: Alive) -> None:
+    def __init__(
+        self, window: MainWindow, settings: Settings, path: Path, notice: str, alive: Alive, faults: Faults
+    ) -> None:
         super().__init__()
+        self._faults = faults
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
@@ -68,11 +75,16 @@ class _Start(QObject):
             self._collector = collect_between_events()
         except Exception as error:
             self.failure = error
-            QApplication.quit()
+            self._failed(error)
             return
         if self._notice:
             self._window.notices.tell(self._notice)
         self._alive(self._controller)
+
+    def _failed(self, error: Exception) -> None:
+        """Told where it can be read and copied; the window stays until its user closes it."""
+        self._window.show_failed()
+        self._faults.tell(log_fault(error, "while the engine was loaded"), CANNOT_START)
 
 
 def load_engine() -> None:
@@ -104,6 +116,7 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
     """
     gc.disable()  # until `collect_between_events`: nothing is thrown away before
     return_large_blocks()
+    check_display()
     path = settings_file()
     settings, notice = load_settings(path)
     if settings.look.size_percent != 100:  # Qt reads it when the application is made
@@ -114,11 +127,13 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
     apply_theme(application, settings.look.face)
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
-    start = _Start(window, settings, path, notice, alive)
-    watch(window)
-    window.show()
-    status = application.exec()
-    start.wait()
+    faults = Faults(window)
+    start = _Start(window, settings, path, notice, alive, faults)
+    with crashes_written(), faults_logged(faults.tell):
+        watch(window)
+        window.show()
+        status = application.exec()
+        start.wait()
     if start.failure is not None:
         raise start.failure
     return status

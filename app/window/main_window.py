@@ -18,7 +18,6 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QGraphicsView,
     QHBoxLayout,
-    QLabel,
     QMainWindow,
     QSplitter,
     QTabBar,
@@ -31,6 +30,7 @@ from app.views.controls.deck import Deck
 from app.views.controls.focus_ring import FocusRing
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.parts import tool_button
+from app.views.controls.plain import Label
 from app.views.controls.preset_bar import PresetBar
 from app.views.controls.sideways import Sideways
 from app.views.controls.transport_bar import TransportBar
@@ -57,6 +57,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
+FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
 WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
@@ -107,7 +108,7 @@ class MainWindow(QMainWindow):
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
         self.notices = NoticeBar()
-        self.error_label = QLabel()
+        self.error_label = Label()
         self.error_label.setToolTip(
             "Model against truth for this pluck: relative mean absolute error, all of the string"
         )
@@ -115,7 +116,7 @@ class MainWindow(QMainWindow):
         self._solo.setObjectName("solo")
         self._solo.setVisible(False)
         self._solo.clicked.connect(self.all_modes_asked)
-        self.rate_label = QLabel()
+        self.rate_label = Label()
         self.rate_label.setObjectName("badge")
         self._audio_button = tool_button("Audio …", "Audio settings", "Where the sound goes, and how (Ctrl+,)")
         self._audio_button.clicked.connect(self.audio_asked)
@@ -133,7 +134,7 @@ class MainWindow(QMainWindow):
         self.quit_asked.connect(self.close)
 
     def _lay_out(self) -> None:
-        self._brand = QLabel("LEARNED STRINGS")
+        self._brand = Label("LEARNED STRINGS")
         self._brand.setObjectName("brand")
         self._head = head = QHBoxLayout()
         head.addWidget(self._brand)
@@ -155,7 +156,7 @@ class MainWindow(QMainWindow):
         decks.addWidget(self.right)
         decks.setSizes([560, 720])
         self._stage = QSplitter(Qt.Orientation.Vertical)
-        self._loading = QLabel(LOADING if cache.is_whole() else COMPILING)
+        self._loading = Label(LOADING if cache.is_whole() else COMPILING)
         self._loading.setObjectName("faint")
         self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._stage.addWidget(self._loading)
@@ -184,6 +185,10 @@ class MainWindow(QMainWindow):
         self._stage.setSizes([310, 0, 300])
         self._set_alive(True)
         view.setFocus()
+
+    def show_failed(self) -> None:
+        """Says, where the string would be, that it cannot be had."""
+        self._loading.setText(FAILED)
 
     def order_tabs(self) -> None:
         """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""

@@ -5,7 +5,7 @@ A broken one is set aside, not fatal; where only some fields are wrong, the othe
 
 from __future__ import annotations
 
-import json
+import errno
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +19,9 @@ from app.export.choices import ExportChoices
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.look import Look
+from engine import bounds
+from engine.plain_text import one_line
+from engine.schema import SchemaError, parse_json
 from engine.whole_file import whole_file
 
 # what a first start finds at the top: strings at full bandwidth, plucked anywhere
@@ -51,27 +54,64 @@ def settings_file() -> Path:
 def load_settings(path: Path) -> tuple[Settings, str]:
     """The settings and a notice: empty, or what was not usable and where the broken file went."""
     try:
-        text = path.read_bytes()
+        text = _bytes(path)
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
-        return Settings(), f"The settings {path} cannot be read ({error.strerror}); starting with defaults."
+        told = error.strerror or error
+        return Settings(), one_line(f"The settings {path} cannot be read ({told}); starting with defaults.")
     try:
         return Settings.model_validate_json(text), ""
-    except ValidationError as error:
-        first = error.errors()[0]
+    except (ValidationError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
             path.replace(aside)
         except OSError:
             aside = path
-        field = ".".join(map(str, first["loc"])) or "the file"
-        kept = _without(text, error)
-        return (
-            kept or Settings(),
-            f"{'Some' if kept else 'The'} settings were not usable ({field}: {first['msg']}) and have their defaults "
-            f"again; the file was set aside as {aside}.",
+        kept, why = None, str(error)
+        if isinstance(error, ValidationError):
+            first = error.errors()[0]
+            why = f"{'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}"
+            kept = _without(text, error)
+        told = (
+            f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
+            f"again; the file was set aside as {aside}."
         )
+        return kept or Settings(), one_line(told)
+
+
+def read_settings(path: Path) -> Settings | None:
+    """Those of a file as it is; None where there is none that can be used as a whole."""
+    try:
+        return Settings.model_validate_json(_bytes(path))
+    except (OSError, ValueError, OverflowError):
+        return None
+
+
+def merged(base: Settings, mine: Settings, theirs: Settings) -> Settings:
+    """What two instances have changed since `base`: of each field mine where I have changed it, else theirs.
+
+    Of the choices each by itself.
+    """
+    own = {name: getattr(mine, name) for name in _changed(base, mine) - {"choices"}}
+    choices = {name: getattr(mine.choices, name) for name in _changed(base.choices, mine.choices)}
+    try:
+        both = Choices.model_validate({**theirs.choices.model_dump(), **choices})
+    except ValidationError:  # they do not go together
+        both = mine.choices
+    return theirs.model_copy(update={**own, "choices": both})
+
+
+def _changed(base: BaseModel, now: BaseModel) -> set[str]:
+    return {name for name in type(base).model_fields if getattr(base, name) != getattr(now, name)}
+
+
+def _bytes(path: Path) -> bytes:
+    with path.open("rb") as file:
+        text = file.read(bounds.LARGEST_TEXT_BYTES + 1)
+    if len(text) > bounds.LARGEST_TEXT_BYTES:
+        raise OSError(errno.EFBIG, "it is larger than any settings", str(path))
+    return text
 
 
 def _without(text: bytes, error: ValidationError) -> Settings | None:
@@ -79,12 +119,12 @@ def _without(text: bytes, error: ValidationError) -> Settings | None:
     fields = [[str(part) for part in fault["loc"]] for fault in error.errors()]
     if any(field[:1] in ([], ["version"]) for field in fields):  # no settings, or those of another version
         return None
-    data: dict[str, Any] = json.loads(text)
-    for field in fields:
-        _drop(data, field)
     try:
+        data: dict[str, Any] = parse_json(text, "settings")
+        for field in fields:
+            _drop(data, field)
         return Settings.model_validate(data)
-    except ValidationError:
+    except (ValidationError, SchemaError, OverflowError):
         return None
 
 
@@ -101,5 +141,7 @@ def _drop(data: dict[str, Any], field: list[str]) -> None:
 def save_settings(path: Path, settings: Settings) -> None:
     """Writes whole or not at all. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as unfinished:
-        unfinished.write_text(settings.model_dump_json(indent=2), encoding="utf-8")
+    with whole_file(path) as unfinished, unfinished.open("wb") as file:
+        file.write(settings.model_dump_json(indent=2).encode())
+        file.flush()
+        os.fsync(file.fileno())  # or a loss of power may leave an empty file of this name

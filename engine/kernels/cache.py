@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -24,34 +28,56 @@ def _version() -> str:
 
 
 @cache
-def folder() -> Path:
+def folder() -> Path | None:
     """A folder for these very sources: where the user says, else beside them, in the home folder, or a temporary one.
 
-    Numba notices that a function's own file has changed, but not a file that it calls into. With one folder a version
-    nothing compiled for another memory layout is ever loaded.
+    None where nothing can be written at all: then what is compiled is not kept. Numba notices that a function's own
+    file has changed, but not a file that it calls into. With one folder a version nothing compiled for another memory
+    layout is ever loaded.
     """
+    for place in _places():
+        if _can_be_written(place):
+            return place
+    try:
+        made = Path(tempfile.mkdtemp(prefix=f"kernels-{_version()}"))
+    except OSError:
+        return None
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    return made
+
+
+def _places() -> Iterator[Path]:
+    """In the order of preference."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(chosen)
+        yield Path(chosen)
     name = f"kernels-{_version()}"
-    for place in (Path(__file__).parent / "__pycache__", Path("~/.cache/learned-strings").expanduser()):
-        try:
-            (place / name).mkdir(parents=True, exist_ok=True)
-        except (OSError, RuntimeError):  # read-only, or no home
-            continue
-        if os.access(place / name, os.W_OK):
-            return place / name
-    return Path(tempfile.mkdtemp(prefix=name))
+    yield Path(__file__).parent / "__pycache__" / name
+    with suppress(RuntimeError):  # no home
+        yield Path("~/.cache/learned-strings").expanduser() / name
+
+
+def _can_be_written(place: Path) -> bool:
+    """Tried, not asked: permissions are not all that can forbid it."""
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=place):
+            return True
+    except OSError:  # read-only, or full
+        return False
 
 
 def is_whole() -> bool:
     """Whether everything has been compiled, so that nobody has to wait for it."""
-    return _mark().exists()
+    mark = _mark()
+    return mark is not None and mark.exists()
 
 
 def set_whole() -> None:
     """Notes that everything has been compiled."""
-    _mark().touch()
+    if (mark := _mark()) is not None:
+        mark.touch()
 
 
-def _mark() -> Path:
-    return folder() / f"whole-{_version()}"
+def _mark() -> Path | None:
+    place = folder()
+    return place and place / f"whole-{_version()}"

@@ -9,12 +9,13 @@ from numba import config, njit
 
 from engine.kernels import cache
 
-config.CACHE_DIR = str(cache.folder())
+PLACE = cache.folder()
+config.CACHE_DIR = str(PLACE or "")
 
 # Fast mathematics without "nnan" and "ninf": a model that blows up shall be seen to. NumPy's errors: Python's test of
 # every divisor keeps loops from becoming vector instructions.
 COMPILED: dict[str, Any] = {
-    "cache": True,
+    "cache": PLACE is not None,
     "nogil": True,
     "fastmath": {"reassoc", "contract", "nsz", "arcp"},
     "error_model": "numpy",

@@ -123,7 +123,7 @@ def _finish(mixer: np.ndarray) -> None:
 @cfunc(
     types.int32(types.voidptr, types.voidptr, types.uint64, types.voidptr, types.uint64, types.voidptr),
     nopython=True,
-    cache=True,
+    cache=COMPILED["cache"],
     error_model="numpy",
 )
 def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped-def]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from engine import bounds
 from engine.models.base import StringModel, count_parameters
 from engine.models.dmd import DMD, DMDConfiguration
 from engine.models.fno import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
@@ -14,7 +15,7 @@ from engine.models.koopman_tension import KoopmanTension, KoopmanTensionConfigur
 from engine.models.koopman_var import KoopmanVar, KoopmanVarConfiguration
 from engine.models.lru import LRU, LRUConfiguration
 from engine.models.s5 import S5, S5Configuration
-from engine.schema import read
+from engine.schema import SchemaError, read
 
 # name in presets and on the command line -> (class, configuration, whose defaults are the paper's sizes)
 MODELS: dict[str, tuple[type[StringModel[Any]], type]] = {
@@ -37,8 +38,21 @@ def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> St
         SchemaError: a field is unknown, of another type, or refused by the configuration.
         KeyError: no such model.
     """
-    kind, sizes = MODELS[name]
-    return kind(read(sizes, configuration or {}, "model_configuration"))
+    return MODELS[name][0](read_model_configuration(name, configuration or {}, "model_configuration"))
+
+
+def read_model_configuration(name: str, data: object, where: str) -> Any:
+    """The configuration of a model from plain data, its sizes within `engine.bounds`.
+
+    Raises:
+        SchemaError, KeyError: as `build_model`.
+    """
+    configuration: Any = read(MODELS[name][1], data, where)
+    try:
+        bounds.check_sizes(configuration)
+    except ValueError as error:
+        raise SchemaError(f"{where}: {error}") from error
+    return configuration
 
 
 __all__ = [
@@ -64,4 +78,5 @@ __all__ = [
     "StringModel",
     "build_model",
     "count_parameters",
+    "read_model_configuration",
 ]

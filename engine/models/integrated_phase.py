@@ -518,7 +518,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         squares = torch.cat([real.square() - imag.square(), 2 * real * imag], dim=-1)
         n = self.configuration.state_size
         weight = (matrix * self._modulation_units).view(2, n, 2, n)[:, alive][..., alive]
-        exponent = nn.functional.linear(squares, weight.reshape(2 * weight.shape[1], -1))
+        exponent = nn.functional.linear(squares, weight.flatten(2).flatten(0, 1))
         growth, turn = exponent.chunk(2, dim=-1)
         if adiabatic is not None:
             weight = (adiabatic * self._modulation_units[..., :n])[alive][:, alive]

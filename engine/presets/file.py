@@ -19,18 +19,22 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from engine.models import MODELS, StringModel, build_model, count_parameters
+from engine import bounds
+from engine.models import StringModel, build_model, count_parameters, read_model_configuration
+from engine.plain_text import one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
-from engine.schema import SchemaError, read, write
+from engine.schema import SchemaError, parse_json, read, write
 from engine.whole_file import whole_file
 
 METADATA_KEY = "learned_strings"
-LARGEST_FILE_BYTES = 256 * 2**20
 
 
 class PresetError(ValueError):
-    """A preset that cannot be used. The message names the file, what is wrong with it and the remedy."""
+    """A preset that cannot be used. The message names the file, what is wrong with it and the remedy, in one line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
 
 
 @dataclass(frozen=True)
@@ -140,16 +144,18 @@ class _open:
             size = self._path.stat().st_size
             if not self._path.is_file():
                 raise PresetError(f"{self._path}: not a file; give a .safetensors preset")
-            if size > LARGEST_FILE_BYTES:
+            if size > bounds.LARGEST_PRESET_BYTES:
+                most = bounds.LARGEST_PRESET_BYTES
                 raise PresetError(
-                    f"{self._path}: {size / 2**20:.0f} MiB is more than the {LARGEST_FILE_BYTES // 2**20} MiB that a "
-                    "preset may have; it is not one of ours"
+                    f"{self._path}: {size / 2**20:.0f} MiB is more than the {most // 2**20} MiB that a preset may"
+                    " have; it is not one of ours"
                 )
+            check_header(self._path)
             self._file = safe_open(self._path, framework="pt")
             return self._file.__enter__()
         except FileNotFoundError:
             raise PresetError(f"{self._path}: no such preset file; check the path") from None
-        except SafetensorError as error:
+        except (SafetensorError, UnicodeError) as error:
             raise PresetError(
                 f"{self._path}: not a whole safetensors file ({error}); get the preset again"
             ) from error
@@ -160,14 +166,22 @@ class _open:
         self._file.__exit__(*exception)
 
 
+def check_header(path: Path) -> None:
+    """Raises SafetensorError where the header of a safetensors file is longer than any of ours."""
+    with path.open("rb") as file:
+        length = int.from_bytes(file.read(8), "little")
+    if length > bounds.LARGEST_HEADER_BYTES:
+        raise SafetensorError(f"a header of {length} bytes")
+
+
 def _info_of(path: Path, file: Any) -> PresetInfo:
     text = (file.metadata() or {}).get(METADATA_KEY)
     if text is None:
         raise PresetError(f"{path}: has no {METADATA_KEY!r} metadata; it is not a preset of this program")
     try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise PresetError(f"{path}: metadata is not JSON ({error}); get the preset again") from error
+        data = parse_json(text, "metadata")
+    except SchemaError as error:
+        raise PresetError(f"{path}: {error}; get the preset again") from error
     if not isinstance(data, dict):
         raise PresetError(f"{path}: metadata is no JSON object; get the preset again")
     try:
@@ -176,7 +190,7 @@ def _info_of(path: Path, file: Any) -> PresetInfo:
         raise PresetError(f"{path}: {error}") from error
     try:
         info = read(PresetInfo, data, "metadata")
-        read(MODELS[info.model][1], info.model_configuration, "metadata.model_configuration")
+        read_model_configuration(info.model, info.model_configuration, "metadata.model_configuration")
     except SchemaError as error:
         raise PresetError(f"{path}: {error}; get the preset again or train it again") from error
     return info

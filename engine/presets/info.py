@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+from engine import bounds
 from engine.models import MODELS
 from engine.pluck import Pluck
 from engine.presets.migrations import FORMAT_VERSION
@@ -26,6 +27,12 @@ class TrainedRange:
     width: tuple[float, float] | None
     peak_m: tuple[float, float]
     tension_rise: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("position", "width", "peak_m"):
+            low, high = getattr(self, name) or (0.0, 0.0)
+            if not 0 <= low <= high:
+                raise ValueError(f"{name} must be a range from 0 on, not {low:g} … {high:g}")
 
 
 @dataclass(frozen=True)
@@ -75,10 +82,9 @@ class PresetInfo:
         for name in ("rate_hz", "modes", "horizon_steps", "scale_m"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
-        if self.rate_hz > 1_000_000:
-            raise ValueError(f"rate_hz must be at most 1000000, not {self.rate_hz}")
-        if not 3 <= self.grid_points <= 10_001 or self.modes > self.grid_points - 2:
-            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
+        bounds.check("horizon_steps", self.horizon_steps, (1, bounds.MOST_FRAMES))
+        bounds.check("scale_m", self.scale_m, (1e-12, 1e3), "m")
+        bounds.check_motion(self.string, self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
 
     @property
     def horizon_s(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from engine.schema import SchemaError, read
 HIGHEST_HZ = 20_000.0  # modes above are not heard
 LARGEST_FILE_BYTES = 65_536
 STRINGS = SHIPPED / "strings"
-MOST_MODES_COUNTED = 10_000
 
 
 def read_string(path: Path) -> StringParameters:
@@ -68,7 +66,7 @@ def of_string(
     chosen, rate = string or info.string, rate_hz or info.rate_hz
     highest_hz = min(HIGHEST_HZ, rate / 2)
     if modes is None:
-        modes = min(_modes_below(chosen, highest_hz), info.grid_points - 2)
+        modes = min(chosen.modes_below(highest_hz), info.grid_points - 2)
     if modes < 1:
         raise PresetError(f"{name}: it has no mode below {highest_hz:g} Hz; lower its tension, or make it longer")
     try:
@@ -84,14 +82,3 @@ def of_string(
     except ValueError as error:
         raise PresetError(f"{name}: {error}") from error
     return replace(preset, info=told, model=model.eval())
-
-
-def _modes_below(string: StringParameters, frequency_hz: float) -> int:
-    """In closed form: EIη⁴ + T₀η² = ρA (2πf)² is quadratic in η²."""
-    bending = string.youngs_modulus_pa * string.second_moment_m4
-    square = string.mass_per_length_kg_m * (2 * math.pi * frequency_hz) ** 2
-    eta_squared = 2 * square / (string.tension_n + math.sqrt(string.tension_n**2 + 4 * bending * square))
-    count = math.sqrt(eta_squared) * string.length_m / math.pi
-    if not math.isfinite(count):
-        return MOST_MODES_COUNTED
-    return min(MOST_MODES_COUNTED, math.ceil(count) - 1)

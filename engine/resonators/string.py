@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
+from engine import bounds
 from engine.resonators.base import Resonator
 from engine.resonators.sine_transform import analysis_matrix, synthesis_matrix
 
@@ -21,7 +22,7 @@ class StringParameters:
     """Physical parameters of a simply supported stiff string. Default: the paper's Table 1, nylon, B3.
 
     Raises:
-        ValueError: a parameter is not finite, negative, or zero where that has no meaning.
+        ValueError: a parameter is not finite, negative, zero where that has no meaning, or out of its bounds.
     """
 
     length_m: float = 0.65
@@ -39,6 +40,7 @@ class StringParameters:
             value = getattr(self, field.name)
             if not math.isfinite(value) or value < 0 or (value == 0 and field.name not in may_be_zero):
                 raise ValueError(f"string parameter {field.name} must be positive and finite, not {value}")
+            bounds.check(f"string parameter {field.name}", value, bounds.STRING[field.name])
 
     @property
     def mass_per_length_kg_m(self) -> float:
@@ -59,6 +61,17 @@ class StringParameters:
         eta = self.wavenumbers(modes)
         bending = self.youngs_modulus_pa * self.second_moment_m4
         return ((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m).sqrt()
+
+    def decay_rate(self, mode: int) -> float:
+        """σ of one mode, as in `decay_rates`."""
+        eta = mode * math.pi / self.length_m
+        return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
+
+    def undamped_frequency(self, mode: int) -> float:
+        """ω of one mode, as in `undamped_frequencies`."""
+        eta = mode * math.pi / self.length_m
+        bending = self.youngs_modulus_pa * self.second_moment_m4
+        return math.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
 
     def tension_coupling(self, modes: int) -> Tensor:
         """k_μ = EAη_μ² / 4ρA in 1/(m² s²)·m², float64 (modes,).
@@ -90,5 +103,15 @@ class StringParameters:
 
     def modes_below(self, frequency_hz: float) -> int:
         """The number of modes whose undamped frequency lies below `frequency_hz`."""
-        most = max(1, int(2 * self.length_m * frequency_hz * (self.mass_per_length_kg_m / self.tension_n) ** 0.5))
-        return int((self.undamped_frequencies(most) < 2 * math.pi * frequency_hz).sum())
+        # EIη⁴ + T₀η² = ρAω², solved for η² without the difference of near numbers
+        omega = 2 * math.pi * max(0.0, frequency_hz)
+        load = self.mass_per_length_kg_m * omega**2
+        bending = self.youngs_modulus_pa * self.second_moment_m4
+        eta_squared = 2 * load / (self.tension_n + math.sqrt(self.tension_n**2 + 4 * bending * load))
+        count = math.floor(self.length_m / math.pi * math.sqrt(eta_squared))
+        # rounding may put it one beside the mode that lies at the frequency itself
+        while count > 0 and self.undamped_frequency(count) >= omega:
+            count -= 1
+        while self.undamped_frequency(count + 1) < omega:
+            count += 1
+        return count

@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 import torch
 from torch import Tensor
 
+from engine.bounds import SUBSTEPS_IN_A_PERIOD
 from engine.resonators.base import Resonator
 from engine.truth.linear import damped_rotation
 from engine.truth.state import ModalState
@@ -37,7 +38,7 @@ def default_substeps(resonator: Resonator, rate_hz: float) -> int:
     `substeps` to choose.
     """
     highest_hz = float(resonator.omega.max()) / (2 * math.pi)
-    return math.ceil(36 * highest_hz / rate_hz)
+    return math.ceil(SUBSTEPS_IN_A_PERIOD * highest_hz / rate_hz)
 
 
 class SplittingSolver:

@@ -10,7 +10,7 @@ offline    a voice for a file
 
 from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
-from engine.voices.offline import OfflineVoice, render_voice
+from engine.voices.offline import OfflineVoice, render_voice, voice_blocks
 from engine.voices.programs import (
     Program,
     bank_program,
@@ -34,4 +34,5 @@ __all__ = [
     "render_voice",
     "rendered_program",
     "truth_program",
+    "voice_blocks",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,21 @@ def render_voice(
     advanced: Callable[[float], None] = lambda share: None,
     until_db: float | None = None,
 ) -> NDArray[np.float32]:
-    """The first seconds of a pluck, (frames, points), ±1 being full scale; no limiter.
+    """All of `voice_blocks` at once, (frames, points)."""
+    return np.concatenate(list(voice_blocks(program, source, info, pluck, ear, seconds, advanced, until_db)))
+
+
+def voice_blocks(
+    program: Program,
+    source: ModelSource | None,
+    info: PresetInfo,
+    pluck: Pluck,
+    ear: Ear,
+    seconds: float,
+    advanced: Callable[[float], None] = lambda share: None,
+    until_db: float | None = None,
+) -> Iterator[NDArray[np.float32]]:
+    """The first seconds of a pluck in blocks (frames, points), ±1 being full scale; no limiter.
 
     Args:
         source: what renders the samples of a program that is not compiled.
@@ -77,18 +91,17 @@ def render_voice(
         assert source is not None
         _fill(offline.voice, source, initial_m, ear, advanced)
     frames = max(1, round(seconds * program.rate_hz))
-    out = np.zeros((frames, len(ear.points)), np.float32)
     loudest_db = -math.inf
     for first in range(0, frames, BLOCK_FRAMES):
         block = offline.read(min(BLOCK_FRAMES, frames - first))
-        out[first : first + len(block)] = block
-        share = (first + len(block)) / frames
-        advanced(FILLING + (1 - FILLING) * share if program.rendered else share)
+        yield block
+        done = first + len(block)
+        advanced(FILLING + (1 - FILLING) * done / frames if program.rendered else done / frames)
         level_db = offline.voice.level_db
         loudest_db = max(loudest_db, level_db)
         if until_db is not None and level_db < loudest_db - until_db:
-            return out[: first + len(block) + round(SILENCE_S * program.rate_hz)]
-    return out
+            yield np.zeros((min(round(SILENCE_S * program.rate_hz), frames - done), len(ear.points)), np.float32)
+            return
 
 
 def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanced: Callable[[float], None]) -> None:

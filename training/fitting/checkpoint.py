@@ -17,6 +17,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from engine.plain_text import one_line
+from engine.presets.file import check_header
+from engine.schema import parse_json
 from engine.whole_file import whole_file
 
 
@@ -56,8 +59,9 @@ class Checkpoint:
         average: dict[str, Tensor] = {}
         optimiser: dict[str, dict[str, Tensor]] = {}
         try:
+            check_header(path)
             with safe_open(path, framework="pt") as file:
-                facts = json.loads(file.metadata()["facts"])
+                facts = parse_json(file.metadata()["facts"], "facts")
                 for key in file.keys():  # noqa: SIM118 - not a mapping
                     part, _, name = key.partition("/")
                     if part == "optimiser":
@@ -66,7 +70,8 @@ class Checkpoint:
                     else:
                         {"model": model, "best": best, "average": average}[part][name] = file.get_tensor(key)
         except (SafetensorError, KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{path}: damaged checkpoint ({error}); delete it to start the run again") from error
+            message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
+            raise ValueError(message) from error
         return cls(model, best, average, optimiser, facts)
 
 

@@ -22,6 +22,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from engine.metrics import RelativeError
 from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
+from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
 from training.configuration import Recipe, TrainingConfiguration, read_configuration
 from training.data.batches import TrainingData, batches
@@ -342,12 +343,18 @@ class _Run:
             self._start = read(RelativeError, start, f"{path}: start") if start else None
         except (SchemaError, KeyError, TypeError) as error:
             raise ValueError(f"{path}: of another version ({error}); delete it to start the run again") from error
+        except (ValueError, OverflowError, RuntimeError) as error:
+            raise ValueError(f"{path}: damaged checkpoint ({error}); delete it to start the run again") from error
         if other.digest != self._configuration.digest:
             raise ValueError(f"{path}: belongs to another configuration; delete it or choose another run folder")
-        self._model.load_state_dict(dict(checkpoint.model))
-        if self._average is not None:
-            self._average.load_state_dict(dict(checkpoint.average))
-        restore_moments(self._optimiser, checkpoint.optimiser)
+        try:
+            self._model.load_state_dict(dict(checkpoint.model))
+            if self._average is not None:
+                self._average.load_state_dict(dict(checkpoint.average))
+            restore_moments(self._optimiser, checkpoint.optimiser)
+        except (RuntimeError, ValueError, KeyError, TypeError) as error:  # torch's words for tensors that do not fit
+            message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
+            raise ValueError(message) from error
         self._best_model = {name: t.to(device) for name, t in checkpoint.best_model.items()}
         self._batches = batches(self._recipe, self._data.count, self.step // self._per_epoch)
 

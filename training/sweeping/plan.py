@@ -6,11 +6,13 @@ is there twice; then the non-linear string before the linear one, and the short 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from engine import bounds
 from engine.schema import SchemaError, read
 from training.cell import RECIPE, Cell, Initial, configuration_of
 from training.configuration import TrainingConfiguration, read_toml
@@ -38,7 +40,15 @@ class Block:
         for name in ("models", "strings", "initials", "rates_hz", "horizons", "seeds"):
             if not getattr(self, name):
                 raise ValueError(f"{name} is empty; name at least one, or remove the block")
+        if self.count > bounds.MOST_RUNS:
+            raise ValueError(f"a block of {self.count} cells is too large, at most {bounds.MOST_RUNS} may be")
         list(self.cells())  # a cell that cannot be is told here
+
+    @property
+    def count(self) -> int:
+        """Of its cells."""
+        lists = (self.models, self.strings, self.initials, self.rates_hz, self.horizons, self.seeds)
+        return math.prod(map(len, lists))
 
     def cells(self) -> Iterator[Cell]:
         """In order of value; see the module."""
@@ -92,6 +102,8 @@ class _File:
     def __post_init__(self) -> None:
         if not self.block:
             raise ValueError("there is no [[block]]; a plan needs at least one")
+        if (count := sum(block.count for block in self.block)) > bounds.MOST_RUNS:
+            raise ValueError(f"a plan of {count} cells is too large, at most {bounds.MOST_RUNS} may be")
         if "seed" in self.recipe_fields:
             raise ValueError("recipe_fields cannot set the seed; a block's seeds do")
 

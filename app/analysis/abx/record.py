@@ -18,6 +18,7 @@ from app.analysis.abx.trials import LARGEST_SEED, MOST_TRIALS, Run, Trial, draw_
 from app.shared.version import program_version
 from app.shared.vocabulary import Pickup
 from app.shared.whole_file import WriteError, explain, whole_file
+from engine.plain_text import one_line
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Shape
 
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
@@ -30,7 +31,10 @@ _FROZEN = ConfigDict(frozen=True, extra="forbid")
 
 
 class RecordError(ValueError):
-    """A record that cannot be used. The message names the file, what is wrong with it and the remedy."""
+    """A record that cannot be used. The message names the file, what is wrong with it and the remedy, in one line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
 
 
 class HeardSource(BaseModel):
@@ -158,6 +162,8 @@ def load_record(path: Path) -> AbxRecord:
         return AbxRecord.model_validate_json(data)
     except ValidationError as error:
         raise RecordError(_explain(path, error)) from error
+    except OverflowError as error:
+        raise RecordError(f"{path}: holds a number that is too large ({error}); choose another file") from error
 
 
 def list_records(folder: Path) -> tuple[list[tuple[Path, AbxRecord]], list[str]]:

@@ -12,7 +12,13 @@ class ElidedLabel(QLabel):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.setTextFormat(Qt.TextFormat.PlainText)
         self._shorter: tuple[str, ...] = ()
+
+    @property
+    def marked_up(self) -> bool:
+        """Whether its texts are the program's own and may be HTML."""
+        return self.textFormat() != Qt.TextFormat.PlainText
 
     def say(self, text: str, *shorter: str) -> None:
         """`shorter` are other wordings, the longest first, for where there is no room for the text."""
@@ -33,7 +39,7 @@ class ElidedLabel(QLabel):
         return QSize(0, super().minimumSizeHint().height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self.text().startswith("<"):  # rich text has no ellipsis
+        if self.marked_up and self.text().startswith("<"):  # rich text has no ellipsis
             super().paintEvent(event)
             return
         painter = QPainter(self)

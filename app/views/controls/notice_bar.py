@@ -7,12 +7,13 @@ from datetime import datetime
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 
 from app.views import theme
 from app.views.controls.notice import Notice
 from app.views.controls.notice_list import NoticeList
 from app.views.controls.parts import tool_button
+from app.views.controls.plain import Label
 
 MOST_KEPT = 50
 
@@ -28,7 +29,7 @@ class NoticeBar(QFrame):
         self._list: NoticeList | None = None
         self.bell = Bell()  # placed by the window
         self.bell.clicked.connect(self.show_all)
-        self._label = QLabel()
+        self._label = Label()
         self._label.setWordWrap(True)
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._details = tool_button("Details", "Notice details", "What the system said, to copy (F8)")

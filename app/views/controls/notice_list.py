@@ -9,13 +9,14 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
     QDialog,
     QHBoxLayout,
-    QLabel,
     QListWidget,
     QPlainTextEdit,
     QPushButton,
     QVBoxLayout,
     QWidget,
 )
+
+from app.views.controls.plain import Label
 
 if TYPE_CHECKING:
     from app.views.controls.notice import Notice
@@ -47,7 +48,7 @@ class NoticeList(QDialog):
         buttons.addWidget(close)
         column = QVBoxLayout(self)
         column.addWidget(self._list, 3)
-        column.addWidget(QLabel("Details"))
+        column.addWidget(Label("Details"))
         column.addWidget(self._details, 2)
         column.addLayout(buttons)
 

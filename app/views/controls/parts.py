@@ -9,6 +9,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.plain import Label
 
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
@@ -33,7 +34,7 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
 
 
 def faint(text: str = "") -> QLabel:
-    made = QLabel(text)
+    made = Label(text)
     made.setObjectName("faint")
     return made
 
@@ -79,7 +80,7 @@ def vertical_rule() -> QFrame:
 
 def label(kind: str = "", text: str = "", selectable: bool = False) -> QLabel:
     """Text that wraps; `kind` is a name in the style sheet ("faint", "warning")."""
-    made = QLabel(text)
+    made = Label(text)
     made.setObjectName(kind)
     made.setWordWrap(True)
     if selectable:

@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.plain import plain_tip
 
 
 class Readout(ElidedLabel):
@@ -29,4 +30,5 @@ class Readout(ElidedLabel):
         wordings = self._told if text else self._resting
         if wordings[0] != self.text():
             self.say(*wordings)
-            self.setToolTip(wordings[0])  # where there is too little room for it
+            # where there is too little room for it
+            self.setToolTip(wordings[0] if self.marked_up else plain_tip(wordings[0]))

@@ -13,6 +13,7 @@ from app.session.choices import Choices
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from app.views import theme
 from app.views.controls.parts import tool_button
+from app.views.controls.plain import plain_tip
 
 if TYPE_CHECKING:
     from app.presets.library import PresetEntry
@@ -89,7 +90,8 @@ class SlotButtons(QWidget):
             told = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
             )
-            button.setToolTip(f"Hear {slot.upper()}: {title} (X switches at the playhead)" + (told if gain else ""))
+            tip = f"Hear {slot.upper()}: {title} (X switches at the playhead)" + (told if gain else "")
+            button.setToolTip(plain_tip(tip))
             kind = theme.source_kind(source)
             if button.objectName() != kind:
                 button.setObjectName(kind)
@@ -146,7 +148,7 @@ class SlotButtons(QWidget):
             source = f"preset:{entry.name}"
             action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
             told = f"Its model for the same pluck, from {entry.info.rate_hz} Hz"
-            action.setToolTip(f"{told}\n{entry.path.name}")
+            action.setToolTip(plain_tip(f"{told}\n{entry.path.name}"))
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)
         match.toggled.connect(lambda on: self.change_asked.emit("level_match", on))

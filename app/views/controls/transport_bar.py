@@ -6,7 +6,6 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QSizePolicy,
     QVBoxLayout,
@@ -17,6 +16,7 @@ from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Cho
 from app.views.controls.knob import Knob, KnobRange
 from app.views.controls.meter import Meter
 from app.views.controls.parts import combo_box, tool_button, vertical_rule
+from app.views.controls.plain import Label
 from app.views.controls.slot_buttons import SlotButtons
 from engine.pluck import (
     DEFAULT_LISTEN,
@@ -189,7 +189,7 @@ class TransportBar(QFrame):
         self._shape.setStyleSheet(TIGHT)
         self._shape.setFixedWidth(SHAPE_WIDTH)
         self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
-        label = QLabel("PLUCK")
+        label = Label("PLUCK")
         label.setObjectName("knob")
         column = QVBoxLayout()
         column.addWidget(label, alignment=Qt.AlignmentFlag.AlignHCenter)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
+
+from app.views.controls.plain import Label
 
 
 class AboutDialog(QDialog):
@@ -14,7 +16,7 @@ class AboutDialog(QDialog):
         title, _, rest = text.partition("\n")
         self.setWindowTitle("About")
         self.resize(620, 460)
-        heading = QLabel(title)
+        heading = Label(title)
         heading.setObjectName("title")
         body = QPlainTextEdit(rest.strip(), readOnly=True)
         body.setAccessibleName("About this program")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal, SignalInstance
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.analysis.abx.record import AbxRecord
 from app.analysis.abx.text import MEANING, p_text, verdict
 from app.views.controls.parts import label
+from app.views.controls.plain import Label
 
 
 class ResultPage(QWidget):
@@ -20,9 +21,9 @@ class ResultPage(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._score = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._score = Label(alignment=Qt.AlignmentFlag.AlignCenter)
         self._score.setStyleSheet("font-size: 26px; font-weight: 600;")
-        self._p = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._p = Label(alignment=Qt.AlignmentFlag.AlignCenter)
         self._p.setStyleSheet("font-size: 17px;")
         self._verdict = label()
         self._verdict.setAlignment(Qt.AlignmentFlag.AlignCenter)

@@ -25,6 +25,7 @@ from app.analysis.abx.sound import Candidate
 from app.analysis.abx.text import MEANING
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, USUAL_TRIALS, needed_correct
 from app.views.controls.parts import combo_box, label, tool_button
+from app.views.controls.plain import Label
 
 ROW_HEIGHT = 30
 
@@ -188,6 +189,6 @@ class SetupPage(QWidget):
 
 def _row_name(text: str) -> QLabel:
     """As high as the row's buttons, so that both stand on one line."""
-    made = QLabel(text)
+    made = Label(text)
     made.setMinimumHeight(ROW_HEIGHT)
     return made

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.analysis.abx.sound import Candidate
 from app.views.controls.parts import label
+from app.views.controls.plain import Label
 
 HEAR = "Hear X, then say which one it is."
 SAY = "Which one is X?"
@@ -31,7 +32,7 @@ class TrialPage(QWidget):
         self.setAccessibleDescription(
             "A, B and X: hear them. 1 or left: X is A. 2 or right: X is B. Space: begin again. Escape: stop the test."
         )
-        self._number = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._number = Label(alignment=Qt.AlignmentFlag.AlignCenter)
         self._number.setStyleSheet("font-size: 20px; font-weight: 600;")
         self._bar = QProgressBar(textVisible=False)
         self._bar.setFixedHeight(6)

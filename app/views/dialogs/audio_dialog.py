@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
 from app.views.controls.parts import combo_box
+from app.views.controls.plain import Label
 
 RATES = {0: "The device's own", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
 BUFFERS: dict[Buffer, str] = {
@@ -64,9 +65,9 @@ class AudioDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Audio settings")
         self.setMinimumWidth(520)
-        self._state_label = QLabel()
+        self._state_label = Label()
         self._state_label.setWordWrap(True)
-        self._problem_label = QLabel()
+        self._problem_label = Label()
         self._problem_label.setObjectName("warning")
         self._problem_label.setWordWrap(True)
         self._problem_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -79,9 +80,9 @@ class AudioDialog(QDialog):
         self._buffer.setToolTip("How much sound is kept ready: more is safer, less is more prompt")
         for box in (self._device, self._rate, self._buffer):
             box.activated.connect(self._choose)
-        self._gaps = QLabel("0")
+        self._gaps = Label("0")
         self._gaps.setMinimumWidth(40)
-        self._load = QLabel("0 %")
+        self._load = Label("0 %")
         self._load.setToolTip("Share of the sound device's time that the voices take")
         self._lay_out()
 
@@ -147,7 +148,7 @@ class AudioDialog(QDialog):
         for button, side in zip(self._tones, ("left", "both", "right"), strict=True):
             button.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
         reset = _button("Reset", "Count gaps from zero", self.gaps_reset)
-        advice = QLabel(ADVICE)
+        advice = Label(ADVICE)
         advice.setObjectName("faint")
         advice.setWordWrap(True)
         form = QFormLayout()

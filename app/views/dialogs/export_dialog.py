@@ -11,7 +11,6 @@ from PySide6.QtGui import QCloseEvent, QDesktopServices
 from PySide6.QtWidgets import (
     QDialog,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QPushButton,
     QTabBar,
@@ -26,6 +25,7 @@ from app.presets.library import PresetEntry
 from app.session.choices import Choices
 from app.shared.durations import duration
 from app.shared.vocabulary import Pickup
+from app.views.controls.plain import Label
 from app.views.dialogs.export_job import ExportJob, Work
 from app.views.dialogs.export_pages import BatchPage, SoundPage, as_heard
 from app.views.dialogs.sound_form import SoundForm, wav_settings
@@ -86,7 +86,7 @@ class ExportDialog(QDialog):
         self.tabs.addTab("Batch")
         self.tabs.setDrawBase(False)
         self.tabs.setExpanding(False)
-        self.state = QLabel(_RECIPE_NOTE)
+        self.state = Label(_RECIPE_NOTE)
         self.state.setObjectName("faint")
         self.state.setWordWrap(True)
         self.state.setMinimumHeight(34)

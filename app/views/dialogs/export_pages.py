@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
     QFormLayout,
-    QLabel,
     QLineEdit,
     QListWidget,
     QListWidgetItem,
@@ -28,6 +27,7 @@ from app.session.choices import Choices
 from app.session.slots import other_preset
 from app.shared.vocabulary import Pickup
 from app.views.controls.parts import combo_box, faint, tool_button
+from app.views.controls.plain import Label, plain_tip
 from app.views.dialogs.sound_form import label, row_of, wav_settings
 from engine.pluck import Pluck
 
@@ -88,7 +88,7 @@ class SoundPage(QWidget):
         self.path.textEdited.connect(self._name_edited)
         browse = tool_button("Browse …", tip="Choose the file")
         browse.clicked.connect(self._browse)
-        self.what = QLabel(_pluck_text(preset, choices))
+        self.what = Label(_pluck_text(preset, choices))
         self.what.setObjectName("faint")
         self.what.setWordWrap(True)
         form = QFormLayout(self)
@@ -156,7 +156,7 @@ class BatchPage(QWidget):
         checked = set(batch.presets) or {choices.preset}
         for entry in self._entries:
             item = QListWidgetItem(entry.title)
-            item.setToolTip(entry.path.name)
+            item.setToolTip(plain_tip(entry.path.name))
             item.setCheckState(Qt.CheckState.Checked if entry.name in checked else Qt.CheckState.Unchecked)
             self.presets.addItem(item)
         self.presets.setCurrentRow(next((row for row, e in enumerate(self._entries) if e.name in checked), 0))

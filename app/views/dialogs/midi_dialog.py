@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.views.controls.parts import combo_box
+from app.views.controls.plain import Label
 
 NOTE_MODES = (
     ("Say where the string is plucked", "position"),
@@ -40,7 +41,7 @@ class MidiDialog(QDialog):
         self._notes = combo_box("What notes do", NOTE_MODES)
         self._notes.setToolTip("Velocity always says how hard the string is plucked")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
-        self._problem = QLabel()
+        self._problem = Label()
         self._problem.setObjectName("warning")
         self._problem.setWordWrap(True)
         self._problem.setTextInteractionFlags(
@@ -50,7 +51,7 @@ class MidiDialog(QDialog):
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
         for name, box in (("Input", self._inputs), ("Notes", self._notes)):
-            label = QLabel(name)
+            label = Label(name)
             label.setMinimumHeight(box.sizeHint().height())  # else it stands higher than its box
             form.addRow(label, box)
         column = QVBoxLayout(self)
@@ -58,7 +59,7 @@ class MidiDialog(QDialog):
         column.setSpacing(12)
         column.addLayout(form)
         column.addWidget(self._problem)
-        heading = QLabel("CONTROLLERS")
+        heading = Label("CONTROLLERS")
         heading.setObjectName("faint")
         column.addWidget(heading)
         column.addLayout(self._build_rows(turned))
@@ -73,7 +74,7 @@ class MidiDialog(QDialog):
         grid.setColumnStretch(1, 1)
         grid.setVerticalSpacing(6)
         for row, (field, label) in enumerate(turned.items()):
-            taught = QLabel()
+            taught = Label()
             learn, forget = QPushButton("Learn"), QPushButton("Forget")
             learn.setCheckable(True)
             learn.setAccessibleName(f"Learn a controller for {label}")
@@ -82,7 +83,7 @@ class MidiDialog(QDialog):
             for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
                 button.setAutoDefault(False)
                 button.clicked.connect(lambda _=False, asked=asked, field=field: asked.emit(field))
-            for place, widget in enumerate((QLabel(label[:1].upper() + label[1:]), taught, learn, forget)):
+            for place, widget in enumerate((Label(label[:1].upper() + label[1:]), taught, learn, forget)):
                 grid.addWidget(widget, row, place)
             self._rows[field] = taught, learn, forget
         return grid

@@ -21,7 +21,6 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QScrollArea,
     QTreeWidget,
@@ -34,6 +33,7 @@ from app.presets.heard_words import heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
 from app.views.controls.parts import combo_box, tool_button
+from app.views.controls.plain import Label
 from app.views.dialogs.preset_card import preset_card
 
 _KEYS = Qt.Key
@@ -82,10 +82,10 @@ class PresetBrowser(QFrame):
         self._starred.setCheckable(True)
         self._starred.toggled.connect(self._tell_filter)
         self.list = self._build_list()
-        self._card = QLabel(textFormat=Qt.TextFormat.RichText, wordWrap=True)
+        self._card = Label(textFormat=Qt.TextFormat.RichText, wordWrap=True)
         self._card.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._card.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._state = QLabel()
+        self._state = Label()
         self._state.setObjectName("faint")
         self._lay_out()
         for widget in (self.search, self.list):
@@ -134,7 +134,7 @@ class PresetBrowser(QFrame):
         card.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._card.setContentsMargins(14, 4, 10, 10)
         card.setWidget(self._card)
-        hint = QLabel(_HINT)
+        hint = Label(_HINT)
         hint.setObjectName("faint")
         foot = QHBoxLayout()
         foot.addWidget(self._state, 1)

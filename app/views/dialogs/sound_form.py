@@ -10,6 +10,7 @@ from app.export.sound import DECAY_RANGE_DB, LONGEST_S
 from app.export.wav import WavSettings
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits
 from app.views.controls.parts import combo_box, faint
+from app.views.controls.plain import Label
 
 RATES_HZ = (0, 44_100, 48_000, 96_000)  # 0: the model's own
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
@@ -102,7 +103,7 @@ def wav_settings(export: ExportChoices) -> WavSettings:
 
 def label(text: str) -> QLabel:
     """A form's label, as wide as all of them so that the forms of the dialog stand in line."""
-    made = QLabel(text)
+    made = Label(text)
     made.setFixedWidth(LABEL_WIDTH)
     made.setMinimumHeight(28)
     made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)

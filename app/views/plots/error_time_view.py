@@ -61,6 +61,7 @@ class ErrorTimeView(QWidget):
             "rmse": item.plot(pen=pg.mkPen(theme.MODEL, width=1, style=dotted)),
             "mae": item.plot(pen=pg.mkPen(theme.DIFFERENCE, width=1, style=dotted)),
         }
+        self.readout.setTextFormat(Qt.TextFormat.AutoText)  # a legend in colours
         self._stored_errors: dict[str, float] = {}
         self._horizon_s = 1.0
         self._range: tuple[float, float] | None = None

@@ -27,6 +27,7 @@ from PySide6.QtWidgets import (
 
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, keeps_own_keys
+from app.views.controls.plain import plain_tip
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
@@ -210,7 +211,7 @@ class _Rows(QAbstractTableModel):
         if role == Qt.ItemDataRole.ForegroundRole:
             return QColor(theme.FAINT if self.dimmed or row.grey or value is None else _colour(column))
         if role == Qt.ItemDataRole.ToolTipRole:
-            return row.tip or None
+            return plain_tip(row.tip) or None
         return None
 
     def _alignment(self, column: int) -> Qt.AlignmentFlag:

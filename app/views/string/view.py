@@ -28,6 +28,7 @@ from app.analysis.string_frame import StringFrame
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.controls.parts import tool_button
+from app.views.controls.plain import plain_tip
 from app.views.string.axes import MARGIN_X, StringAxes
 from app.views.string.ground import TrainedPlucks, paint_ground, paint_legend
 from app.views.string.ink import (
@@ -218,7 +219,9 @@ class StringView(QWidget):
         at = event.position()
         if self._drag is None:
             self._hover(self._under(at))
-            self.setToolTip(self._warning if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered])
+            self.setToolTip(
+                plain_tip(self._warning) if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered]
+            )
             return
         axes = self._axes()
         fine = FINE if event.modifiers() & _Shift else 1.0

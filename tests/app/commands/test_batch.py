@@ -123,7 +123,7 @@ def test_cancelling_keeps_whole_files_and_their_rows(small_preset: Path, folder:
     assert "position 0.3, 1 mm" in seen[0][1]
     assert any(left_s is not None for _, _, left_s in seen)
     assert {row.status for row in run_batch(plan(small_preset, folder))} == {"kept", "written"}
-    assert list((folder / "out").glob(".*")) == []
+    assert list((folder / "out").glob(".*.unfinished")) == []
 
 
 def test_cancelling_before_the_first_file_leaves_no_index(small_preset: Path, folder: Path) -> None:
@@ -154,3 +154,15 @@ def test_an_unwritable_folder_is_told(run, words: list[object], folder: Path) ->
     (folder / "out").write_text("in the way")
     assert "cannot be made" in run(*words).failure
     assert batch.INDEX == "index.csv"
+
+
+def test_two_batches_into_one_folder_lose_no_row(small_preset: Path, folder: Path) -> None:
+    """Each read the index when it began; what the other has added meanwhile stays."""
+    from app.export.batch_index import BatchIndex, BatchRow
+
+    (folder / "out").mkdir(parents=True)
+    indices = [BatchIndex(folder / "out" / batch.INDEX) for _ in range(2)]
+    for number in range(8):
+        for which, one in enumerate(indices):
+            one.add([BatchRow(f"{which}_{number}.wav", "written", "small", 0.3, 1.0, "model", 4000)])
+    assert len(index(folder)) == 16

@@ -120,3 +120,72 @@ def test_recipe_and_other_choices_exclude_each_other(run, folder: Path) -> None:
     assert "--seconds: is missing" in run(
         "render", "a", "b.wav", "--position", 0.3, "--amplitude-mm", 1
     ).usage.replace("'", "")
+
+
+def forged(file: Path, path: Path, **changes: object) -> Path:
+    """A WAV whose recipe says something else, as a stranger may send it."""
+    with soundfile.SoundFile(file) as sound:
+        recipe, samples, rate_hz = json.loads(sound.comment), sound.read(), sound.samplerate
+    for name, value in changes.items():
+        (recipe if name in recipe else recipe["pluck"])[name] = value
+    with soundfile.SoundFile(path, "w", rate_hz, 1, "PCM_16", format="WAV") as sound:
+        sound.comment = json.dumps(recipe)
+        sound.write(samples)
+    return path
+
+
+@pytest.mark.parametrize("name", ["../escaped", "/tmp/escaped", "..", "a/../../b", "C:\\x", "\x1b[2J"])
+def test_a_preset_name_of_a_recipe_is_never_a_path(
+    run, installed: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    from app.export.files import default_file_name
+    from engine.pluck import Pluck
+
+    run("render", "good", folder / "first.wav", *PLUCK)
+    bad = forged(folder / "first.wav", tmp_path / "bad.wav", preset=name)
+    inside = tmp_path / "deep" / "inside"
+    inside.mkdir(parents=True)
+    monkeypatch.chdir(inside)
+    before = set(tmp_path.rglob("*.wav"))
+    assert run("render", "--recipe", bad).status == 0  # its digest is known
+    (made,) = set(tmp_path.rglob("*.wav")) - before
+    assert made.parent == inside
+    plain = default_file_name(name, Pluck(), 48_000, "model")
+    assert Path(plain).name == plain and plain.isprintable() and not plain.startswith(".") and "\\" not in plain
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"decay_db": 1e9}, "decay_db must lie in"),
+        ({"difference_gain_db": -5}, "difference_gain_db must lie in"),
+        ({"horizon_s": float("inf")}, "horizon_s"),
+        ({"fade_out_s": 1e300}, "fade_out_s"),
+        ({"position": 7}, "position must lie in"),
+        ({"source": "both", "listen_right": 0.5}, "cannot share one file"),
+    ],
+)
+def test_a_recipe_out_of_range_is_told_with_its_file(
+    run, installed: Path, folder: Path, tmp_path: Path, changes: dict[str, object], message: str
+) -> None:
+    run("render", "good", folder / "first.wav", *PLUCK)
+    bad = forged(folder / "first.wav", tmp_path / "bad.wav", **changes)
+    told = run("render", "--recipe", bad, tmp_path / "again.wav").failure
+    assert f"{bad}: its recipe cannot be used" in told and message in told
+    assert not (tmp_path / "again.wav").exists()
+
+
+def test_escapes_and_forged_lines_of_a_recipe_do_not_reach_the_terminal(
+    run, installed: Path, folder: Path, tmp_path: Path
+) -> None:
+    run("render", "good", folder / "first.wav", *PLUCK)
+    evil = "\x1b]0;owned\x07\nseconds  999\r\x9b2J\u202e"
+    bad = forged(
+        folder / "first.wav", tmp_path / "bad.wav", preset=evil, preset_sha256="0" * 64, program=evil, version=evil
+    )
+    shown = run("info", bad)
+    assert shown.status == 0
+    assert all(line.isprintable() for line in shown.out.splitlines())
+    assert [line.split()[1] for line in shown.out.splitlines() if line.startswith("seconds ")] == ["0.15"]
+    assert all(c.isprintable() or c == "\n" for c in run("info", bad, "--json").out)
+    assert run("render", "--recipe", bad, tmp_path / "again.wav").failure.isprintable()

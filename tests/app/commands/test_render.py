@@ -14,7 +14,8 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from engine.presets.file import LARGEST_FILE_BYTES, METADATA_KEY
+from engine.bounds import LARGEST_PRESET_BYTES
+from engine.presets.file import METADATA_KEY
 
 
 def render(preset: object, out: Path, *more: Any, position: float = 0.4, amplitude_mm: float = 3) -> list[Any]:
@@ -180,6 +181,6 @@ def test_a_missing_truncated_or_oversized_preset_is_told(run, small_preset, fold
     assert "no preset" in run(*render(path, out)).failure
     path.write_bytes(small_preset.read_bytes()[:-50])
     assert f"{path}: not a whole safetensors file" in run(*render(path, out)).failure
-    os.truncate(path, LARGEST_FILE_BYTES + 1)
-    assert f"{path}: 256 MiB is more than" in run(*render(path, out)).failure
+    os.truncate(path, LARGEST_PRESET_BYTES + 1)
+    assert f"{path}: 64 MiB is more than" in run(*render(path, out)).failure
     assert list(folder.iterdir()) == []

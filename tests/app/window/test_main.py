@@ -13,10 +13,11 @@ import threading
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 from app.window import main
+from app.window.main_window import MainWindow
 
 def close_when_rendered():
-    window = QApplication.activeWindow() or QApplication.topLevelWidgets()[0].window()
-    if "error of this pluck" in window.error_label.text():
+    window = next((each for each in QApplication.topLevelWidgets() if isinstance(each, MainWindow)), None)
+    if window is not None and "error of this pluck" in window.error_label.text():
         window.close()
 
 application = QApplication([])

@@ -43,6 +43,28 @@ def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> N
     assert told(code, NUMBA_CACHE_DIR=str(tmp_path)) == f"{tmp_path} {tmp_path} False None True"
 
 
+def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody() -> None:
+    code = (
+        "from pathlib import Path; from engine.kernels import cache;"
+        "cache._places = lambda: [Path('/dev/null/there')];"
+        "from engine.kernels.compiled import tanh;"
+        "print(cache.folder(), cache.folder().is_dir(), round(tanh(9.5)), len(list(cache.folder().rglob('*.nbc'))))"
+    )
+    folder, there, value, kept = told(code, NUMBA_CACHE_DIR="/dev/null/chosen").split()
+    assert (there, value, kept) == ("True", "1", "1")
+    assert not Path(folder).exists()  # once the process has ended
+
+
+def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
+    code = (
+        "import tempfile; from pathlib import Path; from engine.kernels import cache;"
+        "cache._places = lambda: [Path('/dev/null/there')]; tempfile.tempdir = '/dev/null/nowhere';"
+        "from engine.kernels.compiled import tanh;"
+        "print(cache.folder(), cache.is_whole(), cache.set_whole(), cache.is_whole(), round(tanh(9.5)))"
+    )
+    assert told(code) == "None False None False 1"
+
+
 @pytest.mark.parametrize("whole", [True, False])
 def test_all_is_compiled_once(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[str] = []

@@ -12,9 +12,8 @@ import pytest
 
 from engine.schema import SchemaError, write
 from training.results import RESULTS, Row, add_rows, read_results
-from training.sweeping import workers as module
 from training.sweeping.sweep import Options, Unwatched, is_finished, results_of, sweep, unfinished
-from training.sweeping.workers import Layout, fitted, local_workers
+from training.sweeping.workers import Layout, cluster_workers, fitted, local_workers
 from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
 from training.sweeping.workers.performing import end_of, perform
 
@@ -219,13 +218,12 @@ def here(count: int) -> Layout:
 
 
 def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options: Options, alone: Options) -> None:
-    """Two models on two data sets from two seeds: on two Dask workers with a kill, and one after another here."""
+    """Two models on two data sets from two seeds: on two processes with a kill, and one after another here."""
     made = plan(epochs=60)
     sweep(made, Inline(), alone)
 
     killer = Killer(options.runs / made.name)
     with local_workers(here(2)) as workers:
-        assert "Dask" in workers.description
         rows = sweep(made, workers, options, killer)
     assert [(row.name, row.status) for row in rows] == [(run.name, "done") for run in made.runs]
     assert len(rows) == 8
@@ -250,12 +248,32 @@ def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options:
     assert options.results.read_bytes() == before
 
 
-def test_plain_processes_do_the_same(plan, options: Options, alone: Options, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "dask_is_installed", lambda: False)
+def test_the_workers_of_a_dask_cluster_do_the_same(plan, options: Options, alone: Options) -> None:
+    from distributed import LocalCluster
+
     made = plan(seeds="0")
     made = replace(made, runs=made.runs[:1])
     sweep(made, Inline(), alone)
-    with local_workers(here(1)) as workers:
-        assert "as Dask is not installed" in workers.description
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        cluster_workers(cluster.scheduler_address) as workers,
+    ):
+        assert "the Dask cluster inproc://" in workers.description
         sweep(made, workers, options)
     assert measured(options.results) == measured(alone.results)
+
+
+def test_a_sweep_here_listens_to_nobody(plan, options: Options) -> None:
+    """What listens, even on the loopback, can be reached by every account of the computer."""
+    made = plan(seeds="0")
+    made = replace(made, runs=made.runs[:1])
+    seen: list[Any] = []
+
+    class Look(Watch):
+        def progressed(self, event: Progressed) -> None:
+            family = [psutil.Process(), *psutil.Process().children(recursive=True)]
+            seen.append([port for one in family for port in one.net_connections("inet") if port.status == "LISTEN"])
+
+    with local_workers(here(1)) as workers:
+        sweep(made, workers, options, Look())
+    assert seen and not any(seen)

@@ -1,11 +1,13 @@
-"""Workers of Dask: of this machine, or of a cluster."""
+"""Workers of a Dask cluster.
+
+Whoever reaches a scheduler can run code on its workers: with tls:// only those who hold its certificates can, with
+tcp:// anybody. Certificates are named in Dask's own configuration (`distributed.comm.tls`).
+"""
 
 from __future__ import annotations
 
 import importlib.util
-import logging
 import queue
-import signal
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -13,13 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 from engine.schema import write
 from training.sweeping.workers.base import DEATHS, Ended, Event, Noted, Task, Workers, WorkersError, given_up
-from training.sweeping.workers.layout import Layout
 from training.sweeping.workers.performing import end_of, event_of, perform
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
 CONNECT_S = 10.0  # to a scheduler
+
+
+def open_to_anybody(address: str) -> bool:
+    """Whether a scheduler's address says that it neither encrypts nor asks who is there."""
+    return not address.startswith("tls://")
 
 
 def dask_is_installed() -> bool:
@@ -98,11 +104,6 @@ def _perform_on_dask(task: dict[str, Any], topic: str) -> dict[str, Any]:
     return perform(task, lambda told: worker.log_event(topic, told))
 
 
-def dask_setup(worker: object) -> None:
-    """Dask calls this in each of our own workers: the interrupt of a terminal is for the command alone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 @contextmanager
 def cluster_workers(address: str, most: int | None = None) -> Iterator[Workers]:
     """The workers of the Dask cluster at `address`; `most` of them, None: as many as there are.
@@ -122,31 +123,4 @@ def cluster_workers(address: str, most: int | None = None) -> Iterator[Workers]:
             "--scheduler out"
         ) from error
     with client, closing(_DaskWorkers(client, f"the Dask cluster {address}", most)) as found:
-        yield found
-
-
-@contextmanager
-def dask_workers(layout: Layout) -> Iterator[Workers]:
-    """Workers of this machine."""
-    import dask
-    from distributed import Client, Nanny, Scheduler, SpecCluster
-
-    common = {
-        "nthreads": 1,  # tasks at once, not threads of one
-        "memory_limit": 0,  # memory-mapped data sets would count, and the run be killed for them
-        "host": "127.0.0.1",
-        "preload": [__name__],
-        "silence_logs": logging.CRITICAL,  # what matters is told by `Noted`
-    }
-    workers = {
-        number: {"cls": Nanny, "options": {**common, "env": dict(environment)}}
-        for number, environment in enumerate(layout.environments)
-    }
-    settings = {"host": "127.0.0.1", "port": 0, "dashboard_address": "127.0.0.1:0", "allowed_failures": DEATHS}
-    with (
-        dask.config.set({"distributed.worker.profile.enabled": False}),
-        SpecCluster(workers, {"cls": Scheduler, "options": settings}, silence_logs=logging.CRITICAL) as cluster,
-        Client(cluster, set_as_default=False) as client,
-        closing(_DaskWorkers(client, f"Dask workers here: {layout.description}")) as found,
-    ):
         yield found

@@ -1,4 +1,4 @@
-"""Workers of this machine where Dask is not installed: plain processes."""
+"""Workers of this machine: plain processes, each reached through a pipe that it inherits. Nothing listens."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class _ProcessWorkers:
     """Processes of this machine, each with a pipe of its own: the death of one disturbs no other."""
 
     def __init__(self, layout: Layout) -> None:
-        self.description = f"processes here, as Dask is not installed: {layout.description}"
+        self.description = f"processes here: {layout.description}"
         self._places = [_Place(environment) for environment in layout.environments]
         self._context = multiprocessing.get_context("spawn")
 

@@ -123,7 +123,7 @@ def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Pat
     dialog.close_button.click()
     qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text(), timeout=30_000)
     assert wavs(tmp_path) == []
-    assert list(tmp_path.glob(".*")) == []
+    assert list(tmp_path.glob(".*.unfinished")) == []
 
 
 def test_its_state_is_remembered(made, tmp_path: Path) -> None:
@@ -210,7 +210,7 @@ def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_p
     dialog.close_button.click()
     qtbot.waitUntil(lambda: "Cancelled; what was finished is kept" in dialog.state.text(), timeout=30_000)
     assert 1 < len(wavs(tmp_path / "strings")) < 60
-    assert list((tmp_path / "strings").glob(".*")) == []
+    assert list((tmp_path / "strings").glob(".*.unfinished")) == []
 
 
 def test_every_control_of_the_dialog_has_a_name_and_a_tip(dialog: ExportDialog) -> None:

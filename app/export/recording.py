@@ -1,0 +1,73 @@
+"""A sound of any length on disk: memory holds a block of it at a time."""
+
+from __future__ import annotations
+
+import tempfile
+import weakref
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+BLOCK_FRAMES = 2**16
+
+
+class Sound(Protocol):
+    """Frames (frames, points) of which a slice can be had: an array, or a recording."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, frames: slice, /) -> NDArray[np.floating]: ...
+
+
+class Recording:
+    """Samples (frames, points) in single precision, as voices give them, in a temporary file that goes with it.
+
+    Raises:
+        OSError: the disk of temporary files is full.
+    """
+
+    def __init__(self, points: int) -> None:
+        self.points = points
+        self._file: Any = tempfile.TemporaryFile(prefix="learned-strings-", buffering=0)  # noqa: SIM115
+        weakref.finalize(self, self._file.close)
+        self._frames = 0
+
+    def append(self, block: NDArray[np.float32]) -> None:
+        """More frames (n, points) at its end."""
+        data = memoryview(np.ascontiguousarray(block, np.float32).tobytes())
+        self._file.seek(self._frames * self._frame_bytes)
+        while data:
+            data = data[self._file.write(data) :]
+        self._frames += len(block)
+
+    def cut(self, frames: int) -> None:
+        """Leaves the first frames alone."""
+        self._frames = min(self._frames, frames)
+
+    def __len__(self) -> int:
+        return self._frames
+
+    def __getitem__(self, frames: slice) -> NDArray[np.float64]:
+        first, last, _ = frames.indices(self._frames)
+        self._file.seek(first * self._frame_bytes)
+        wanted = max(0, last - first) * self._frame_bytes
+        return np.frombuffer(_read(self._file, wanted), np.float32).reshape(-1, self.points).astype(np.float64)
+
+    @property
+    def _frame_bytes(self) -> int:
+        return 4 * self.points
+
+
+def _read(file: Any, wanted: int) -> bytes:
+    parts = []
+    while wanted > 0 and (part := file.read(wanted)):
+        parts.append(part)
+        wanted -= len(part)
+    return b"".join(parts)
+
+
+def blocks(sound: Sound, frames: int = BLOCK_FRAMES) -> Iterator[tuple[int, NDArray[np.floating]]]:
+    """First frame and frames of each block of a sound."""
+    for first in range(0, len(sound), frames):
+        yield first, sound[first : first + frames]

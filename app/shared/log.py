@@ -1,0 +1,116 @@
+"""The log: a file of a few megabytes at most, with every fault that nobody expected, for a report.
+
+What ends a process from within (a fault in compiled code) writes where each thread was into a file beside it.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import logging
+import os
+import platform
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from types import TracebackType
+
+from platformdirs import user_log_path
+
+from app.shared.version import PROGRAM, program_version
+
+LARGEST_BYTES = 2**20
+OLDER_KEPT = 2
+MOST_KINDS = 200  # of faults in a run
+FILE_VARIABLE = "LEARNED_STRINGS_LOG"
+
+_log = logging.getLogger("learned_strings")
+
+
+def log_file() -> Path:
+    """LEARNED_STRINGS_LOG, else the platform's place for a user's logs."""
+    given = os.environ.get(FILE_VARIABLE)
+    return Path(given) if given else user_log_path("learned-strings", appauthor=False) / "learned-strings.log"
+
+
+@contextmanager
+def faults_logged(told: Callable[[str], None]) -> Iterator[None]:
+    """Within, what no code expects is written to the log, in whatever thread it happens, and given to `told`.
+
+    A log that cannot be written is done without.
+    """
+    handler = _open(log_file())
+    before = sys.excepthook, threading.excepthook
+    known: set[str] = set()
+
+    def note(kind: type[BaseException], error: BaseException | None, trace: TracebackType | None, where: str) -> None:
+        text = f"{where}\n{''.join(traceback.format_exception(kind, error, trace))}"
+        if text not in known and len(known) < MOST_KINDS:  # one that comes with every picture is written once
+            known.add(text)
+            _log.error("%s", text)
+            told(text)
+
+    def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if not issubclass(kind, Exception):  # an interrupt is no fault
+            before[0](kind, error, trace)
+            return
+        before[0](kind, error, trace)
+        note(kind, error, trace, f"in the thread {threading.current_thread().name}")
+
+    def of_thread(arguments: threading.ExceptHookArgs) -> None:
+        if issubclass(arguments.exc_type, SystemExit):
+            return
+        before[1](arguments)
+        name = arguments.thread.name if arguments.thread else "unknown"
+        note(arguments.exc_type, arguments.exc_value, arguments.exc_traceback, f"in the thread {name}")
+
+    sys.excepthook, threading.excepthook = of_main, of_thread
+    try:
+        yield
+    finally:
+        sys.excepthook, threading.excepthook = before
+        if handler is not None:
+            _log.removeHandler(handler)
+            handler.close()
+
+
+@contextmanager
+def crashes_written() -> Iterator[None]:
+    """Within, what ends the process writes where its threads were into the file `.crash` beside the log."""
+    path = log_file().with_suffix(".crash")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("w" if path.exists() and path.stat().st_size > LARGEST_BYTES else "a")
+    except OSError:
+        yield
+        return
+    with file:
+        faulthandler.enable(file)
+        try:
+            yield
+        finally:
+            faulthandler.disable()
+
+
+def log_fault(error: BaseException, where: str) -> str:
+    """Notes a fault that was caught, and returns its text."""
+    text = f"{where}\n{''.join(traceback.format_exception(error))}"
+    _log.error("%s", text)
+    return text
+
+
+def _open(path: Path) -> logging.Handler | None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handler = RotatingFileHandler(path, maxBytes=LARGEST_BYTES, backupCount=OLDER_KEPT, encoding="utf-8")
+    except OSError:
+        return None
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    _log.addHandler(handler)
+    _log.setLevel(logging.INFO)
+    _log.propagate = False
+    _log.info("%s %s, Python %s, %s", PROGRAM, program_version(), platform.python_version(), platform.platform())
+    return handler

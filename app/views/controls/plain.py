@@ -1,0 +1,29 @@
+"""Labels and tips that show their text as it is: what a file says is never taken for markup.
+
+Qt looks at a text and shows it as HTML where it seems to be some, which loads pictures that it names.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import Qt as GuiQt
+from PySide6.QtWidgets import QLabel
+
+
+class Label(QLabel):
+    """A QLabel of plain text, unless another format is asked for."""
+
+    def __init__(self, *arguments: Any, **properties: Any) -> None:
+        super().__init__(*arguments, **properties)
+        if self.textFormat() == Qt.TextFormat.AutoText:
+            self.setTextFormat(Qt.TextFormat.PlainText)
+
+
+def plain_tip(text: str) -> str:
+    """A tool tip that shows this very text: tips have no format to choose, so what looks like markup is escaped."""
+    if not GuiQt.mightBeRichText(text):
+        return text
+    return f"<p style='white-space: pre-wrap'>{escape(text)}</p>"

@@ -1,0 +1,31 @@
+"""Faults that nobody expected, of any thread, in one dialog of the window's."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QWidget
+
+from app.shared.log import log_file
+from app.views.dialogs.fault_dialog import FaultDialog
+
+UNEXPECTED = "An error that nobody expected. What you hear and see may go on; if it does not, start again."
+
+
+class Faults(QObject):
+    """`tell` may be called from any thread."""
+
+    _told = Signal(str, str)
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        self._window = window
+        self.dialog: FaultDialog | None = None
+        self._told.connect(self._show, Qt.ConnectionType.QueuedConnection)
+
+    def tell(self, text: str, heading: str = UNEXPECTED) -> None:
+        self._told.emit(text, heading)
+
+    def _show(self, text: str, heading: str) -> None:
+        if self.dialog is None:
+            self.dialog = FaultDialog(log_file(), heading, self._window)
+        self.dialog.add(text)

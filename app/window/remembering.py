@@ -1,0 +1,68 @@
+"""Settings are saved soon after each change, so that a process that ends in any way loses a moment at most."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from filelock import FileLock
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from app.window.settings import Settings, merged, read_settings, save_settings
+
+LOOK_EVERY_MS = 1_000
+LOCK_S = 2.0  # waited for another instance that is saving
+
+
+class Keeper(QObject):
+    """Looks now and then at what there is to remember, and writes what has changed and then rested.
+
+    Another instance's changes are kept: of each field, what this one has changed since it read or wrote the file.
+
+    Args:
+        current: what is to be remembered, as it is now.
+    """
+
+    failed = Signal(str)
+
+    def __init__(self, path: Path, read: Settings, current: Callable[[], Settings], parent: QObject) -> None:
+        super().__init__(parent)
+        self._path, self._current = path, current
+        self._base = self._seen = read
+        self._writing: threading.Thread | None = None
+        self._told = False
+        self._timer = QTimer(self, interval=LOOK_EVERY_MS)
+        self._timer.timeout.connect(self.look)
+        self._timer.start()
+
+    def look(self) -> None:
+        """Writes, in a thread of its own, what has changed since the last time but not since the last look."""
+        now = self._current()
+        rested, self._seen = now == self._seen, now
+        if not rested or now == self._base or (self._writing is not None and self._writing.is_alive()):
+            return
+        base, self._base = self._base, now
+        self._writing = threading.Thread(target=self._write, args=(base, now), name="settings")
+        self._writing.start()
+
+    def close(self) -> None:
+        """Writes what has not been written yet."""
+        self._timer.stop()
+        if self._writing is not None:
+            self._writing.join()
+        now = self._current()
+        if now != self._base or not self._path.exists():
+            self._write(self._base, now)
+            self._base = now
+
+    def _write(self, base: Settings, now: Settings) -> None:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with FileLock(self._path.with_name(f".{self._path.name}.lock"), timeout=LOCK_S):
+                theirs = read_settings(self._path)
+                save_settings(self._path, now if theirs is None else merged(base, now, theirs))
+        except OSError as error:
+            if not self._told:  # once: it would come again with every change
+                self._told = True
+                self.failed.emit(f"The settings {self._path} cannot be written ({error.strerror or error}).")

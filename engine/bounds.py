@@ -1,0 +1,143 @@
+"""How large whatever a file asks for may be: the one place for it, looked at before anything is built.
+
+Presets, settings and plans come from strangers. A few bytes of them can ask for any amount of memory or time, so each
+number has a bound here. The bounds lie far beyond every string and model that anybody would train on one computer.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from engine.resonators.string import StringParameters
+
+# Files
+LARGEST_PRESET_BYTES = 64 * 2**20
+LARGEST_HEADER_BYTES = 2**20  # of safetensors: names, shapes and metadata
+LARGEST_TEXT_BYTES = 2**20  # of JSON and TOML
+LARGEST_TABLE_BYTES = 64 * 2**20  # of CSV
+DEEPEST_NESTING = 32
+LONGEST_STRING = 10_000  # characters of one value
+MOST_ENTRIES = 1_000  # of one list
+LARGEST_INTEGER = 2**63 - 1
+
+# Models: field of a configuration -> least and most. A field that is not here takes OTHER_SIZES.
+SIZES: Mapping[str, tuple[int, int]] = {
+    "grid_points": (1, 10_001),
+    "state_size": (1, 4_096),
+    "rank": (1, 4_096),
+    "width": (1, 1_024),
+    "depth": (1, 32),
+    "layers": (0, 64),
+    "lags": (1, 64),
+    "node_spacing": (1, 1_000_000),
+}
+OTHER_SIZES = (-65_536, 65_536)
+MOST_LAYERS_OF_WIDTHS = 16
+LARGEST_WIDTH = 8_192
+MOST_PARAMETERS = 16 * 2**20  # float32 of the largest preset
+
+# Strings: parameter -> least and most, in the unit of its name
+STRING: Mapping[str, tuple[float, float]] = {
+    "length_m": (0.01, 100.0),
+    "area_m2": (1e-10, 1e-2),
+    "second_moment_m4": (0.0, 1e-6),
+    "density_kg_m3": (1.0, 1e5),
+    "youngs_modulus_pa": (0.0, 1e13),
+    "damping_d1_kg_m_s": (0.0, 1e3),
+    "damping_d3_kg_m_s": (0.0, 1e3),
+    "tension_n": (1e-3, 1e6),
+}
+
+# Motion
+HIGHEST_RATE_HZ = 1_000_000
+MOST_FRAMES = 10**9  # of a horizon
+MOST_MATRIX_NUMBERS = 2_000_000  # modes times grid points: 16 MB a matrix of shapes
+MOST_NUMBERS_A_SECOND = 100_000_000  # grid points times rate
+MOST_SUBSTEPS = 1_024  # of the truth in a sample
+MOST_FLOWS = 250_000  # modes times kinds of sub-steps: 64 MB of the truth's tables
+SUBSTEPS_IN_A_PERIOD = 36  # of the highest mode; see `default_substeps`
+
+# Work
+MOST_RUNS = 2_000  # of a plan
+LARGEST_DATASET_BYTES = 64 * 2**30
+
+
+def check(name: str, value: float, limits: tuple[float, float], unit: str = "") -> None:
+    """Raises ValueError, naming the field and its range, where a value is out of it."""
+    low, high = limits
+    if not low <= value <= high:
+        told = f" {unit}" if unit else ""
+        raise ValueError(f"{name} must lie in {low:.10g} … {high:.10g}{told}, not {brief(value)}")
+
+
+def check_sizes(configuration: object) -> None:
+    """Every whole number of a model's configuration, and each of its tuples.
+
+    Raises:
+        ValueError: one is out of its bounds; the message names the field.
+    """
+    for field in dataclasses.fields(configuration):  # type: ignore[arg-type]
+        value = getattr(configuration, field.name)
+        if isinstance(value, bool):
+            continue
+        if isinstance(value, int):
+            check(field.name, value, SIZES.get(field.name, OTHER_SIZES))
+        elif isinstance(value, float):
+            check(field.name, value, (-1e12, 1e12))
+        elif isinstance(value, tuple):
+            if len(value) > MOST_LAYERS_OF_WIDTHS:
+                raise ValueError(
+                    f"{field.name} has {len(value)} entries, at most {MOST_LAYERS_OF_WIDTHS} may be given"
+                )
+            for entry in value:
+                if isinstance(entry, int | float):
+                    check(field.name, entry, (-LARGEST_WIDTH, LARGEST_WIDTH))
+
+
+def check_motion(
+    string: StringParameters, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool
+) -> None:
+    """That a string's motion can be computed in ordinary memory and time, in closed form.
+
+    Raises:
+        ValueError: it cannot, or a mode does not oscillate; the message names the fields.
+    """
+    check("rate_hz", rate_hz, (1, HIGHEST_RATE_HZ), "Hz")
+    check("grid_points", grid_points, (3, SIZES["grid_points"][1]))
+    if not 1 <= modes <= grid_points - 2:
+        raise ValueError(f"a grid of {grid_points} points cannot hold {brief(modes)} modes")
+    if modes * grid_points > MOST_MATRIX_NUMBERS:
+        raise ValueError(
+            f"modes times grid_points must be at most {MOST_MATRIX_NUMBERS}, not {modes} times {grid_points}"
+        )
+    if grid_points * rate_hz > MOST_NUMBERS_A_SECOND:
+        raise ValueError(
+            f"grid_points times rate_hz must be at most {MOST_NUMBERS_A_SECOND}, not {grid_points} times {rate_hz:g}"
+        )
+    # σ² < ω² is a quadratic in η² that is not above 0 at η = 0: it holds for all modes if for the first and the last
+    for mode in (1, modes):
+        if not string.decay_rate(mode) < string.undamped_frequency(mode):
+            raise ValueError(f"mode {mode} is overdamped: lower its damping, or keep fewer modes")
+    if not tension_modulated:
+        return
+    highest_hz = string.undamped_frequency(modes) / (2 * math.pi)
+    substeps = math.ceil(SUBSTEPS_IN_A_PERIOD * highest_hz / rate_hz)
+    if substeps > MOST_SUBSTEPS:
+        raise ValueError(
+            f"mode {modes} at {highest_hz:.3g} Hz is too high for a rate_hz of {rate_hz:g}: the truth would take"
+            f" {substeps:.3g} sub-steps, at most {MOST_SUBSTEPS}; keep fewer modes"
+        )
+    if modes * min(modes, substeps) > MOST_FLOWS:
+        raise ValueError(f"{modes} modes with {substeps} sub-steps of the truth are too many; keep fewer modes")
+
+
+def brief(value: object) -> str:
+    """A value in a message: never longer than a few words."""
+    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        return f"a whole number of {value.bit_length()} bits"
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -1,0 +1,26 @@
+"""Text that came from a file, made fit for one line of a terminal or a label."""
+
+from __future__ import annotations
+
+LONGEST_MESSAGE = 500  # characters
+
+
+def printable(text: str) -> str:
+    """The text with its lines, and without anything that commands a terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+
+
+def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
+    """The text in one line of printable characters, its middle left out where it is longer than `most`.
+
+    Control characters, escapes, line ends and marks that turn the direction of text become spaces, so that nothing
+    can forge a second line or command a terminal. Beginning and end stay: a message names its file at the beginning
+    and the remedy at the end.
+    """
+    if len(text) > 4 * most:  # what is left out need not be looked at
+        text = f"{text[: 2 * most]}{text[-2 * most :]}"
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    if len(line) <= most:
+        return line
+    end = most // 3
+    return f"{line[: most - end - 3].rstrip()} … {line[-end:].lstrip()}"

@@ -1,0 +1,98 @@
+"""What a file says is shown as it is: no label and no tip takes it for markup, which would load what it names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtGui import Qt as GuiQt
+from PySide6.QtWidgets import QLabel, QListWidget, QTextEdit, QTreeWidget, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.export.choices import ExportChoices
+from app.presets.library import PresetEntry
+from app.session.choices import Choices
+from app.views.controls.notice_bar import NoticeBar
+from app.views.controls.plain import Label, plain_tip
+from app.views.controls.preset_bar import PresetBar
+from app.views.controls.readout import Readout
+from app.views.controls.slot_buttons import SlotButtons
+from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.preset_browser import PresetBrowser
+from engine.presets import read_info
+
+EVIL = "<img src=evil>"
+
+
+@pytest.fixture
+def entry(small_preset: Path) -> PresetEntry:
+    words = {name: f"{name} {EVIL}" for name in ("title", "description", "knows", "licence", "initialisation")}
+    return PresetEntry(
+        f"name {EVIL}", Path("/x") / f"{EVIL}.safetensors", replace(read_info(small_preset), **words), 1
+    )
+
+
+def formatted(root: QWidget) -> Iterator[str]:
+    """Every text beneath a widget that Qt would take for HTML: labels, editors, tips."""
+    for label in [*root.findChildren(QLabel), *([root] if isinstance(root, QLabel) else [])]:
+        rich = label.textFormat() == Qt.TextFormat.RichText
+        if rich or (label.textFormat() == Qt.TextFormat.AutoText and GuiQt.mightBeRichText(label.text())):
+            yield label.text()
+    for editor in root.findChildren(QTextEdit):
+        yield editor.toHtml()
+    tips = [each.toolTip() for each in [root, *root.findChildren(QWidget), *root.findChildren(QAction)]]
+    for tree in root.findChildren(QTreeWidget):
+        items = [tree.topLevelItem(row) for row in range(tree.topLevelItemCount())]
+        tips += [item.toolTip(column) for item in items if item for column in range(tree.columnCount())]
+    for view in root.findChildren(QListWidget):
+        tips += [view.item(row).toolTip() for row in range(view.count())]
+    yield from filter(GuiQt.mightBeRichText, tips)
+
+
+def texts(root: QObject) -> str:
+    labels = [*root.findChildren(QLabel), *([root] if isinstance(root, QLabel) else [])]
+    return "\n".join([*(label.text() for label in labels), *(each.toolTip() for each in root.findChildren(QWidget))])
+
+
+def test_no_view_that_holds_a_files_text_takes_it_for_markup(
+    qtbot: QtBot, entry: PresetEntry, tmp_path: Path
+) -> None:
+    notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), PresetBrowser(), Readout()
+    export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
+    dialog = ExportDialog([entry], Choices(preset=entry.name), export)
+    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
+    for view in views:
+        qtbot.addWidget(view)
+    notices.tell(f"{EVIL}: tensor {EVIL} is unknown", EVIL)
+    notices.show_all()
+    bar.set_chosen(entry)
+    slots.set_entries([entry])
+    slots.show_choices(Choices(a=f"preset:{entry.name}", b="difference"))
+    browser.show_entries([entry], (), entry.name, 1, str(tmp_path / EVIL))
+    readout.tell(EVIL)
+    for view in views:
+        assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
+    assert "evil" in texts(notices)  # and it is shown
+
+
+def test_labels_are_made_in_one_place() -> None:
+    """A QLabel of its own would look at its text and guess; the preset's card alone is HTML, and escapes."""
+    app = Path(__file__).parents[3] / "app"
+    made = [
+        path.relative_to(app).as_posix()
+        for path in sorted(app.rglob("*.py"))
+        if "benchmarks" not in path.parts and "QLabel(" in path.read_text("utf-8").replace("(QLabel)", "")
+    ]
+    assert made == []
+
+
+def test_a_tip_or_a_label_shows_what_it_is_given(qtbot: QtBot) -> None:
+    label = Label(EVIL)
+    qtbot.addWidget(label)
+    assert label.textFormat() == Qt.TextFormat.PlainText
+    assert plain_tip("2 < 3\nand on") == "2 < 3\nand on"
+    assert "&lt;img" in plain_tip(EVIL) and "<img" not in plain_tip(EVIL)

@@ -1,0 +1,134 @@
+"""Settings outlive a kill, two instances keep each other's, and any file lets the app start."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QObject
+from pytestqt.qtbot import QtBot
+
+from app.session.choices import Choices
+from app.window.remembering import Keeper
+from app.window.settings import Settings, load_settings, merged, save_settings
+
+
+class Desk:
+    """What is to be remembered of one instance."""
+
+    def __init__(self, path: Path, owner: QObject) -> None:
+        self.now = load_settings(path)[0]
+        self.keeper = Keeper(path, self.now, lambda: self.now, owner)
+        self.keeper._timer.stop()  # the test says when it looks
+
+    def choose(self, **changes: object) -> None:
+        choices = Choices.model_validate({**self.now.choices.model_dump(), **changes})
+        self.now = self.now.model_copy(update={"choices": choices})
+
+    def look(self) -> None:
+        self.keeper.look()
+        if self.keeper._writing is not None:
+            self.keeper._writing.join()
+
+
+def test_a_change_is_saved_once_it_rests(qtbot: QtBot, tmp_path: Path) -> None:
+    owner, path = QObject(), tmp_path / "settings.json"
+    desk = Desk(path, owner)
+    desk.choose(position=0.41)
+    desk.look()
+    assert not path.exists()  # it may be under way
+    desk.look()
+    assert load_settings(path)[0].choices.position == 0.41
+    before = path.stat().st_mtime_ns
+    desk.look()
+    desk.keeper.close()
+    assert path.stat().st_mtime_ns == before  # nothing new, nothing written
+
+
+def test_two_instances_keep_what_the_other_changed(qtbot: QtBot, tmp_path: Path) -> None:
+    owner, path = QObject(), tmp_path / "settings.json"
+    one, other = Desk(path, owner), Desk(path, owner)
+    one.choose(position=0.41)
+    one.keeper.close()
+    other.choose(amplitude_mm=2.5)
+    other.now = other.now.model_copy(update={"favourites": ("mine",)})
+    other.keeper.close()
+    found, notice = load_settings(path)
+    assert (found.choices.position, found.choices.amplitude_mm, found.favourites) == (0.41, 2.5, ("mine",))
+    assert notice == ""
+    assert [each.name for each in tmp_path.glob("*.json")] == ["settings.json"]
+
+
+def test_merged_is_mine_where_i_changed_it() -> None:
+    base = Settings()
+    mine = base.model_copy(update={"window_geometry": "mine"})
+    theirs = base.model_copy(update={"window_geometry": "theirs", "favourites": ("theirs",)})
+    assert merged(base, mine, theirs).window_geometry == "mine"
+    assert merged(base, mine, theirs).favourites == ("theirs",)
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    owner, told = QObject(), []
+    desk = Desk(tmp_path / "file" / "settings.json", owner)
+    desk.keeper.failed.connect(told.append)
+    for position in (0.41, 0.42):
+        desk.choose(position=position)
+        desk.keeper.close()
+    assert len(told) == 1 and "cannot be written" in told[0]
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+from PySide6.QtCore import QCoreApplication, QTimer
+from app.session.choices import Choices
+from app.window.remembering import Keeper
+from app.window.settings import Settings
+application = QCoreApplication([])
+box = [Settings()]
+keeper = Keeper(Path(sys.argv[1]), box[0], lambda: box[0], application)
+QTimer.singleShot(0, lambda: box.__setitem__(0, Settings(choices=Choices(position=0.41))))
+print("ready", flush=True)
+application.exec()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
+def test_a_kill_loses_nothing_that_rested(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE) as process:
+        end = time.monotonic() + 60
+        while not path.exists() and time.monotonic() < end:
+            time.sleep(0.05)
+        os.kill(process.pid, signal.SIGKILL)
+    assert load_settings(path)[0].choices.position == 0.41
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"[" * 100_000,
+        b'{"version": 1, "colour": ' + b"7" * 5000 + b"}",
+        b'{"choices": ' + b'{"a": ' * 500 + b"1" + b"}" * 500 + b"}",
+        b'{"window_geometry": "' + b"x" * 3_000_000 + b'"}',
+        b"\xff\xfe",
+        b'{"choices": {"position": NaN}}',
+        json.dumps({"favourites": ["\x1b[2J"], "\x1b]0;owned\x07": 1}).encode(),
+    ],
+    ids=["deep", "digits", "deep tables", "large", "no text", "NaN", "escapes"],
+)
+def test_any_file_lets_the_app_start(text: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_bytes(text)
+    settings, notice = load_settings(path)
+    assert isinstance(settings, Settings)
+    assert notice.isprintable() and len(notice) <= 500
+    save_settings(path, settings)
+    assert load_settings(path) == (settings, "")

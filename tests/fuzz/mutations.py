@@ -1,0 +1,116 @@
+"""Damaged files: bytes changed at random, and texts with values that are too many, too large, or of another kind."""
+
+from __future__ import annotations
+
+import json
+import random
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from engine.presets.file import METADATA_KEY
+
+HOSTILE: tuple[Any, ...] = (
+    None, True, "", "x" * 20_000, "../../escape", "/etc/passwd", "\x1b]0;owned\x07\r\n", "<img src=x>", "\u202e\x00",
+    0, -1, 1, 2, 3, 97, 10**9, -(10**9), 2**31, 2**63, 2**64, 10**400, 0.5, -0.0, 1e-320, 1e300, -1e300,
+    float("nan"), float("inf"), [], {}, [[]], [1] * 5_000, [10**9], {"a": {"b": {}}}, ["a", 1, None],
+)  # fmt: skip
+
+
+def damaged_bytes(data: bytes, draw: random.Random) -> bytes:
+    """Cut, lengthened, overwritten, swapped or doubled at a few places, most of them near the beginning."""
+    changed = bytearray(data)
+    for _ in range(draw.choice((1, 1, 2, 8))):
+        size = max(1, len(changed))
+        place = min(size - 1, int(size * draw.random() ** draw.choice((1, 4, 8))))
+        kind = draw.randrange(6)
+        if kind == 0:
+            del changed[place:]
+        elif kind == 1:
+            changed[place : place + 1] = draw.randbytes(draw.choice((1, 4, 64)))
+        elif kind == 2 and changed:
+            changed[place] ^= 1 << draw.randrange(8)
+        elif kind == 3:
+            del changed[place : place + draw.choice((1, 8, 100))]
+        elif kind == 4:
+            changed[place:place] = changed[place : place + draw.choice((1, 8, 100))]
+        else:
+            changed[place : place + 8] = struct.pack("<Q", draw.choice((0, 1, 2**31, 2**40, 2**63, 2**64 - 1)))
+    return bytes(changed)
+
+
+def damaged_value(value: Any, draw: random.Random) -> Any:
+    """Plain data with a few of its values, fields or lengths changed."""
+    whole = {"": json.loads(json.dumps(value))}
+    for _ in range(draw.choice((1, 1, 1, 2, 4))):
+        holders: list[Any] = [whole]
+        for holder in holders:
+            inner = holder.values() if isinstance(holder, dict) else holder
+            holders += [each for each in inner if isinstance(each, dict | list) and each]
+        holder = draw.choice(holders)
+        key = draw.choice(list(holder)) if isinstance(holder, dict) else draw.randrange(len(holder))
+        kind = draw.randrange(5)
+        if kind == 0 and len(holder) > 1:
+            del holder[key]
+        elif kind == 1 and isinstance(holder, dict) and holder is not whole:
+            holder[draw.choice(("colour", "depth", "\x1b[2J", "y" * 5_000))] = draw.choice(HOSTILE)
+        elif kind == 2 and isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
+            holder[key] = min(holder[key], 1e18) * draw.choice((-1, 0, 2, 10, 1e3, 1e6, 10**9, 1e-9))
+        elif kind == 3:
+            holder[key] = _nested(draw.choice((3, 40, 400)))
+        else:
+            holder[key] = draw.choice(HOSTILE)
+    return whole[""]
+
+
+def _nested(depth: int) -> list[Any]:
+    value: list[Any] = []
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+def damaged_text(value: Any, draw: random.Random) -> str:
+    """The JSON of damaged data; now and then what no data make."""
+    text = json.dumps(damaged_value(value, draw))
+    kind = draw.randrange(12)
+    if kind == 0:
+        return text.replace(": ", ": " + "[" * draw.choice((100, 2_000)), 1)
+    if kind == 1:
+        return text.replace("1", "7" * 5_000, 1)
+    if kind == 2:
+        return text[: draw.randrange(len(text) + 1)]
+    return text
+
+
+def damaged_preset(data: bytes, draw: random.Random) -> bytes:
+    """Of its bytes, of its header, or of what it says of itself."""
+    if draw.random() < 0.4:
+        return damaged_bytes(data, draw)
+    (length,) = struct.unpack_from("<Q", data)
+    header, weights = json.loads(data[8 : 8 + length]), bytearray(data[8 + length :])
+    kind = draw.randrange(8)
+    if kind == 0:
+        header = damaged_value(header, draw)
+    elif kind == 1 and weights:  # weights that are numbers still, or not
+        for _ in range(draw.choice((1, 100))):
+            struct.pack_into(
+                "<f", weights, 4 * draw.randrange(len(weights) // 4), draw.choice((0, 1e30, -1e3, 1e-40))
+            )
+    else:
+        text = header["__metadata__"][METADATA_KEY]
+        header["__metadata__"][METADATA_KEY] = damaged_text(json.loads(text), draw)
+    written = json.dumps(header).encode()
+    return struct.pack("<Q", len(written)) + written + bytes(weights)
+
+
+def attacked(name: str, rounds: int, seed: int, attack: Callable[[random.Random], None]) -> None:
+    """Runs an attack so often, each from a seed of its own, and prints how many were refused or did no harm."""
+    failures = []
+    for number in range(rounds):
+        try:
+            attack(random.Random(f"{seed}:{name}:{number}"))
+        except Exception as error:
+            failures.append(f"{name} {seed}:{number}: {type(error).__name__}: {error}"[:600])
+    print(f"\n{name}: refused or harmless {rounds - len(failures)} of {rounds} (seed {seed})")
+    assert not failures, "\n".join(failures[:20])

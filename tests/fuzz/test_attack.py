@@ -1,0 +1,272 @@
+"""The attack: damaged files to every reader. Each is refused in one line by its own error, or does no harm."""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import soundfile
+import torch
+
+from app.analysis.abx.record import RecordError, load_record
+from app.commands.arrays import read_displacements
+from app.commands.console import Failure
+from app.export.files import SoundRequest
+from app.export.recipe import Recipe, RecipeError, read_recipe, request_of
+from app.export.wav import WavSettings
+from app.presets.library import list_presets
+from app.window.settings import Settings, load_settings
+from engine.pluck import Pluck
+from engine.presets import (
+    SHIPPED,
+    STRINGS,
+    PresetError,
+    described_parameters,
+    load_preset,
+    outside_training,
+    read_string,
+)
+from engine.schema import SchemaError, write
+from engine.sources import ModelSource, Runaway, TruthSource, project
+from engine.voices import Ear, model_program, render_voice, truth_program
+from tests.fuzz.mutations import attacked, damaged_bytes, damaged_preset, damaged_text
+from training.by_name import load
+from training.fitting.checkpoint import Checkpoint
+from training.heard_file import COLUMNS, read_heard
+from training.results import Row, add_rows, read_results
+from training.sweeping.plan import load_plan
+
+FRAMES = 32
+
+
+def in_one_line(error: Exception, path: Path) -> None:
+    told = str(error)
+    assert len(told) <= 500 and told.isprintable() and str(path) in told, told[:700]
+
+
+def use(path: Path) -> None:
+    """Loads a preset and plays it: its model, its physics, and both as they are heard."""
+    preset = load_preset(path)
+    info = preset.info
+    initial_m = project(Pluck().displacement(info.grid_points), info.modes)
+    outside_training(info, Pluck())
+    described_parameters(path, info)
+    truth = TruthSource(info)
+    frames, _ = truth.advance(truth.start(initial_m[None]), 2)
+    assert bool(torch.isfinite(frames).all())
+    try:
+        source = ModelSource(preset)
+    except ValueError:  # it needs a frame before the first
+        return
+    seconds = FRAMES / info.rate_hz
+    try:
+        frames, _ = source.advance(source.start(initial_m[None]), FRAMES)
+        assert bool(torch.isfinite(frames).all())
+        for program in (model_program(preset.model, info, info.rate_hz), truth_program(info, info.rate_hz)):
+            sound = render_voice(program, source if program.rendered else None, info, Pluck(), Ear((0.37,)), seconds)
+            assert bool(np.isfinite(sound).all())
+    except Runaway:
+        return
+
+
+@pytest.mark.parametrize("name", ["small", "nylon_nonlinear_4k", "dmd", "any_string"])
+def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
+    shipped = {
+        "nylon_nonlinear_4k": SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors",
+        "any_string": SHIPPED / "studio_any_string.safetensors",
+        "dmd": SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors",
+    }
+    whole = shipped.get(name, small_preset).read_bytes()
+    path = tmp_path / "stranger.safetensors"
+    shutil.copy(small_preset, tmp_path / "good.safetensors")
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(damaged_preset(whole, draw))
+        try:
+            use(path)
+        except PresetError as error:
+            in_one_line(error, path)
+        entries, problems = list_presets(tmp_path)
+        assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
+
+    attacked(f"presets ({name})", rounds // 4, seed, attack)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader, a whole file of its kind, and the error that is its own."""
+
+    name: str
+    whole: Callable[[Path], bytes]
+    read: Callable[[Path], object]
+    errors: tuple[type[Exception], ...]
+    damaged: Callable[[bytes, random.Random], bytes] = damaged_bytes
+
+
+def json_or_bytes(whole: bytes, draw: random.Random) -> bytes:
+    return damaged_bytes(whole, draw) if draw.random() < 0.3 else damaged_text(json.loads(whole), draw).encode()
+
+
+def toml_or_bytes(whole: bytes, draw: random.Random) -> bytes:
+    lines = whole.decode().splitlines()
+    if draw.random() < 0.3:
+        return damaged_bytes(whole, draw)
+    place = draw.randrange(len(lines))
+    name = lines[place].partition("=")[0] if "=" in lines[place] else "colour "
+    value = draw.choice(
+        ("-1", "0", "1e300", "nan", "inf", "'x'", "[]", "{}", "true", "9" * 5000, "1000000000", "[1, 'a']",
+         "'" + "x" * 50_000 + "'", "[" * 100 + "]" * 100, "[" * 3_000, "[" + "1," * 3000 + "]")
+    )  # fmt: skip
+    lines[place] = f"{name}= {value}"
+    return "\n".join(lines).encode()
+
+
+def wav(folder: Path, comment: str) -> bytes:
+    buffer = io.BytesIO()
+    with soundfile.SoundFile(buffer, "w", 4000, 1, "PCM_16", format="WAV") as file:
+        file.comment = comment
+        file.write(np.zeros(8))
+    return buffer.getvalue()
+
+
+def recipe_text(preset: Path) -> str:
+    return Recipe.of(SoundRequest(load_preset(preset), Pluck(), 0.37, 0.1), WavSettings()).model_dump_json()
+
+
+def damaged_wav(whole: bytes, draw: random.Random) -> bytes:
+    if draw.random() < 0.4:
+        return damaged_bytes(whole, draw)
+    with soundfile.SoundFile(io.BytesIO(whole)) as file:
+        comment = file.comment
+    try:
+        return wav(Path(), damaged_text(json.loads(comment), draw).replace("\\u0000", ""))
+    except (ValueError, soundfile.LibsndfileError):  # a text that no WAV can hold
+        return damaged_bytes(whole, draw)
+
+
+def saved(value: Any) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, value)
+    return buffer.getvalue()
+
+
+def row_file(folder: Path) -> bytes:
+    row = Row("d" * 16, "a", "done", "koopman", "linear", "noise", 4000, 400, "ours", 0, rel_mse=0.5)
+    add_rows(folder / "rows.csv", [row])
+    return (folder / "rows.csv").read_bytes()
+
+
+def checkpoint(folder: Path) -> bytes:
+    tensor = torch.zeros(3)
+    facts = {"configuration": {"a": [1, 2]}, "step": 3, "loss_total": 0.5}
+    Checkpoint({"w": tensor}, {"w": tensor}, {}, {"0": {"exp_avg": tensor}}, facts).save(folder / "whole")
+    return (folder / "whole").read_bytes()
+
+
+def heard(path: Path) -> None:
+    for problem in read_heard(path.parent)[1]:
+        in_one_line(ValueError(problem), path)
+
+
+def settings(path: Path) -> None:
+    found, notice = load_settings(path)
+    assert isinstance(found, Settings) and len(notice) <= 500 and notice.isprintable()
+    for aside in path.parent.glob("*.broken.json"):
+        aside.unlink()
+
+
+PLAN = b"""description = "a plan"
+[[block]]
+models = ["koopman", "dmd"]
+strings = ["linear"]
+initials = ["gaussian"]
+rates_hz = [4000]
+horizons = [400]
+seeds = [0, 1]
+[data]
+count = 20
+"""
+CONFIGURATION = b"""title = "a run"
+model = "koopman_var"
+[data]
+initial = "gaussian"
+rate_hz = 4000
+modes = 10
+count = 100
+[data.string]
+length_m = 0.65
+tension_n = 60.97
+[recipe]
+epochs = 1
+batch_size = 10
+[model_configuration]
+state_size = 16
+multiplier_widths = [8]
+"""
+HEARD = f"{','.join(COLUMNS)}\na,{'0' * 64},4,0.5,-1,0,0.1,,,1\n".encode()
+TARGETS = (
+    Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
+    Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
+    Target("run.toml", lambda p: CONFIGURATION, lambda p: load(str(p)), (SchemaError,), toml_or_bytes),
+    Target(
+        "string.toml", lambda p: (STRINGS / "steel_e4.toml").read_bytes(), read_string, (SchemaError,), toml_or_bytes
+    ),
+    Target("rows.csv", row_file, read_results, (SchemaError,)),
+    Target("heard.csv", lambda p: HEARD, heard, ()),
+    Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),
+    Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
+    Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (RecordError,), json_or_bytes),
+)
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_readers(target: Target, tmp_path: Path, rounds: int, seed: int) -> None:
+    folder = tmp_path / "there"
+    folder.mkdir()
+    whole, path = target.whole(tmp_path), folder / target.name
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(target.damaged(whole, draw))
+        try:
+            target.read(path)
+        except target.errors as error:
+            in_one_line(error, path)
+        assert {each.name for each in folder.iterdir()} <= {target.name}
+
+    attacked(target.name, rounds // len(TARGETS), seed, attack)
+
+
+def test_recipes(small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
+    preset = load_preset(small_preset)
+    whole, path = wav(tmp_path, recipe_text(small_preset)), tmp_path / "stranger.wav"
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(damaged_wav(whole, draw))
+        try:
+            recipe = read_recipe(path)
+            request_of(recipe, preset, path)
+            assert recipe.settings.fade_out_s <= 600
+        except RecipeError as error:
+            in_one_line(error, path)
+
+    attacked("recipes", rounds // 4, seed, attack)
+
+
+def test_a_whole_file_of_each_kind_is_read(small_preset: Path, tmp_path: Path) -> None:
+    """Or the attack would show nothing."""
+    for target in TARGETS[:-1]:
+        path = tmp_path / target.name
+        path.write_bytes(target.whole(tmp_path))
+        target.read(path)
+    (tmp_path / "whole.wav").write_bytes(wav(tmp_path, recipe_text(small_preset)))
+    read_recipe(tmp_path / "whole.wav")
+    use(small_preset)
+    assert write(load(str(tmp_path / "run.toml")).data)["modes"] == 10
