@@ -38,6 +38,8 @@ MODEL_NAMES = {
 
 TITLE_WORDS = {"koopman_var": "Koopman, variable"}  # where a musician would not know the tables' name
 
+OF_MANY_STRINGS = frozenset({"koopman_tension"})  # learned by `family train`, no model of one cell
+
 Initial = Literal["gaussian", "noise"]
 _NAME = re.compile(
     r"nylon_(?P<kind>linear|nonlinear)_(?P<initial>gaussian|noise)_(?P<rate>\d+)k_(?P<model>[a-z0-9_]+?)"
@@ -60,6 +62,8 @@ class Cell:
     def __post_init__(self) -> None:
         if self.model not in MODELS:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        if self.model in OF_MANY_STRINGS:
+            raise ValueError(f"model {self.model!r} learns many strings, no cell's one; `family train` trains it")
         if self.rate_hz not in MODES:
             raise ValueError(f"rate_hz must be one of {', '.join(map(str, MODES))}, the paper's, not {self.rate_hz}")
         if self.horizon < 1:

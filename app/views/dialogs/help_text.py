@@ -83,6 +83,12 @@ MODELS = (
         "sample rate.",
     ),
     (
+        "Shared tension",
+        "One model for every string. Each latent is a mode of the linear string; many times a period, the tension that all of "
+        "them add turns them together. Three learned curves mend what such steps get wrong, the same for all modes of all "
+        "strings: pitch, stiffness, damping and tension are inputs. Bounded and decaying for any weights, at any sample rate.",
+    ),
+    (
         "LRU",
         "Linear recurrent unit: layers of a diagonal linear recurrence that is stable for every weight, with "
         "networks that bend each sample between them. The initial shape goes in as one impulse; from then on the "
