@@ -31,6 +31,7 @@ from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_m
 from training.fitting.losses import training_loss
 from training.fitting.phases import start_from_phases
 from training.fitting.pursuit import LatentFit, pursue
+from training.fitting.soap import SOAP
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
@@ -409,7 +410,8 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
             "weight_decay": recipe.weight_decay if recipe.eigenvalue_decay else 0.0,
         },
     ]
-    return torch.optim.AdamW(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
+    kind = SOAP if recipe.optimiser == "soap" else torch.optim.AdamW
+    return kind(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
 
 
 def _keep_statistics(model: torch.nn.Module) -> None:
