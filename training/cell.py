@@ -29,6 +29,7 @@ MODEL_NAMES = {
     "koopman": "Koopman",
     "koopman_var": "Koopman_var",
     "koopman_integrated": "integrated phase",
+    "koopman_tension": "shared tension",
     "lru": "LRU",
     "s5": "S5",
     "fgru": "FGRU",

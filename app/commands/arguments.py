@@ -16,6 +16,22 @@ PresetName = Annotated[str, typer.Argument(metavar="PRESET", help="A preset's na
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Cache = Annotated[Path | None, typer.Option(help="Folder of the data sets; made where it is not there.")]
 
+StringName = Annotated[
+    str | None,
+    typer.Option(
+        "--string",
+        metavar="NAME|STRING.toml",
+        help="For a preset of many strings: another one, by name, or a file of a configuration's [data.string].",
+    ),
+]
+StringRate = Annotated[
+    int | None, typer.Option("--rate", metavar="HZ", help="For a preset of many strings: another sample rate.")
+]
+StringModes = Annotated[
+    int | None,
+    typer.Option("--modes", min=1, metavar="M", help="And so many modes; default all below 20 kHz."),
+]
+
 POSITION_HELP = "Where to pluck: 0 and 1 are the fixed ends, 0.5 the middle."
 AMPLITUDE_HELP = "Peak displacement in mm."
 SECONDS_HELP = "Duration in s."
@@ -49,3 +65,20 @@ def open_preset(name_or_path: str) -> Preset:
     from engine.presets import find_preset, load_preset
 
     return load_preset(find_preset(name_or_path, usable_files()))
+
+
+def open_preset_of_string(
+    name_or_path: str, string: str | None, rate_hz: int | None = None, modes: int | None = None
+) -> Preset:
+    """The same, of the string of a file, at a rate, with so many modes; None: the preset's own.
+
+    Raises:
+        PresetError, SchemaError: no such preset or string; or the preset is of one string.
+    """
+    from engine.presets import find_string, of_string, read_string
+
+    if rate_hz is not None:
+        check_range("--rate", rate_hz, 1_000, 1_000_000, "Hz")
+    return of_string(
+        open_preset(name_or_path), None if string is None else read_string(find_string(string)), rate_hz, modes
+    )

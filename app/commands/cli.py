@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, batch, bench, evaluation, info, listing, motion, render, sweep, tables, training
+from app.commands import abx, batch, bench, evaluation, family, info, listing, motion, render, sweep, tables, training
 from app.commands.console import say
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
@@ -71,6 +71,7 @@ cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
 cli.add_typer(bench.bench, name="bench")
 cli.add_typer(abx.abx, name="abx")
+cli.add_typer(family.family, name="family")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -58,6 +58,10 @@ def evaluate(
         typer.Option("--held-out", min=10, max=10_000, metavar="N", help="Fresh plucks of its draw, not a split."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of --held-out.")] = 1,
+    on: Annotated[
+        str | None,
+        typer.Option("--on", metavar="CONFIG", help="A preset of many strings: on the data of this run, by name."),
+    ] = None,
     heard: Annotated[
         bool, typer.Option("--heard", help="Instead: what a listener would notice of a few plucks, by name.")
     ] = False,
@@ -76,6 +80,7 @@ def evaluate(
         ("--trajectories", trajectories),
         ("--csv", table),
         ("--held-out", fresh),
+        ("--on", on),
     )
     for option, given in of_data if heard else of_heard:
         if given:
@@ -87,10 +92,12 @@ def evaluate(
         raise typer.BadParameter("is missing: give a preset's name or file", param_hint="PRESET")
     check_range("--past", past, 0, LONGEST_PAST_S, "s")
     loaded = open_preset(preset)
+    if on is not None:
+        loaded = _on(loaded, on)
     info = loaded.info
     if 0 < past * info.rate_hz < 1:
         raise typer.BadParameter(f"must hold a sample of {info.rate_hz} Hz, not {past:g} s", param_hint="--past")
-    configuration = _data_of(loaded)
+    configuration = _data_of(loaded, on)
     splits: tuple[str, ...] = ("validation", "test") if split == "both" else (split,)
     if fresh is not None:
         splits, configuration = ("all",), replace(configuration, count=fresh)
@@ -267,12 +274,32 @@ class _Measurement:
         return {"start_s": start_s, "stop_s": stop_s, "past_horizon": past}
 
 
-def _data_of(preset: Preset) -> DatasetConfiguration:
-    """The data set that a preset names."""
+def _on(preset: Preset, run: str) -> Preset:
+    """A preset of many strings, of the string, the rate, the modes and the horizon of a run's data."""
+    from engine.presets import of_string
+    from training.by_name import load
+
+    data = load(run).data
+    told = replace(preset.info, tension_modulated=data.tension_modulated)
+    own = of_string(replace(preset, info=told), data.string, data.rate_hz, data.modes)
+    # the errors that it tells are those of the family
+    info = replace(own.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
+    return replace(own, info=replace(info, horizon_steps=data.steps))
+
+
+def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
+    """The data set that a preset names, or that of a run."""
     from engine.schema import SchemaError, read
+    from training.by_name import load
     from training.configuration import TrainingConfiguration
 
     info = preset.info
+    if on is not None:
+        return load(on).data
+    if info.family is not None:
+        raise Failure(
+            f"{preset.path}: learned many strings: `family evaluate` measures it on such, --on CONFIG on a run's data"
+        )
     try:
         data = read(TrainingConfiguration, info.training, f"{preset.path}: metadata.training").data
     except SchemaError as error:

@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from engine.metrics import ErrorSums
     from engine.pluck import Pluck
     from engine.presets import Preset, PresetInfo
+    from engine.resonators import StringParameters
 
 InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
 Steps = Annotated[int, typer.Option(min=1, help="Frames after the initial one.")]
-StringKind = Literal["linear", "nonlinear"]
+STRING_KINDS = ("linear", "nonlinear")
 Solver = Literal["fast", "dop853"]
 LONGEST_S = 600.0  # of a comparison
 
@@ -31,7 +32,13 @@ LONGEST_S = 600.0  # of a comparison
 def simulate(
     u0: InputFile,
     out: OutputFile,
-    string: Annotated[StringKind, typer.Option(help="The nonlinear string is tension-modulated.")],
+    string: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND|NAME|STRING.toml",
+            help='"linear" or "nonlinear" (tension-modulated), the nylon B3; or another one, by name or file.',
+        ),
+    ],
     rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate in Hz.")],
     modes: Annotated[int, typer.Option(min=1, help="Modes kept.")],
     steps: Steps,
@@ -46,7 +53,8 @@ def simulate(
     U0 is in metres, at rest, on any grid of at least MODES + 2 points.
     """
     arguments.check_range("--rate", rate, 1, 1_000_000, "Hz")
-    if substeps is not None and (solver, string) != ("fast", "nonlinear"):
+    parameters, tension_modulated = _string_of(string)
+    if substeps is not None and (solver != "fast" or not tension_modulated):
         raise typer.BadParameter(
             "only the fast solver of the nonlinear string has sub-steps", param_hint="--substeps"
         )
@@ -61,17 +69,27 @@ def simulate(
     arrays.check_result_size(len(initial), steps + 1, points)
     solve = _fast if solver == "fast" else _dop853
     with progress("simulate") as report:
-        arrays.write_motion(out, initial, steps, solve(string == "nonlinear", rate, modes, steps, substeps), report)
+        arrays.write_motion(
+            out, initial, steps, solve(parameters, tension_modulated, rate, modes, steps, substeps), report
+        )
     if (peak_m := float(initial.abs().max())) > arrays.IMPLAUSIBLE_PEAK_M:
         say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
 
 
-def predict(preset: arguments.PresetName, u0: InputFile, out: OutputFile, steps: Steps) -> None:
-    """Predict the motion with a preset's model, at its rate.
+def predict(
+    preset: arguments.PresetName,
+    u0: InputFile,
+    out: OutputFile,
+    steps: Steps,
+    string: arguments.StringName = None,
+    rate: arguments.StringRate = None,
+    modes: arguments.StringModes = None,
+) -> None:
+    """Predict the motion with a preset's model: of its own string at its own rate, unless told.
 
     U0 is in metres, at rest, on the preset's grid.
     """
-    loaded = arguments.open_preset(preset)
+    loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     from app.commands import arrays
 
     initial = arrays.read_displacements(u0)
@@ -84,6 +102,19 @@ def predict(preset: arguments.PresetName, u0: InputFile, out: OutputFile, steps:
     arrays.check_result_size(len(initial), steps + 1, points)
     with progress("predict") as report:
         arrays.write_motion(out, initial, steps, _predicted(loaded, steps), report)
+    for words in _outside_family(loaded.info, initial):
+        say(f"warning: {words}")
+
+
+def _outside_family(info: PresetInfo, initial: Tensor) -> list[str]:
+    """How a string, and displacements of it, lie beyond those that a preset of many has learned."""
+    if info.family is None:
+        return []
+    found = info.family.outside(info.string)
+    rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(initial)).max())
+    if rise > (limit := info.family.tension_rise[1]):
+        found.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")
+    return found
 
 
 def compare(
@@ -93,6 +124,9 @@ def compare(
     seconds: arguments.Seconds,
     shape: arguments.Shape = arguments.DEFAULT_SHAPE,
     width: arguments.Width = arguments.DEFAULT_WIDTH,
+    string: arguments.StringName = None,
+    rate: arguments.StringRate = None,
+    modes: arguments.StringModes = None,
     json: arguments.Json = False,
 ) -> None:
     """Compare a preset's model with the physics on one pluck.
@@ -101,7 +135,7 @@ def compare(
     """
     pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
-    loaded = arguments.open_preset(preset)
+    loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     info = loaded.info
     steps = round(seconds * info.rate_hz)
     if steps < 1:
@@ -181,15 +215,33 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     return sums
 
 
-def _fast(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
-    from app.commands.arrays import blocks_of
+def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
+    """A string, and whether its stretch adds to its tension."""
+    from engine.presets import PresetError, find_string, read_string
     from engine.resonators import StringParameters
+
+    if kind_or_file in STRING_KINDS:
+        return StringParameters(), kind_or_file == "nonlinear"
+    try:
+        return read_string(find_string(kind_or_file)), True
+    except PresetError as error:
+        kinds = " or ".join(STRING_KINDS)
+        raise typer.BadParameter(f"must be {kinds}, or a string: {error}", param_hint="--string") from error
+
+
+def _fast(
+    parameters: StringParameters,
+    tension_modulated: bool,
+    rate_hz: float,
+    modes: int,
+    steps: int,
+    substeps: int | None,
+) -> Motion:
+    from app.commands.arrays import blocks_of
     from engine.truth import ModalState, SplittingSolver
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
-        string = StringParameters().resonator(
-            modes, tension_modulated=tension_modulated, grid_points=initial.shape[1]
-        )
+        string = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=initial.shape[1])
         solver, state = (
             SplittingSolver(string, rate_hz, substeps=substeps),
             ModalState.at_rest(string.to_modes(initial)),
@@ -202,14 +254,18 @@ def _fast(tension_modulated: bool, rate_hz: float, modes: int, steps: int, subst
     return motion
 
 
-def _dop853(tension_modulated: bool, rate_hz: float, modes: int, steps: int, substeps: int | None) -> Motion:
-    from engine.resonators import StringParameters
+def _dop853(
+    parameters: StringParameters,
+    tension_modulated: bool,
+    rate_hz: float,
+    modes: int,
+    steps: int,
+    substeps: int | None,
+) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
-        string = StringParameters().resonator(
-            modes, tension_modulated=tension_modulated, grid_points=initial.shape[1]
-        )
+        string = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=initial.shape[1])
         yield string.to_grid(solve_dop853(string, ModalState.at_rest(string.to_modes(initial)), rate_hz, steps))
 
     return motion

@@ -20,6 +20,8 @@ from engine.presets import (
 )
 from training.heard_file import Heard, read_heard
 
+FIRST = "studio_any_string"
+
 
 @dataclass(frozen=True)
 class PresetEntry:
@@ -67,7 +69,9 @@ class Library:
         return next((entry for entry in self.entries if entry.name == name), None)
 
     def first(self) -> PresetEntry | None:
-        """What a first start shows: the best of the highest rate."""
+        """What a first start shows: the string of every string, or else the best of the highest rate."""
+        if (chosen := self.find(FIRST)) is not None:
+            return chosen
         highest_hz = max((entry.info.rate_hz for entry in self.entries), default=0)
         fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)

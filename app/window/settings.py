@@ -22,7 +22,7 @@ from app.views.look import Look
 from engine.whole_file import whole_file
 
 # what a first start finds at the top: strings at full bandwidth, plucked anywhere
-FIRST_FAVOURITES = ("studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
+FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
 
 
 class Settings(BaseModel):

@@ -16,7 +16,7 @@ QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
 # A voice's state
 WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
 # A voice's kind
-BANK, TRUTH, RENDERED = 0, 1, 2
+BANK, TRUTH, RENDERED, TENSION = 0, 1, 2, 3
 
 # Slots of a voice (W: whole number, R: real)
 STATE = 0  # W
@@ -37,7 +37,7 @@ STRUCK_S = 14  # R the device clock's time of the gesture
 BEGAN_S = 15  # R and of the callback that gave the device its first samples
 STARVED = 16  # W frames in which it should have sounded and had nothing to
 MODES = 17  # W latents, or modes, or 0
-MOVING = 18  # W modes of the truth that still move
+MOVING = 18  # W modes of the truth, or latents that share a tension, that still move
 NODE = 19  # W the node from which a bank's integral goes on
 SEGMENT_VALID = 20  # W whether a bank knows where its last segment ended
 LOUDNESS = 21  # R nepers below full scale that the loudest latent, or all of the string, has now
@@ -99,6 +99,9 @@ BANK_ROWS = 21
 # Rows of the truth's state: amplitude and speed
 TRUTH_ROWS = 2
 
+# Rows of latents that share a tension: x, y, and in the third the largest energy and stretch
+TENSION_ROWS = 4
+
 # Slots of a bank's program
 P_MODES = 0  # W
 P_RATIO = 1  # R trained samples a frame
@@ -137,6 +140,14 @@ T_SILENCE = 3  # R
 T_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
 T_FLOWS, T_KICKS, T_COUPLING, T_ETA, T_SUBSTEPS, T_LEVEL_OF, T_INVERSE = 6, 7, 8, 9, 10, 11, 12  # W slots
 T_HEADER = 16
+
+# Slots of the program of latents that share a tension; then the eight rows (modes,) of `kernels.tension.advance`
+S_MODES = 0  # W
+S_NODES = 1  # W of a frame
+S_DECAY = 2  # R of the largest energy in a frame
+S_SILENCE = 3  # R
+S_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
+S_HEADER = 8
 
 # Slots of a rendered voice's program
 R_TAPS = 0  # W of the filter, to either side

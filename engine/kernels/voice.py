@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import bank, rendered, truth
+from engine.kernels import bank, rendered, tension, truth
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
@@ -31,6 +31,8 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     fence()
     if kind == at.BANK:
         bank.generate(voice, program, fading, heard, out, scratch)
+    elif kind == at.TENSION:
+        tension.generate(voice, program, fading, heard, out)
     else:
         truth.generate(voice, program, fading, heard, out)
     if fading:

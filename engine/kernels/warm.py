@@ -38,6 +38,7 @@ INFO = PresetInfo(
     seed=0,
 )
 LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
+ONE_TENSION = {"grid_points": INFO.grid_points, "modes": INFO.modes}
 MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
 BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
@@ -56,7 +57,7 @@ def warm() -> None:
 
 def voices() -> None:
     """A few quanta of every kind of voice; what a device calls is compiled as it is imported."""
-    for program in (*map(_bank, BANKS), truth_program(INFO, RATE_HZ)):
+    for program in (*map(_bank, BANKS), _shared_tension(), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
             voice = _struck(program, ear)
             voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
@@ -70,6 +71,7 @@ def models() -> None:
     with torch.inference_mode():
         for name, sizes in (
             ("koopman_integrated", LATENTS),
+            ("koopman_tension", ONE_TENSION),
             ("s5", {"grid_points": INFO.grid_points}),
             ("fgru", {"grid_points": INFO.grid_points}),
             ("frnn", {"grid_points": INFO.grid_points}),
@@ -83,6 +85,12 @@ def models() -> None:
 
 def _bank(sizes: dict[str, Any]) -> Program:
     program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
+    assert program is not None
+    return program
+
+
+def _shared_tension() -> Program:
+    program = bank_program(_model("koopman_tension", ONE_TENSION), INFO, RATE_HZ)
     assert program is not None
     return program
 

@@ -10,6 +10,7 @@ from engine.models.dmd import DMD, DMDConfiguration
 from engine.models.fno import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
 from engine.models.integrated_phase import IntegratedPhaseConfiguration, KoopmanIntegrated
 from engine.models.koopman import Koopman, KoopmanConfiguration
+from engine.models.koopman_tension import KoopmanTension, KoopmanTensionConfiguration
 from engine.models.koopman_var import KoopmanVar, KoopmanVarConfiguration
 from engine.models.lru import LRU, LRUConfiguration
 from engine.models.s5 import S5, S5Configuration
@@ -21,6 +22,7 @@ MODELS: dict[str, tuple[type[StringModel[Any]], type]] = {
     "koopman": (Koopman, KoopmanConfiguration),
     "koopman_var": (KoopmanVar, KoopmanVarConfiguration),
     "koopman_integrated": (KoopmanIntegrated, IntegratedPhaseConfiguration),
+    "koopman_tension": (KoopmanTension, KoopmanTensionConfiguration),
     "fgru": (FGRU, FGRUConfiguration),
     "frnn": (FRNN, FRNNConfiguration),
     "lru": (LRU, LRUConfiguration),
@@ -53,6 +55,8 @@ __all__ = [
     "Koopman",
     "KoopmanConfiguration",
     "KoopmanIntegrated",
+    "KoopmanTension",
+    "KoopmanTensionConfiguration",
     "KoopmanVar",
     "KoopmanVarConfiguration",
     "LRUConfiguration",

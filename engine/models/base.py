@@ -96,6 +96,14 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
         return []
 
+    def tuned(self, physics: Physics) -> StringModel[Any]:
+        """What was learned, with another resonator, rate or scale.
+
+        Raises:
+            ValueError: the model learned one string, which its weights are.
+        """
+        raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
+
     def release(self, displacement: Tensor) -> State:
         """The state at frame 0 of strings that are released at rest from displacements (batch, grid_points).
 

@@ -10,6 +10,7 @@ from engine.models import MODELS
 from engine.pluck import Pluck
 from engine.presets.migrations import FORMAT_VERSION
 from engine.resonators.base import Resonator
+from engine.resonators.family import StringFamily
 from engine.resonators.string import StringParameters
 
 
@@ -38,6 +39,7 @@ class PresetInfo:
         initialisation: how the training began, by name.
         knows: what its start was told of the string, in words; empty: nothing but the displacement.
         rel_mse, rel_mae: validation errors over the horizon (the paper's metrics), test errors beside them.
+        family: of a model of many strings, which were learned; `string` is the one that it plays unless told.
         training: the complete training configuration, so that the run can be repeated.
     """
 
@@ -63,6 +65,7 @@ class PresetInfo:
     training: dict[str, Any] = field(default_factory=dict)
     description: str = ""
     knows: str = ""
+    family: StringFamily | None = None
     licence: str = "MIT"
     format_version: int = FORMAT_VERSION
 
@@ -110,6 +113,7 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
         *found,
         *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
         *_too_tense(info, pluck),
+        *(info.family.outside(info.string) if info.family else []),
     ]
 
 

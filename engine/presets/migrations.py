@@ -31,7 +31,12 @@ def _knows(data: Metadata) -> Metadata:
     return {**data, "knows": knows}
 
 
-MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows}
+def _one_string(data: Metadata) -> Metadata:
+    """2 → 3: a preset may be of a family of strings; those before are of one."""
+    return dict(data)
+
+
+MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows, 2: _one_string}
 FORMAT_VERSION = max(MIGRATIONS) + 1
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -18,9 +19,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from engine.kernels import layout as at
-from engine.models.base import StringModel
+from engine.models.base import Physics, StringModel
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
+from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetInfo
 from engine.truth import SplittingSolver, default_substeps
@@ -79,6 +81,8 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
         return _dmd_program(model, info, rate_hz)
     if isinstance(model, KoopmanIntegrated) and _is_bank(model):
         return _integrated_program(model, info, rate_hz)
+    if isinstance(model, KoopmanTension) and model.configuration.input == "displacement":
+        return _tension_program(model, info, rate_hz)
     return None
 
 
@@ -186,6 +190,26 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
         return (info.scale_m / FULL_SCALE_M * weights.T @ modes).numpy(), np.zeros(weights.shape[1])
 
     return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
+
+
+@torch.no_grad()
+def _tension_program(model: KoopmanTension, info: PresetInfo, rate_hz: int) -> Program:
+    own = model.tuned(Physics(info.resonator, rate_hz))  # in metres, at this rate
+    step, n = own.step(Fraction(1)), info.modes
+    reals = {at.S_DECAY: step.decay, at.S_SILENCE: HEARD_SILENCE, at.S_LOUDNESS: -math.log(FULL_SCALE_M)}
+    memory = _packed(at.S_HEADER, reals, {at.S_MODES: n, at.S_NODES: step.nodes}, {at.S_HEADER - 1: step.rows})
+
+    def start(displacement_m: Tensor) -> tuple[Array, Array]:
+        with torch.inference_mode():
+            state = own.let_go(displacement_m.double()[None], step)
+        limits = torch.cat([state.largest_energy, state.largest_stretch])
+        return state.x[0].numpy(), torch.cat([state.y[0], limits]).numpy()
+
+    def read(weights: Tensor) -> tuple[Array, Array]:
+        found = weights.double().T @ own.shapes.T / FULL_SCALE_M
+        return torch.cat([found, found * step.seen], dim=1).numpy(), np.zeros(len(found))
+
+    return Program(at.TENSION, memory, n, rate_hz, info.grid_points, start, read)
 
 
 def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:

@@ -42,7 +42,7 @@ class Voice:
         begin: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         n = program.modes
-        rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS}.get(program.kind, 0)
+        rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
         self.program, self.ear = program, ear
         self.memory = memory = np.zeros(_state(n) + rows * n)
         self._counts = counts = memory.view(np.int64)
@@ -57,10 +57,10 @@ class Voice:
         memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
-        memory[place : place + n], memory[place + n : place + 2 * n] = first, second
+        memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second
         self._samples: NDArray[np.float32] | None = None
         self._source_rate_hz = source_rate_hz
-        if program.kind == at.TRUTH:
+        if program.kind in (at.TRUTH, at.TENSION):
             counts[at.MOVING] = n
         elif program.kind == at.BANK:
             from engine.kernels.bank import strike

@@ -14,7 +14,7 @@ import torch
 from app.commands import arrays, motion
 from engine.metrics import relative_error
 from engine.pluck import Pluck
-from engine.presets import load_preset
+from engine.presets import find_string, load_preset, read_string
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, TruthSource, project
@@ -268,3 +268,70 @@ def test_silence_compared_with_what_a_model_makes_of_it_is_valid_json(run, small
 )
 def test_a_pluck_out_of_range_is_bad_usage(run, small_preset: Path, changed: dict[str, float], message: str) -> None:
     assert message in run(*compare(small_preset, **changed)).usage
+
+
+STEEL_E4 = "steel_e4"
+
+
+def test_a_preset_of_many_strings_predicts_the_string_that_is_named(run, folder: Path) -> None:
+    initial = Pluck(0.3, 1.0).displacement(101)[None].numpy()
+    np.save(folder / "u.npy", initial)
+    of_string = ("--string", STEEL_E4, "--steps", 300)
+    assert run("predict", "studio_any_string", folder / "u.npy", folder / "model.npy", *of_string).status == 0
+    modes = read_string(find_string(STEEL_E4)).modes_below(20_000)
+    solved = ("--rate", 48_000, "--modes", modes)
+    assert run("simulate", folder / "u.npy", folder / "truth.npy", *of_string, *solved).status == 0
+    found, truth = np.load(folder / "model.npy"), np.load(folder / "truth.npy")
+    assert found.shape == truth.shape == (1, 301, 101)
+    assert relative_l2(found, truth) < 1e-5
+
+
+def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
+    np.save(folder / "u.npy", Pluck(0.3, 1.0).displacement(101)[None].numpy())
+    (folder / "mine.toml").write_text(find_string(STEEL_E4).read_text())
+    told = ("--string", folder / "mine.toml", "--rate", 22_050, "--modes", 12, "--steps", 40)
+    assert run("predict", "studio_any_string", folder / "u.npy", folder / "m.npy", *told).status == 0
+    assert np.load(folder / "m.npy").shape == (1, 41, 101)
+
+
+def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> None:
+    np.save(folder / "u.npy", Pluck(0.3, 20.0, "triangular").displacement(101)[None].numpy())
+    text = find_string(STEEL_E4).read_text()
+    (folder / "slack.toml").write_text(text.replace("tension_n = 72.592", "tension_n = 0.72592"))
+    files = (folder / "u.npy", folder / "m.npy")
+    found = run("predict", "studio_any_string", *files, "--string", folder / "slack.toml", "--steps", 9)
+    assert found.status == 0
+    assert "pitch" in found.err
+    assert "raises the tension" in found.err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("length_m = -1", "length_m must be positive"),
+        ("size = 3", "unknown field 'size'"),
+        ("damping_d1_kg_m_s = 900.0", "overdamped"),
+    ],
+)
+def test_an_impossible_string_is_one_line(run, folder: Path, text: str, words: str) -> None:
+    np.save(folder / "u.npy", Pluck().displacement(101)[None].numpy())
+    (folder / "bad.toml").write_text(text)
+    files = (folder / "u.npy", folder / "m.npy")
+    found = run("predict", "studio_any_string", *files, "--string", folder / "bad.toml", "--steps", 9)
+    assert found.status == 1
+    assert words in found.err
+    assert found.err.count("\n") == 1
+    assert not (folder / "m.npy").exists()
+
+
+def test_a_preset_of_one_string_refuses_another(run, small_preset: Path, folder: Path) -> None:
+    np.save(folder / "u.npy", Pluck().displacement(101)[None].numpy())
+    found = run("predict", small_preset, folder / "u.npy", folder / "m.npy", "--string", STEEL_E4, "--steps", 9)
+    assert (found.status, "choose a preset of many strings" in found.err) == (1, True)
+
+
+def test_compare_takes_a_string(run) -> None:
+    pluck = ("--position", 0.3, "--amplitude-mm", 1, "--seconds", 0.02)
+    found = run("compare", "studio_any_string", *pluck, "--string", STEEL_E4, "--json")
+    assert found.status == 0
+    assert json.loads(found.out)["rel_mse"] < 1e-9

@@ -1,0 +1,328 @@
+"""Koopman latents that share one tension: one model for every string.
+
+A latent z_n = x_n + iy_n is a mode: with λ_n = e^{h(-σ_n + iω_n)} of the resonator it turns and decays as the linear
+string does, an eigenfunction of its Koopman operator. At nodes, h apart, the tension that the stretch of all modes
+adds turns them together (κ_n = h² k_n, which is a share of (hω_n)²):
+
+    S = Σ_m η_m² A_m x_m²,    R = Σ_m η_m² κ_m r_m x_m²,
+    y_n ← y_n + (h k_n/ω_n) [A_n S (1 - 2R) - κ_n r_n S²] x_n,      z_n ← λ_n z_n,
+
+the exact flow of the potential c/4 (S² - 2 S² R), between exact flows of the damped linear string. What sets out and
+what is seen are other coordinates than those in which the kicks act:
+
+    x_n(0) = q_n (1 + p_n κ_n S₀),      q̂_n = x_n (1 - p_n κ_n S).
+
+A, r and p are what is learned: three curves over the phase hω that a mode turns between two nodes, even polynomials
+(Chebyshev, of (hω)²), A(0) = 1. They are shared by all modes of all strings, so that the model takes any resonator
+with any number of modes: pitch, length, density and tension change nothing but λ and κ, inharmonicity and damping
+enter by them too. At rest all corrections vanish: a quiet string is the linear one, exactly.
+
+What they have to learn is the error that kicks at nodes make, and it is large: without them, a hundred nodes in a
+period of the first mode leave 1e-7 to 1e-3 of a second's energy wrong. For h → 0 backward error analysis tells
+them: r = p = 1/12 (Takahashi and Imada 1984; Blanes, Casas and Ros 1999 for a processed integrator), the start
+"series". A fit that sets out from 0 finds the twelfths by itself, and departs from them where hω is not small.
+
+Stability. A is held in 0 … 2, r and p in -1 … 1, S below what the energy at the start allows, and after each frame
+Σ ω² |z|² below 1.5 times that energy, falling as the slowest mode does: for every value of every weight the motion is
+bounded and decays to silence. A string never comes near that bound, and neither does a model that is any good.
+
+Any rate: nodes are a whole number to a frame, as many as keep ω₁h below `node_phase` and the highest mode's below
+`highest_phase` (where two modes' phases add up to 2π, kicks would pump them).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import ClassVar, NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
+from engine.models.inputs import InputKind, join_input
+
+SERIES = 1 / 12  # r and p of small hω
+SPARE = 1.5  # of the energy at the start: more is not believed
+SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
+FRAMES_AT_ONCE = 4096
+
+
+@dataclass(frozen=True)
+class KoopmanTensionConfiguration:
+    """Sizes.
+
+    Attributes:
+        modes: of the resonator, or more: those to spare rest.
+        degree: of each curve's polynomial in (hω)².
+        node_phase: the largest phase in rad that the first mode turns between nodes.
+        highest_phase: the same of the highest mode; below π/2 no two modes are pumped.
+        input: what the encoder is told; see `engine.models.inputs`.
+    """
+
+    grid_points: int = 101
+    modes: int = 25
+    degree: int = 3
+    node_phase: float = 0.05
+    highest_phase: float = 1.56
+    input: InputKind = "displacement"
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "modes")
+        if self.modes > self.grid_points - 2:
+            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
+        if not 0 <= self.degree <= 32:
+            raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")
+        for name in ("node_phase", "highest_phase"):
+            if not 0.001 <= getattr(self, name) <= math.pi:
+                raise ValueError(f"{name} must lie in 0.001 … π, not {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class KoopmanTensionState:
+    """Where the latents are.
+
+    Attributes:
+        x, y: z before the kick at the present node, float64 (batch, modes); before the first frame, as it is let go.
+        largest_energy: of Σ ω² |z|², at the present, (batch,).
+        largest_stretch: of S, (batch,).
+        step_size: samples of the trained rate in a frame; None before the first.
+    """
+
+    x: Tensor
+    y: Tensor
+    largest_energy: Tensor
+    largest_stretch: Tensor
+    step_size: Fraction | None
+
+
+class Step(NamedTuple):
+    """What a step from node to node takes, `nodes` of them to a frame; float64 (modes,) each."""
+
+    nodes: int
+    decay: float  # of the largest energy, a frame
+    cosine: Tensor  # Re λ
+    sine: Tensor  # Im λ
+    kick: Tensor  # h k A/ω
+    second_kick: Tensor  # h k κ r/ω
+    stretch: Tensor  # η² A
+    second_stretch: Tensor  # η² κ r
+    seen: Tensor  # κ p
+    squares: Tensor  # ω²
+
+    @property
+    def rows(self) -> Tensor:
+        """For `engine.kernels.tension`, (8, modes)."""
+        return torch.stack(self[2:])
+
+
+class KoopmanTension(StringModel[KoopmanTensionState]):
+    """See the module. The resonator is a buffer: `tuned` gives the same model of another."""
+
+    initialisations: ClassVar = {
+        "kicks": f"{LINEAR_STRING}, and how tension couples them",
+        "series": f"{LINEAR_STRING}, how tension couples them, and the error of kicks for small steps",
+    }
+
+    def __init__(self, configuration: KoopmanTensionConfiguration) -> None:
+        super().__init__()
+        self.configuration = c = configuration
+        self.grid_points = c.grid_points
+        curve = (c.degree + 1,)
+        self.A = nn.Parameter(torch.zeros(curve, dtype=torch.float64))  # of (A - 1)/(hω)²
+        self.r = nn.Parameter(torch.zeros(curve, dtype=torch.float64))
+        self.p = nn.Parameter(torch.zeros(curve, dtype=torch.float64))
+        self.nu_log: Tensor  # of σ, 1/samples
+        self.theta_log: Tensor  # of ω, rad/sample
+        self.coupling: Tensor  # k in 1/samples²
+        self.stretch: Tensor  # η² in 1/(normalised displacement)²
+        self.shapes: Tensor
+        self.analysis: Tensor
+        for name in ("nu_log", "theta_log", "coupling", "stretch"):
+            self.register_buffer(name, torch.zeros(c.modes, dtype=torch.float64))
+        self.register_buffer("shapes", torch.zeros(c.modes, c.grid_points, dtype=torch.float64))
+        self.register_buffer("analysis", torch.zeros(c.grid_points, c.modes, dtype=torch.float64))
+
+    def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
+        """See the contract. kicks: no correction. series: those that backward error analysis knows."""
+        check_initialisation(self, how)
+        with torch.no_grad():
+            for curve in (self.A, self.r, self.p):
+                curve.zero_()
+            if how == "series":
+                self.r[0] = self.p[0] = SERIES
+            self._take(physics)
+
+    @torch.no_grad()
+    def tuned(self, physics: Physics) -> KoopmanTension:
+        """What was learned, with another resonator, rate or scale."""
+        resonator = physics.resonator
+        sizes = replace(self.configuration, modes=resonator.modes, grid_points=resonator.points)
+        other = KoopmanTension(sizes)
+        for name in ("A", "r", "p"):
+            getattr(other, name).copy_(getattr(self, name))
+        other._take(physics)
+        return other.train(self.training)
+
+    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanTensionState:
+        """See the contract; `second` as in `engine.models.inputs.join_input`."""
+        join_input(self.configuration.input, displacement, second)
+        sigma, omega = self._rates()
+        q = displacement.double() @ self.analysis
+        speed = torch.zeros_like(q) if second is None else second.double() @ self.analysis
+        x, y = q, -(speed + sigma * q) / omega
+        stretch = (self._stretch * q.square()).sum(-1)
+        # 2 × the energy: of the linear string, and what the tension holds
+        energy = (omega.square() * (x.square() + y.square())).sum(-1)
+        energy = SPARE * (energy + 0.5 * stretch * (self._coupling * q.square()).sum(-1))
+        largest_stretch = energy * (self._stretch / omega.square()).amax()
+        return KoopmanTensionState(x, y, energy, largest_stretch, None)
+
+    def advance(
+        self,
+        state: KoopmanTensionState,
+        steps: int,
+        readout: Tensor | None = None,
+        step_size: Fraction | int = 1,
+    ) -> tuple[Tensor, KoopmanTensionState]:
+        """See the contract.
+
+        Args:
+            step_size: samples of the trained rate in a frame, the same throughout a motion.
+
+        Raises:
+            ValueError: a step size that is not above 0, or another than the state's.
+        """
+        size = Fraction(step_size)
+        if not size > 0 or state.step_size not in (None, size):
+            raise ValueError(f"step_size must be above 0 and stay the same, not {step_size} after {state.step_size}")
+        step = self.step(size)
+        if state.step_size is None:
+            state = self._let_go(state, step, size)
+        to_points = self.shapes if readout is None else self.shapes @ readout.double()
+        to_points = to_points.to(torch.get_default_dtype())
+        blocks, done = [], 0
+        while done < steps:
+            count = min(FRAMES_AT_ONCE, steps - done)
+            compiled = state.x.device.type == "cpu" and not torch.is_grad_enabled()
+            amplitudes, state = (self._compiled if compiled else self._plain)(state, step, count)
+            blocks.append(amplitudes.to(to_points.dtype) @ to_points)
+            done += count
+        return torch.cat(blocks, dim=1), state
+
+    def amplitudes(self, state: KoopmanTensionState, steps: int) -> Tensor:
+        """Modal amplitudes of the next frames, float64 (batch, steps, modes), without gradients, on the CPU."""
+        step = self.step(Fraction(1))
+        if state.step_size is None:
+            state = self._let_go(state, step, Fraction(1))
+        return self._compiled(state, step, steps)[0]
+
+    def step(self, size: Fraction) -> Step:
+        """From node to node, of frames that are `size` samples of the trained rate apart."""
+        c, (sigma, omega) = self.configuration, self._rates()
+        fastest = max(float(omega[0]) / c.node_phase, float(omega[-1]) / c.highest_phase)
+        nodes = max(1, math.ceil(float(size) * fastest))
+        h = float(size) / nodes
+        phase = h * omega
+        growth, r, p = self._curves(phase)
+        kappa = h * h * self._coupling
+        shrunk, angle = torch.exp(-h * sigma), h * self._coupling / omega
+        return Step(
+            nodes,
+            math.exp(-2 * float(size) * float(sigma.min())),
+            shrunk * phase.cos(),
+            shrunk * phase.sin(),
+            angle * growth,
+            angle * kappa * r,
+            self._stretch * growth,
+            self._stretch * kappa * r,
+            kappa * p,
+            omega.square(),
+        )
+
+    def _curves(self, phase: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """A, r and p of phases hω."""
+        argument = (2 * (phase / self.configuration.highest_phase).square() - 1).clamp(-1, 1)
+        basis = torch.cos(torch.arange(len(self.A), dtype=torch.float64) * torch.arccos(argument)[:, None])
+        growth = 1 + phase.square() * (basis @ self.A)
+        return growth.clamp(0, 2), (basis @ self.r).clamp(-1, 1), (basis @ self.p).clamp(-1, 1)
+
+    def let_go(self, displacement: Tensor, step: Step) -> KoopmanTensionState:
+        """The state before the first frame of strings released at rest from displacements (batch, grid_points)."""
+        return self._let_go(self.release(displacement), step, Fraction(1))
+
+    def _let_go(self, state: KoopmanTensionState, step: Step, size: Fraction) -> KoopmanTensionState:
+        """The coordinates in which kicks act, half a kick before the first node."""
+        stretch = (self._stretch * state.x.square()).sum(-1, keepdim=True)
+        x = state.x * (1 + step.seen * stretch)
+        first = torch.minimum((step.stretch * x.square()).sum(-1, keepdim=True), state.largest_stretch[:, None])
+        second = (step.second_stretch * x.square()).sum(-1, keepdim=True)
+        kick = step.kick * first * (1 - 2 * second) - step.second_kick * first.square()
+        return replace(state, x=x, y=state.y - 0.5 * kick * x, step_size=size)
+
+    def _compiled(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Tensor, KoopmanTensionState]:
+        from engine.kernels.tension import advance  # Numba only when it is needed
+
+        x, y, largest = state.x.clone().contiguous(), state.y.clone().contiguous(), state.largest_energy.clone()
+        out = x.new_empty(len(x), steps, x.shape[1])
+        of_rows = largest.numpy(), state.largest_stretch.numpy()
+        advance(
+            x.numpy(), y.numpy(), *of_rows, step.decay, step.nodes, SILENCE, step.rows.detach().numpy(), out.numpy()
+        )
+        return out, replace(state, x=x, y=y, largest_energy=largest)
+
+    def _plain(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Tensor, KoopmanTensionState]:
+        """The definition, which gradients pass through."""
+        x, y, largest = state.x, state.y, state.largest_energy
+        frames = []
+        for _ in range(steps):
+            for _ in range(step.nodes):
+                first = (x.square() @ step.stretch).minimum(state.largest_stretch)[:, None]
+                second = (x.square() @ step.second_stretch)[:, None]
+                y = y + (step.kick * first * (1 - 2 * second) - step.second_kick * first.square()) * x
+                x, y = step.cosine * x - step.sine * y, step.sine * x + step.cosine * y
+            largest = largest * step.decay
+            energy = (x.square() + y.square()) @ step.squares
+            held = torch.where(energy > largest, (largest / energy.clamp(min=1e-300)).sqrt(), 1.0)[:, None]
+            x, y = x * held, y * held
+            frames.append(x * (1 - step.seen * (x.square() @ step.stretch)[:, None]))
+        return torch.stack(frames, dim=1), replace(state, x=x, y=y, largest_energy=largest)
+
+    def _rates(self) -> tuple[Tensor, Tensor]:
+        """σ and ω a sample."""
+        return self.nu_log.clamp(-30, 5).exp(), self.theta_log.clamp(-16, 8).exp()
+
+    @property
+    def _coupling(self) -> Tensor:
+        return self.coupling.clamp(min=0)
+
+    @property
+    def _stretch(self) -> Tensor:
+        return self.stretch.clamp(min=0)
+
+    def _take(self, physics: Physics) -> None:
+        """The resonator, its modes first; latents to spare rest: they have no shape and no share in the tension."""
+        resonator, c, n = physics.resonator, self.configuration, physics.modes
+        if n > c.modes or resonator.points != c.grid_points:
+            raise ValueError(
+                f"model_configuration.modes is {c.modes} on {c.grid_points} points, the resonator has {n} modes on "
+                f"{resonator.points}"
+            )
+        spare = torch.full((c.modes - n,), n - 1)
+        mode = torch.cat([torch.arange(n), spare])
+        log_eigenvalues = physics.log_eigenvalues[mode]
+        self.nu_log.copy_((-log_eigenvalues.real).log().clamp(min=-30))
+        self.theta_log.copy_(log_eigenvalues.imag.log())
+        for buffer in (self.coupling, self.stretch, self.shapes, self.analysis):
+            buffer.zero_()
+        self.coupling[:n] = resonator.coupling / physics.rate_hz**2
+        self.stretch[:n] = resonator.stretch * physics.scale_m**2
+        self.shapes[:n] = resonator.shapes
+        self.analysis[:, :n] = resonator.analysis
+
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        """Those of a quiet string."""
+        sigma, omega = self._rates()
+        return [torch.complex(-sigma, omega)]

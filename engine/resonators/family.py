@@ -1,0 +1,57 @@
+"""Which strings a model of many has learned, and how far another is from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from engine.resonators.string import StringParameters
+
+BRIGHT_HZ = 3_000.0  # where the second decay time is told
+NEAR = 1.01  # of a range's end: nothing changes there
+
+Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class StringFamily:
+    """Ranges (low, high) of what is heard of a string; two of them where the middle is left out.
+
+    Attributes:
+        pitch_hz: of the quiet first mode.
+        inharmonicity: B: mode n of a string without damping has the frequency n f √(1 + B n²).
+        t60_s, bright_t60_s: decay by 60 dB of the first mode and of the one nearest 3 kHz, the shorter of the two.
+        tension_rise: ΔT/T₀ of a pluck.
+        half_width: of a raised cosine or a Gaussian, in lengths.
+        position: of the pluck, in lengths.
+    """
+
+    pitch_hz: tuple[Bounds, ...]
+    inharmonicity: tuple[Bounds, ...]
+    t60_s: Bounds
+    bright_t60_s: Bounds
+    tension_rise: Bounds
+    half_width: Bounds = (0.04, 0.15)
+    position: Bounds = (0.06, 0.94)
+
+    def outside(self, string: StringParameters) -> list[str]:
+        """How a string differs from these, in plain words; empty where it does not."""
+        sigma, omega = (float(rates[0]) for rates in (string.decay_rates(1), string.undamped_frequencies(1)))
+        pitch_hz = math.sqrt(max(0.0, omega**2 - sigma**2)) / (2 * math.pi)
+        told = (
+            ("pitch", pitch_hz, self.pitch_hz, " Hz"),
+            ("inharmonicity", inharmonicity(string), self.inharmonicity, ""),
+            ("decay time", math.log(1000) / max(sigma, 1e-9), (self.t60_s,), " s"),
+        )
+        return [
+            f"{name} {value:.3g}{unit} is outside the trained "
+            + " and ".join(f"{low:g} … {high:g}{unit}" for low, high in trained)
+            for name, value, trained, unit in told
+            if not any(low / NEAR <= value <= high * NEAR for low, high in trained)
+        ]
+
+
+def inharmonicity(string: StringParameters) -> float:
+    """B = EIπ²/(T₀ℓ²)."""
+    stiffness = string.youngs_modulus_pa * string.second_moment_m4
+    return stiffness * math.pi**2 / (string.tension_n * string.length_m**2)

@@ -1,0 +1,176 @@
+"""Latents that share a tension: against the truth on many strings, at rest, at other rates, and for wild weights."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import pytest
+import torch
+from torch import Tensor
+
+from engine.models import build_model
+from engine.models.base import Physics
+from engine.models.koopman_tension import SERIES, KoopmanTension
+from engine.pluck import Pluck
+from engine.resonators.string import StringParameters
+from engine.truth import ModalState, SplittingSolver
+
+NYLON = StringParameters()
+STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
+
+
+def made(
+    string: StringParameters, modes: int, how: str, rate_hz: float = 48_000, linear: bool = False
+) -> KoopmanTension:
+    model = build_model("koopman_tension", {"modes": modes})
+    assert isinstance(model, KoopmanTension)
+    physics = Physics(string.resonator(modes, tension_modulated=not linear), rate_hz, 1e-3)
+    model.initialise(how, physics, torch.Generator())
+    return model.eval()
+
+
+def pluck_m(string: StringParameters, modes: int, rise: float) -> Tensor:
+    """A displacement (1, 101) in m that raises the tension by `rise`."""
+    resonator = string.resonator(modes)
+    amplitudes = resonator.to_modes(Pluck(0.3, 1.0, "triangular").displacement(101))
+    amplitudes = amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt()
+    return resonator.to_grid(amplitudes)[None]
+
+
+def true_motion(string: StringParameters, displacement_m: Tensor, modes: int, rate_hz: float, steps: int) -> Tensor:
+    resonator = string.resonator(modes)
+    solver = SplittingSolver(resonator, rate_hz)
+    state = ModalState.at_rest(resonator.to_modes(displacement_m))
+    return resonator.to_grid(solver.solve(state, steps)[:, 1:])
+
+
+def relative_error(model: KoopmanTension, displacement_m: Tensor, truth_m: Tensor) -> float:
+    with torch.inference_mode():
+        found = model((displacement_m / 1e-3).float(), truth_m.shape[1]).double() * 1e-3
+    return float((found - truth_m).square().sum() / truth_m.square().sum())
+
+
+@pytest.mark.parametrize(("string", "modes", "rise"), [(NYLON, 57, 0.3), (STEEL, 40, 0.3)])
+def test_what_backward_error_analysis_knows_is_worth_two_orders(
+    string: StringParameters, modes: int, rise: float
+) -> None:
+    displacement = pluck_m(string, modes, rise)
+    truth = true_motion(string, displacement, modes, 48_000, 4_800)
+    kicks = relative_error(made(string, modes, "kicks"), displacement, truth)
+    series = relative_error(made(string, modes, "series"), displacement, truth)
+    assert series < 1e-2 * kicks
+    assert series < 1e-8
+
+
+def test_a_linear_string_is_exact() -> None:
+    displacement = pluck_m(NYLON, 25, 0.3)
+    resonator = NYLON.resonator(25, tension_modulated=False)
+    solved = SplittingSolver(resonator, 4_000).solve(ModalState.at_rest(resonator.to_modes(displacement)), 400)
+    truth = resonator.to_grid(solved[:, 1:])
+    assert relative_error(made(NYLON, 25, "series", 4_000, linear=True), displacement, truth) < 1e-12
+
+
+def test_a_quiet_string_is_the_linear_one() -> None:
+    displacement = pluck_m(NYLON, 25, 1e-9)
+    linear = made(NYLON, 25, "series", linear=True)
+    with torch.inference_mode():
+        truth = linear((displacement / 1e-3).float(), 4_800).double() * 1e-3
+    assert relative_error(made(NYLON, 25, "series"), displacement, truth) < 1e-12
+
+
+def test_another_string_takes_what_was_learned() -> None:
+    model = made(NYLON, 25, "series")
+    other = model.tuned(Physics(STEEL.resonator(40), 48_000, 1e-3))
+    displacement = pluck_m(STEEL, 40, 0.1)
+    expected = made(STEEL, 40, "series")
+    with torch.inference_mode():
+        assert torch.equal(other(displacement.float(), 100), expected(displacement.float(), 100))
+    assert torch.equal(other.r, model.r)
+
+
+@pytest.mark.parametrize("rate_hz", [4_000, 16_000, 44_100, 96_000])
+def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
+    displacement = pluck_m(NYLON, 25, 0.2)
+    model = made(NYLON, 25, "series")
+    steps = rate_hz // 20
+    truth = true_motion(NYLON, displacement, 25, rate_hz, steps)
+    with torch.inference_mode():
+        state = model.release((displacement / 1e-3).float())
+        found, _ = model.advance(state, steps, step_size=Fraction(48_000, rate_hz))
+    error = (found.double() * 1e-3 - truth).square().sum() / truth.square().sum()
+    assert float(error) < 1e-8
+
+
+def test_the_compiled_loop_is_the_definition() -> None:
+    displacement = (pluck_m(NYLON, 25, 0.4) / 1e-3).float()
+    model = made(NYLON, 25, "series")
+    plain, _ = model.advance(model.release(displacement), 300)
+    with torch.no_grad():
+        compiled, _ = model.advance(model.release(displacement), 300)
+    torch.testing.assert_close(compiled, plain.detach(), rtol=0, atol=1e-6)
+
+
+def test_gradients_reach_every_curve() -> None:
+    model = made(NYLON, 25, "series")
+    motion, _ = model.advance(model.release((pluck_m(NYLON, 25, 0.4) / 1e-3).float()), 50)
+    motion.square().sum().backward()
+    for curve in (model.A, model.r, model.p):
+        assert curve.grad is not None
+        assert bool((curve.grad != 0).all())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_weights_stay_bounded_and_fall_silent(seed: int) -> None:
+    model = made(NYLON, 25, "series", 4_000)
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for curve in (model.A, model.r, model.p):
+            curve.copy_(10.0 ** torch.randint(-2, 30, (), generator=generator) * torch.randn(4, generator=generator))
+    displacement = (pluck_m(NYLON, 25, 0.5) / 1e-3).float()
+    with torch.inference_mode():
+        state = model.release(displacement)
+        frames, state = model.advance(state, 40_000)
+        assert bool(torch.isfinite(frames).all())
+        assert float(frames.abs().max()) < 20 * float(displacement.abs().max())
+        for _ in range(20):
+            frames, state = model.advance(state, 40_000)
+    assert float(frames.abs().max()) < 1e-6 * float(displacement.abs().max())
+
+
+def test_phases_are_kept_where_the_curves_were_learned() -> None:
+    model = made(NYLON, 57, "series")
+    for size in (Fraction(1), Fraction(3), Fraction(12), Fraction(160, 147)):
+        step = model.step(size)
+        phases = float(size) / step.nodes * model.theta_log.exp()
+        assert float(phases[0]) <= model.configuration.node_phase + 1e-12
+        assert float(phases[-1]) <= model.configuration.highest_phase + 1e-12
+
+
+def test_the_series_are_twelfths() -> None:
+    with torch.no_grad():
+        _, r, p = made(NYLON, 25, "series")._curves(torch.linspace(0, 1.5, 5, dtype=torch.float64))
+    assert math.isclose(float(r.max()), SERIES)
+    assert math.isclose(float(p.min()), SERIES)
+
+
+def test_another_step_size_amid_a_motion_is_refused() -> None:
+    model = made(NYLON, 25, "series")
+    with torch.inference_mode():
+        _, state = model.advance(model.release((pluck_m(NYLON, 25, 0.1) / 1e-3).float()), 3)
+        with pytest.raises(ValueError, match="step_size"):
+            model.advance(state, 3, step_size=2)
+
+
+def test_latents_to_spare_rest() -> None:
+    displacement = (pluck_m(NYLON, 10, 0.3) / 1e-3).float()
+    model = build_model("koopman_tension", {"modes": 25})
+    model.initialise("series", Physics(NYLON.resonator(10), 48_000, 1e-3), torch.Generator())
+    with torch.inference_mode():
+        torch.testing.assert_close(model(displacement, 100), made(NYLON, 10, "series")(displacement, 100))
+
+
+def test_fewer_modes_than_the_resonator_has_are_refused() -> None:
+    model = build_model("koopman_tension", {"modes": 10})
+    with pytest.raises(ValueError, match=r"model_configuration\.modes is 10"):
+        model.initialise("series", Physics(NYLON.resonator(25), 48_000), torch.Generator())

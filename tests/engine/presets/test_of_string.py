@@ -1,0 +1,126 @@
+"""A preset of many strings becomes one of a string that is given; others refuse."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.pluck import Pluck
+from engine.presets import STRINGS, PresetError, find_preset, find_string, load_preset, of_string, read_string
+from engine.resonators.string import StringParameters
+from engine.schema import SchemaError
+from engine.sources import ModelSource, TruthSource, project
+
+STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
+TOML = """
+length_m = 0.648
+area_m2 = 5.0671e-08
+second_moment_m4 = 2.0432e-16
+density_kg_m3 = 7850.0
+youngs_modulus_pa = 220000000000.0
+damping_d1_kg_m_s = 8e-06
+damping_d3_kg_m_s = 1.4e-06
+tension_n = 72.2016
+"""
+
+
+def test_a_steel_string_is_played_by_the_same_preset() -> None:
+    preset = of_string(load_preset(find_preset("studio_any_string")), STEEL, 44_100)
+    assert preset.info.rate_hz == 44_100
+    assert preset.info.modes == STEEL.modes_below(20_000)
+    assert math.isclose(preset.info.horizon_s, 0.5, rel_tol=1e-3)
+    initial = project(Pluck(0.3, 2.0).displacement(101), preset.info.modes)[None]
+    model, truth = ModelSource(preset), TruthSource(preset.info)
+    found, _ = model.advance(model.start(initial), 4410)
+    expected, _ = truth.advance(truth.start(initial), 4410)
+    assert float((found - expected).square().sum() / expected.square().sum()) < 1e-9
+
+
+def test_nothing_given_is_the_preset_itself() -> None:
+    preset = load_preset(find_preset("studio_any_string"))
+    assert of_string(preset) is preset
+
+
+def test_fewer_modes_and_half_the_rate_hold() -> None:
+    preset = load_preset(find_preset("studio_any_string"))
+    assert of_string(preset, modes=7).info.modes == 7
+    slow = of_string(preset, rate_hz=4_000)
+    assert slow.info.modes == preset.info.string.modes_below(2_000)
+
+
+def test_a_preset_of_one_string_says_so(small_preset: Path) -> None:
+    with pytest.raises(PresetError, match="choose a preset of many strings"):
+        of_string(load_preset(small_preset), STEEL)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"tension_n": 1e9}, "no mode below"),
+        ({"damping_d1_kg_m_s": 100.0}, "overdamped"),
+    ],
+)
+def test_an_impossible_string_is_an_error_that_names_it(changed: dict[str, float], words: str) -> None:
+    preset = load_preset(find_preset("studio_any_string"))
+    string = StringParameters(**{**vars(StringParameters()), **changed})
+    with pytest.raises(PresetError, match=words):
+        of_string(preset, string)
+
+
+def test_a_string_file_is_read(tmp_path: Path) -> None:
+    (tmp_path / "steel.toml").write_text(TOML)
+    assert read_string(tmp_path / "steel.toml") == STEEL
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("length_m = ", "not valid TOML"),
+        ("length = 1.0", "unknown field 'length'"),
+        ("length_m = -1.0", "length_m must be positive"),
+        ("length_m = nan", "finite"),
+        ("a = " + "[" * 5_000, "not valid TOML"),
+        ("# " + "x" * 70_000, "larger than"),
+    ],
+)
+def test_a_wrong_string_file_is_named(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text(text)
+    with pytest.raises(SchemaError, match=words) as caught:
+        read_string(file)
+    assert str(file) in str(caught.value)
+
+
+def test_a_string_beyond_the_family_is_told() -> None:
+    family = load_preset(find_preset("studio_any_string")).info.family
+    assert family is not None
+    assert family.outside(StringParameters()) == []
+    low = StringParameters(tension_n=60.97 / 64)
+    assert any(words.startswith("pitch 3") for words in family.outside(low))
+
+
+def test_modes_are_counted_in_closed_form() -> None:
+    for string in (StringParameters(), STEEL):
+        preset = of_string(load_preset(find_preset("studio_any_string")), string, 48_000)
+        assert preset.info.modes == string.modes_below(20_000)
+    assert torch.isfinite(STEEL.undamped_frequencies(3)).all()
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in STRINGS.glob("*.toml")))
+def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> None:
+    many = load_preset(find_preset("studio_any_string"))
+    string = read_string(find_string(name))
+    assert many.info.family is not None
+    assert many.info.family.outside(string) == []
+    own, expected = load_preset(find_preset(f"studio_any_{name}")), of_string(many, string)
+    assert own.info.string == string
+    for key, tensor in expected.model.state_dict().items():
+        assert torch.equal(own.model.state_dict()[key], tensor)
+
+
+def test_an_unknown_string_lists_those_that_there_are() -> None:
+    with pytest.raises(PresetError, match="nylon_e2"):
+        find_string("nylon_h7")

@@ -1,0 +1,130 @@
+"""A family of strings: what is drawn lies in it, and what is learned holds on others."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.models import KoopmanTension, build_model
+from engine.models.base import Physics
+from engine.presets import load_preset
+from engine.resonators.family import inharmonicity
+from training.family import errors as family_errors
+from training.family.errors import FamilyErrors, StringError
+from training.family.fit import Case, errors, fit_curves, geometric_mean
+from training.family.motions import solve, true_motion
+from training.family.preset import FamilyConfiguration, read_configuration, train_preset
+from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
+
+RATE_HZ, STEPS = 48_000, 1_200
+
+
+def cases(split: str, count: int) -> list[Case]:
+    drawn = (draw_string("inside", split, number) for number in range(count))
+    return [Case(plucked, solve(plucked, RATE_HZ, STEPS)) for plucked in drawn]
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+def test_strings_lie_in_their_column(column: Column) -> None:
+    ranges = FAMILY[column]
+    for number in range(40):
+        plucked = draw_string(column, "test", number)
+        assert not [words for words in ranges.outside(plucked.string) if "decay" not in words]
+        assert any(low <= plucked.pitch_hz <= high for low, high in ranges.pitch_hz)
+        assert math.isclose(inharmonicity(plucked.string), plucked.inharmonicity, rel_tol=1e-9)
+        rise = float(plucked.resonator.relative_tension_rise(plucked.amplitudes_m))
+        assert math.isclose(rise, plucked.tension_rise, rel_tol=1e-9)
+        assert ranges.tension_rise[0] <= rise <= ranges.tension_rise[1]
+        assert float(plucked.resonator.omega[-1]) < 2 * math.pi * 20_000
+        assert 1 <= plucked.resonator.modes <= 99
+
+
+def test_a_string_sounds_as_it_is_told() -> None:
+    string = string_of(110.0, 1e-4, 8.0, 0.5)
+    eigenvalues = string.resonator(60).eigenvalues()
+    assert math.isclose(float(eigenvalues[0].imag) / (2 * math.pi), 110.0, rel_tol=1e-9)
+    assert math.isclose(math.log(1000) / -float(eigenvalues[0].real), 8.0, rel_tol=1e-9)
+    bright = round(3000 / 110) - 1
+    assert math.isclose(math.log(1000) / -float(eigenvalues[bright].real), 0.5, rel_tol=1e-9)
+
+
+def test_splits_share_no_string_and_a_number_is_a_string_for_ever() -> None:
+    pitches = [
+        draw_string("inside", split, n).pitch_hz for split in ("train", "validation", "test") for n in range(9)
+    ]
+    assert len(set(pitches)) == len(pitches)
+    again = draw_string("inside", "test", 3)
+    assert torch.equal(again.amplitudes_m, draw_string("inside", "test", 3).amplitudes_m)
+
+
+def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
+    """A sixth of a second of six strings is enough to find the twelfths of backward error analysis."""
+    train, validation = cases("train", 6), cases("validation", 4)
+    model = build_model("koopman_tension", {"modes": 25, "degree": 2})
+    assert isinstance(model, KoopmanTension)
+    plucked = train[0].plucked
+    physics = Physics(plucked.string.resonator(25), RATE_HZ, 1e-3)
+    model.initialise("kicks", physics, torch.Generator())
+    start = geometric_mean(errors(model, validation, RATE_HZ, STEPS))
+    told = []
+    best = fit_curves(
+        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda p: told.append(p.step)
+    )
+    assert told == [1, 2, 3]
+    assert best < start / 100
+    assert math.isclose(best, geometric_mean(errors(model, validation, RATE_HZ, STEPS)), rel_tol=1e-9)
+    with torch.no_grad():
+        _, r, p = model._curves(torch.tensor([0.0], dtype=torch.float64))
+    assert abs(float(r) - 1 / 12) < 0.01
+    assert abs(float(p) - 1 / 12) < 0.01
+
+
+def test_a_preset_of_many_strings_is_whole(tmp_path: Path) -> None:
+    c = FamilyConfiguration(
+        "Two", "", 25, strings=2, validation_strings=1, test_strings=1, seconds=0.02, steps=1, first_s=0.01
+    )
+    info = train_preset(c, tmp_path / "two.safetensors", cache=tmp_path / "cache")
+    loaded = load_preset(tmp_path / "two.safetensors")
+    assert loaded.info == info
+    assert loaded.info.family == FAMILY["inside"]
+    assert loaded.info.rel_mse is not None
+    assert 0 < loaded.info.rel_mse < 1e-3
+
+
+def test_its_configuration_is_committed() -> None:
+    assert read_configuration().initialisation == "kicks"
+
+
+def test_a_motion_is_kept_and_a_damaged_one_named(tmp_path: Path) -> None:
+    plucked = draw_string("inside", "train", 0)
+    first = true_motion(plucked, RATE_HZ, 50, tmp_path)
+    (file,) = (tmp_path / "motions").iterdir()
+    assert torch.equal(first, true_motion(plucked, RATE_HZ, 50, tmp_path))
+    file.write_bytes(b"nothing")
+    with pytest.raises(ValueError, match=file.name):
+        true_motion(plucked, RATE_HZ, 50, tmp_path)
+
+
+def test_players_are_as_good_as_they_should_be() -> None:
+    players = {
+        "series": family_errors.untrained("series"),
+        "kicks": family_errors.untrained("kicks"),
+        "averaging": family_errors.averaging,
+        "linear": family_errors.linear_string,
+    }
+    found = family_errors.measure(players, "inside", "test", 2, RATE_HZ, (0.0, 0.05))
+    means = [found[name].geometric_mean for name in players]
+    assert means == sorted(means)
+
+
+def test_a_column_tells_its_worst() -> None:
+    strings = tuple(StringError(100.0, 1e-4, rise, 50, error) for rise, error in ((0.1, 1e-6), (0.4, 1e-1)))
+    told = FamilyErrors(strings)
+    assert told.worst.tension_rise == 0.4
+    assert told.share_large == 0.5
+    assert math.isclose(told.geometric_mean, math.sqrt(1e-7))
+    parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
+    assert [(low, high, len(part.strings)) for low, high, part in parts] == [(0, 0.2, 1), (0.3, 0.5, 1)]

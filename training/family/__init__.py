@@ -1,0 +1,8 @@
+"""One model, many strings: a distribution of strings, what is learned from them, and how well on others.
+
+strings     which strings there are, and plucks of them
+motions     their true motions, cached
+fit         the curves of `koopman_tension`, by least squares
+errors      of any model of many strings, by string
+preset      a run as a whole: configuration to preset
+"""

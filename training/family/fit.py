@@ -1,0 +1,144 @@
+"""The curves of `koopman_tension` from the motions of many strings: Gauss and Newton with Levenberg's damping.
+
+There are a dozen numbers, and each string's error is close to quadratic in them, so that a step by least squares
+does what a thousand steps along a gradient do. The loss is the mean logarithm of each string's relative error: a
+string on which it is 1e-9 counts as much as one on which it is 1e-3. Its Gauss–Newton matrix is that of the residuals
+divided by the present errors. Derivatives by the curves' numbers are differences, which the smooth motion allows.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from engine.models.base import Physics
+from engine.models.koopman_tension import KoopmanTension
+from training.family.strings import PluckedString, displacement_m
+
+DIFFERENCE = 1e-4
+FLOOR = 1e-13  # of a relative error, below which it counts no more
+FRAMES = 256  # of a string that enter the matrix, drawn anew for each step
+DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)  # times the last that was best
+
+
+@dataclass(frozen=True)
+class Case:
+    """A string and its true motion, (steps, modes) in m."""
+
+    plucked: PluckedString
+    truth: Tensor
+
+
+@dataclass(frozen=True)
+class FitProgress:
+    """After a step: the geometric means of the errors in training and validation, frames in reach, time left."""
+
+    step: int
+    steps: int
+    frames: int
+    train: float
+    validation: float
+    left_s: float
+
+
+@torch.no_grad()
+def fit_curves(
+    model: KoopmanTension,
+    train: Sequence[Case],
+    validation: Sequence[Case],
+    rate_hz: int,
+    *,
+    steps: int,
+    first_frames: int,
+    seed: int,
+    report: Callable[[FitProgress], None] = lambda progress: None,
+) -> float:
+    """Sets the model's curves in place to those that are best on validation; its geometric mean there.
+
+    Args:
+        first_frames: in reach of the first step; they grow to all within the first half of the steps.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    longest = len(train[0].truth)
+    size = len(model.A)
+    best, present = geometric_mean(errors(model, validation, rate_hz, longest)), _numbers(model)
+    best_numbers, damping, started = present.clone(), 1e-3, time.monotonic()
+    for step in range(steps):
+        frames = min(longest, round(first_frames * (longest / first_frames) ** (2 * step / max(1, steps))))
+        residual = [_motion(model, case, rate_hz, frames) - case.truth[:frames] for case in train]
+        before = torch.stack(
+            [r.square().sum() / case.truth[:frames].square().sum() for r, case in zip(residual, train, strict=True)]
+        )
+        matrix, gradient = torch.zeros(3 * size, 3 * size).double(), torch.zeros(3 * size).double()
+        chosen = [torch.randperm(frames, generator=generator)[:FRAMES] for _ in train]
+        columns: list[list[Tensor]] = [[] for _ in train]
+        for number in range(3 * size):
+            moved = present.clone()
+            moved[number] += DIFFERENCE
+            _set(model, moved)
+            for place, case in enumerate(train):
+                found = _motion(model, case, rate_hz, frames)[chosen[place]] - case.truth[chosen[place]]
+                columns[place].append(((found - residual[place][chosen[place]]) / DIFFERENCE).flatten())
+        for place, case in enumerate(train):
+            jacobian = torch.stack(columns[place], dim=1)
+            weight = frames / len(chosen[place]) / float(case.truth[:frames].square().sum() * (before[place] + FLOOR))
+            matrix += weight * jacobian.T @ jacobian
+            gradient += weight * jacobian.T @ residual[place][chosen[place]].flatten()
+        start = float((before + FLOOR).log().mean())
+        tried = []
+        for factor in DAMPINGS:
+            diagonal = matrix.diagonal()
+            damped = matrix + damping * factor * torch.diag(diagonal + 1e-9 * diagonal.max())
+            numbers = present - torch.linalg.solve(damped, gradient)
+            _set(model, numbers)
+            value = float((errors(model, train, rate_hz, frames) + FLOOR).log().mean())
+            tried.append((value if math.isfinite(value) else math.inf, damping * factor, numbers))
+        value, factor, numbers = min(tried, key=lambda one: one[0])
+        if value < start:
+            present, damping = numbers, factor
+        else:
+            damping *= DAMPINGS[-1]
+        _set(model, present)
+        measured = geometric_mean(errors(model, validation, rate_hz, longest))
+        if measured < best:
+            best, best_numbers = measured, present.clone()
+        left_s = (time.monotonic() - started) / (step + 1) * (steps - step - 1)
+        report(FitProgress(step + 1, steps, frames, math.exp(min(value, start)), measured, left_s))
+    _set(model, best_numbers)
+    return best
+
+
+def errors(model: KoopmanTension, cases: Sequence[Case], rate_hz: int, frames: int) -> Tensor:
+    """Relative squared error of each string's first frames, over the whole grid, (strings,)."""
+    return torch.stack(
+        [
+            (_motion(model, case, rate_hz, frames) - case.truth[:frames]).square().sum()
+            / case.truth[:frames].square().sum()
+            for case in cases
+        ]
+    )
+
+
+def geometric_mean(errors: Tensor) -> float:
+    return float(errors.clamp(min=1e-300).log().mean().exp())
+
+
+@torch.no_grad()
+def _motion(model: KoopmanTension, case: Case, rate_hz: int, frames: int) -> Tensor:
+    """Modal amplitudes in m, (frames, modes): sines are orthogonal, so that their errors are the grid's."""
+    own = model.tuned(Physics(case.plucked.resonator, rate_hz))
+    return own.amplitudes(own.release(displacement_m(case.plucked)[None]), frames)[0]
+
+
+def _numbers(model: KoopmanTension) -> Tensor:
+    return torch.cat([model.A, model.r, model.p]).detach().clone()
+
+
+def _set(model: KoopmanTension, numbers: Tensor) -> None:
+    for curve, part in zip((model.A, model.r, model.p), numbers.chunk(3), strict=True):
+        curve.copy_(part)

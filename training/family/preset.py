@@ -1,0 +1,159 @@
+"""A preset of many strings: a configuration, its strings, the fit, and what the preset says of itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import torch
+
+from engine.models import KoopmanTension, build_model
+from engine.models.base import Physics
+from engine.presets import PresetInfo, TrainedRange, save_preset
+from engine.resonators.string import StringParameters
+from engine.schema import SchemaError, read, write
+from training.configuration import read_toml
+from training.family.errors import player
+from training.family.fit import Case, FitProgress, fit_curves
+from training.family.motions import true_motion
+from training.family.strings import FAMILY, GRID_POINTS, draw_string
+
+CONFIGURATION = Path(__file__).parent / "studio_any_string.toml"
+SCALE_M = 1e-3
+LARGEST_PEAK_M = 0.02
+
+
+@dataclass(frozen=True)
+class FamilyConfiguration:
+    """What a run is, all of it.
+
+    Attributes:
+        string: that the preset plays unless told, with `modes`.
+        strings, validation_strings, test_strings: how many of each split.
+        seconds: of each string's motion.
+        steps: of the fit; the first reaches `first_s` of the motion.
+    """
+
+    title: str
+    description: str
+    modes: int
+    string: StringParameters = field(default_factory=StringParameters)
+    rate_hz: int = 48_000
+    initialisation: str = "kicks"
+    degree: int = 3
+    strings: int = 64
+    validation_strings: int = 32
+    test_strings: int = 64
+    seconds: float = 0.5
+    steps: int = 10
+    first_s: float = 0.0625
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("strings", "validation_strings", "test_strings", "steps"):
+            if not 1 <= getattr(self, name) <= 10_000:
+                raise ValueError(f"{name} must lie in 1 … 10000, not {getattr(self, name)}")
+        if not 0 < self.first_s <= self.seconds <= 10:
+            raise ValueError("first_s and seconds must be above 0, first_s at most seconds, and seconds at most 10")
+
+
+def read_configuration(path: Path = CONFIGURATION) -> FamilyConfiguration:
+    """Raises SchemaError, naming file and field."""
+    if not path.is_file():
+        raise SchemaError(f"{path}: no such configuration; give a .toml file")
+    return read(FamilyConfiguration, read_toml(path), str(path))
+
+
+def train_preset(
+    configuration: FamilyConfiguration,
+    output: Path,
+    *,
+    cache: Path | None = None,
+    made: Callable[[float], None] = lambda share: None,
+    report: Callable[[FitProgress], None] = lambda progress: None,
+) -> PresetInfo:
+    """Makes the preset's file. An interrupted run finds the motions that it made; the fit itself takes minutes.
+
+    Args:
+        made: is told the share of the true motions that are there.
+    """
+    c, started = configuration, time.monotonic()
+    steps = round(c.seconds * c.rate_hz)
+    counts = {"train": c.strings, "validation": c.validation_strings, "test": c.test_strings}
+    cases: dict[str, list[Case]] = {split: [] for split in counts}
+    for split, count in counts.items():
+        for number in range(count):
+            plucked = draw_string("inside", split, number, c.seed)
+            cases[split].append(Case(plucked, true_motion(plucked, c.rate_hz, steps, cache)))
+            made(sum(map(len, cases.values())) / sum(counts.values()))
+    sizes = {"grid_points": GRID_POINTS, "modes": c.modes, "degree": c.degree}
+    model = build_model("koopman_tension", sizes)
+    assert isinstance(model, KoopmanTension)
+    resonator = c.string.resonator(c.modes, grid_points=GRID_POINTS)
+    model.initialise(c.initialisation, Physics(resonator, c.rate_hz, SCALE_M), torch.Generator().manual_seed(c.seed))
+    model.eval()
+    first = max(1, round(c.first_s * c.rate_hz))
+    fit_curves(
+        model,
+        cases["train"],
+        cases["validation"],
+        c.rate_hz,
+        steps=c.steps,
+        first_frames=first,
+        seed=c.seed,
+        report=report,
+    )
+    rel_mse, rel_mae = mean_errors(model, cases["validation"], c.rate_hz)
+    test_rel_mse, test_rel_mae = mean_errors(model, cases["test"], c.rate_hz)
+    family = FAMILY["inside"]
+    info = PresetInfo(
+        title=c.title,
+        description=c.description,
+        model="koopman_tension",
+        model_configuration=write(model.configuration),
+        string=c.string,
+        tension_modulated=True,
+        initial="pluck",
+        rate_hz=c.rate_hz,
+        modes=c.modes,
+        grid_points=GRID_POINTS,
+        horizon_steps=steps,
+        scale_m=SCALE_M,
+        trained_range=TrainedRange(
+            family.position,
+            (family.half_width[0], 2 * family.half_width[1]),
+            (0.0, LARGEST_PEAK_M),
+            family.tension_rise[1],
+        ),
+        initialisation=c.initialisation,
+        knows=KoopmanTension.initialisations[c.initialisation],
+        seed=c.seed,
+        rel_mse=rel_mse,
+        rel_mae=rel_mae,
+        test_rel_mse=test_rel_mse,
+        test_rel_mae=test_rel_mae,
+        training_seconds=time.monotonic() - started,
+        training={"family": write(c)},
+        family=family,
+    )
+    save_preset(output, info, model)
+    return info
+
+
+@torch.inference_mode()
+def mean_errors(model: KoopmanTension, cases: list[Case], rate_hz: int) -> tuple[float, float]:
+    """Relative MSE and MAE of displacement on the grid, each string's own, and their mean over the strings."""
+    play = player(model)
+    squared = absolute = 0.0
+    for case in cases:
+        shapes = case.plucked.resonator.shapes
+        truth = case.truth @ shapes
+        wrong = play(case.plucked, rate_hz, len(truth)) @ shapes - truth
+        squared += float(wrong.square().sum() / truth.square().sum()) / len(cases)
+        absolute += float(wrong.abs().sum() / truth.abs().sum()) / len(cases)
+    return squared, absolute
+
+
+__all__ = ["FamilyConfiguration", "mean_errors", "read_configuration", "train_preset"]

@@ -1,0 +1,35 @@
+"""The shelf: the strings that are shipped as files, each as a preset of its own with what was learned of many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from engine.presets import STRINGS, Preset, of_string, read_string, save_preset
+
+TITLES = {
+    "nylon_e4": "Nylon guitar, E4",
+    "nylon_b3": "Nylon guitar, B3",
+    "nylon_g3": "Nylon guitar, G3",
+    "nylon_d3": "Nylon guitar, D3 (wound)",
+    "nylon_a2": "Nylon guitar, A2 (wound)",
+    "nylon_e2": "Nylon guitar, E2 (wound)",
+    "steel_e4": "Electric guitar, E4",
+    "steel_b3": "Electric guitar, B3",
+    "steel_g3": "Electric guitar, G3",
+    "steel_ds3": "Steel wire, D sharp 3",
+    "piano_c4": "Piano string, C4, plucked",
+}
+
+
+def put_on_shelf(preset: Preset, folder: Path) -> list[Path]:
+    """Writes a preset for each string of `TITLES`; the errors that it tells are those of the family."""
+    written = []
+    for name, title in TITLES.items():
+        file = STRINGS / f"{name}.toml"
+        told = " ".join(line[1:].strip() for line in file.read_text().splitlines() if line.startswith("#"))
+        own = of_string(preset, read_string(file))
+        info = replace(own.info, title=title, description=f"{told} Played by the model of every string.")
+        written.append(folder / f"studio_any_{name}.safetensors")
+        save_preset(written[-1], info, own.model)
+    return written

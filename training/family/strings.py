@@ -1,0 +1,117 @@
+"""The family: strings with random pitch, inharmonicity and damping, each with a random pluck.
+
+A string's motion depends on three numbers of its own (inharmonicity B, two damping rates) and on the shape and the
+relative rise of tension of its pluck; pitch, length, density and tension rescale it exactly. So the ranges are those
+of what is heard, and strings of one length and density stand for all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from torch import Tensor
+
+from engine import excitation
+from engine.resonators.base import Resonator
+from engine.resonators.family import BRIGHT_HZ, StringFamily
+from engine.resonators.string import StringParameters
+
+Column = Literal["inside", "beyond"]
+COLUMNS: tuple[Column, ...] = get_args(Column)
+SPLITS = ("train", "validation", "test")
+FAMILY_VERSION = 1  # of what a seed means
+HIGHEST_HZ = 20_000.0
+MOST_MODES = 99
+GRID_POINTS = 101
+LENGTH_M, MASS_KG_M, AREA_M2, MODULUS_PA = 0.65, 5e-4, 5e-7, 2e10  # of every string: they change nothing but units
+
+
+FAMILY: dict[Column, StringFamily] = {
+    "inside": StringFamily(((55, 880),), ((1e-5, 1e-3),), (1, 20), (0.1, 1), (0.02, 0.5)),
+    "beyond": StringFamily(((30, 55), (880, 1500)), ((2e-6, 1e-5), (1e-3, 3e-3)), (1, 40), (0.1, 1), (0.1, 0.8)),
+}
+
+
+@dataclass(frozen=True)
+class PluckedString:
+    """One string with all its modes below 20 kHz, and one pluck of it.
+
+    Attributes:
+        amplitudes_m: as it is let go, float64 (modes,).
+        tension_rise: ΔT/T₀ then.
+    """
+
+    string: StringParameters
+    resonator: Resonator
+    amplitudes_m: Tensor
+    pitch_hz: float
+    inharmonicity: float
+    tension_rise: float
+
+
+def draw_string(column: Column, split: str, number: int, seed: int = 0) -> PluckedString:
+    """The string of a number; the same for ever, however many are drawn."""
+    ranges = FAMILY[column]
+    entropy = (FAMILY_VERSION, seed, COLUMNS.index(column), SPLITS.index(split), number)
+    random = np.random.default_rng(entropy)
+    while True:
+        pitch_hz, inharmonicity = (_either(random, r) for r in (ranges.pitch_hz, ranges.inharmonicity))
+        t60_s, bright_t60_s = _log_uniform(random, ranges.t60_s), _log_uniform(random, ranges.bright_t60_s)
+        if bright_t60_s < t60_s:
+            break
+    string = string_of(pitch_hz, inharmonicity, t60_s, bright_t60_s)
+    resonator = string.resonator(min(MOST_MODES, string.modes_below(HIGHEST_HZ)), grid_points=GRID_POINTS)
+    shape, place = int(random.integers(3)), float(random.uniform(*ranges.position))
+    half_width, rise = _log_uniform(random, ranges.half_width), _log_uniform(random, ranges.tension_rise)
+    if shape == 0:
+        displacement = excitation.triangular(place, 1e-3, GRID_POINTS)
+    elif shape == 1:
+        displacement = excitation.raised_cosine(place, 2 * half_width, 1e-3, GRID_POINTS)
+    else:
+        displacement = excitation.gaussian(place, half_width, 1e-3, GRID_POINTS)
+    amplitudes = resonator.to_modes(displacement)
+    amplitudes = amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt()
+    return PluckedString(string, resonator, amplitudes, pitch_hz, inharmonicity, rise)
+
+
+def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s: float) -> StringParameters:
+    """A string that sounds so: quiet pitch and decay of its first mode, B, and the decay of the mode nearest 3 kHz.
+
+    Where even a first mode without any damping of its own would decay faster than `t60_s`, it decays so.
+    """
+    slow, fast = math.log(1000) / t60_s, math.log(1000) / bright_t60_s
+    bright = max(2, round(BRIGHT_HZ / pitch_hz))
+    of_squares = min((fast - slow) / (bright**2 - 1), fast / bright**2)
+    constant = max(0.0, slow - of_squares)
+    eta = math.pi / LENGTH_M
+    omega = math.hypot(2 * math.pi * pitch_hz, constant + of_squares)
+    tension_n = omega**2 * MASS_KG_M / eta**2 / (1 + inharmonicity)
+    return StringParameters(
+        length_m=LENGTH_M,
+        area_m2=AREA_M2,
+        second_moment_m4=inharmonicity * tension_n / (MODULUS_PA * eta**2),
+        density_kg_m3=MASS_KG_M / AREA_M2,
+        youngs_modulus_pa=MODULUS_PA,
+        damping_d1_kg_m_s=2 * MASS_KG_M * constant,
+        damping_d3_kg_m_s=2 * MASS_KG_M * of_squares / eta**2,
+        tension_n=tension_n,
+    )
+
+
+def displacement_m(plucked: PluckedString) -> Tensor:
+    """As it is let go, float64 (grid_points,)."""
+    return plucked.resonator.to_grid(plucked.amplitudes_m)
+
+
+def _log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:
+    return math.exp(random.uniform(math.log(bounds[0]), math.log(bounds[1])))
+
+
+def _either(random: np.random.Generator, bounds: tuple[tuple[float, float], ...]) -> float:
+    return _log_uniform(random, bounds[int(random.integers(len(bounds)))])
+
+
+__all__ = ["COLUMNS", "FAMILY", "Column", "PluckedString", "displacement_m", "draw_string", "string_of"]
