@@ -63,11 +63,6 @@ class ModelSource(StringSource):
 
     def __init__(self, preset: Preset) -> None:
         self._model = preset.model
-        if preset.model.configuration.input == "two_frames":
-            raise ValueError(
-                f"{preset.path}: its model needs the frame before the first, which a string at rest does not have;"
-                " call the model itself with two frames"
-            )
         self._scale_m = preset.info.scale_m
         self.rate_hz = preset.info.rate_hz
         self.grid_points = preset.info.grid_points

@@ -11,11 +11,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from engine.models import MODELS
+from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, write
+from engine.schema import SchemaError, read, write
 
-FROM_PHASES = ("koopman_integrated", "fgru", "frnn")  # models that start from what the displacement shows (`phases`)
+# models that can start from what the displacement shows (`fitting.phases`)
+FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
+DIGEST_VERSION = 2  # of the rule by which runs are told apart; see `training.migration`
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -77,9 +80,10 @@ class Recipe:
     latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of a matching pursuit
     # Koopman's pursuit, or an integrated phase, starts from what the displacement shows and knows no string
     blind: bool = False
+    # of a blind integrated phase: its state_size is so many for each mode that the data show; 0: as it is configured
+    latents_per_mode: int = 0
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
-    random_start: bool = False  # a batch sets out from a random frame; for models that are told the velocity
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
     grow_until: float = 0.5  # … over this share of the run
@@ -97,7 +101,7 @@ class Recipe:
         for name in ("epochs", "batch_size", "first_horizon", "validate_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish"):
+        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish", "latents_per_mode"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
         if self.latent_polish and not self.latent_epochs:
@@ -126,6 +130,10 @@ class TrainingConfiguration:
             raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
         if self.recipe.blind and not self.recipe.latent_epochs and self.model not in FROM_PHASES:
             raise ValueError(f"blind needs latent_epochs, or one of {', '.join(FROM_PHASES)}, not {self.model!r}")
+        if self.recipe.latents_per_mode and not (self.recipe.blind and self.model == "koopman_integrated"):
+            raise ValueError(f"latents_per_mode needs blind and the model 'koopman_integrated', not {self.model!r}")
+        if self.recipe.latents_per_mode and "state_size" in self.model_configuration:
+            raise ValueError("state_size follows latents_per_mode; leave one of them out")
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:
@@ -142,19 +150,58 @@ class TrainingConfiguration:
 
     @property
     def digest(self) -> str:
-        """Of all that determines the run's result; what it is called does not.
+        """Of all that determines the run's result, the model's defaults among it; what it is called does not.
 
-        Fields that have their default are left out, so that one which comes later leaves earlier runs their digest.
+        Of data and recipe, whose defaults are never changed, fields that have theirs are left out, so that one which
+        comes later leaves earlier runs their digest. Where a model's sizes change, or this rule does, rows are
+        carried over by `training.migration`.
         """
-        plain = {
-            "model": self.model,
-            "model_configuration": write(self.model_configuration),
-            "data": unlike_default(self.data),
-            "data_version": DATA_VERSION,
-            "recipe": unlike_default(self.recipe),
-            "horizon": self.steps,
-        }
-        return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
+        kind, sizes = MODELS[self.model]
+        start = self.recipe.initialisation or kind.own_initialisation()
+        return digest_of(
+            {
+                "digest_version": DIGEST_VERSION,
+                "model": self.model,
+                "model_configuration": write(read(sizes, self.model_configuration, "model_configuration")),
+                "data": unlike_default(self.data),
+                "data_version": DATA_VERSION,
+                "recipe": {**unlike_default(self.recipe), "initialisation": start},
+                "horizon": self.steps,
+            }
+        )
+
+
+def digest_of(plain: dict[str, Any]) -> str:
+    """Sixteen digits that tell plain data apart."""
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
+
+
+# fields of earlier versions, and the only value that they ever had in a run that was kept
+RETIRED: dict[str, dict[str, Any]] = {
+    "recipe": {"random_start": False},
+    "model_configuration": {"input": "displacement"},
+}
+
+
+def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
+    """A configuration as a preset or a checkpoint of this version or an earlier one holds it.
+
+    Raises:
+        SchemaError: it is none, or sets what is no longer there; the message names the field.
+    """
+    if isinstance(plain, dict):
+        plain = {name: _without_retired(name, value, where) for name, value in plain.items()}
+    return read(TrainingConfiguration, plain, where)
+
+
+def _without_retired(part: str, value: Any, where: str) -> Any:
+    retired = RETIRED.get(part, {})
+    if not isinstance(value, dict):
+        return value
+    for name in retired.keys() & value.keys():
+        if value[name] != retired[name]:
+            raise SchemaError(f"{where}.{part}.{name}: {value[name]!r} is of an earlier version; train it anew")
+    return {name: entry for name, entry in value.items() if name not in retired}
 
 
 def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:

@@ -204,8 +204,7 @@ def held_out(configuration: DatasetConfiguration, scale_m: float, count: int, se
     """
     if seed == configuration.seed:
         raise ValueError(f"seed {seed} is the data set's own: its plucks were trained on; take another")
-    nothing = torch.empty(0)
-    return Dataset(replace(configuration, count=count, seed=seed), nothing, nothing, scale_m)
+    return Dataset(replace(configuration, count=count, seed=seed), torch.empty(0), scale_m)
 
 
 def _parts(c: DatasetConfiguration, split: str, trajectories: int | None) -> list[slice]:

@@ -17,10 +17,10 @@ from filelock import FileLock
 
 from engine.schema import SchemaError, read
 from engine.whole_file import whole_file
+from training.knowledge import given_to
 
 QUARTERS = 4  # windows of the horizon, with an error each
 SHORT_HORIZON = 400  # frames; the paper's second horizon, over which every run is measured too
-PRIOR_KNOWLEDGE = ("physics", "averaging", "matching pursuit")  # starts that know the string's modes
 RESULTS = Path(__file__).parent / "results.csv"
 
 Status = Literal["done", "diverged", "failed"]
@@ -103,7 +103,7 @@ class Row:
     @property
     def structured(self) -> bool:
         """Whether it started from prior knowledge of the string, which the paper's models do not have."""
-        return self.initialisation in PRIOR_KNOWLEDGE
+        return bool(given_to(self.model, self.initialisation))
 
 
 COLUMNS = tuple(field.name for field in fields(Row))

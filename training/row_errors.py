@@ -11,8 +11,7 @@ from typing import Any
 from engine.metrics import ErrorSums
 from engine.models import StringModel
 from engine.presets import PresetInfo, load_preset
-from engine.schema import read
-from training.configuration import TrainingConfiguration
+from training.configuration import TrainingConfiguration, read_configuration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.results import SHORT_HORIZON, Row
@@ -46,7 +45,7 @@ def configuration_of(info: PresetInfo, where: str) -> TrainingConfiguration:
     Raises:
         SchemaError: the preset does not tell it.
     """
-    return read(TrainingConfiguration, info.training, f"{where}: metadata.training")
+    return read_configuration(info.training, f"{where}: metadata.training")
 
 
 def filled(row: Row, preset: Path, cache: Path | None = None) -> Row:

@@ -25,7 +25,6 @@ from engine.excitation import (
     WIDTH_RANGE,
 )
 from engine.metrics import ErrorSums, RelativeError
-from engine.models import MODELS
 from engine.presets import Preset, PresetInfo, TrainedRange, load_preset, save_preset
 from engine.schema import read, write
 from engine.whole_file import whole_file
@@ -33,7 +32,9 @@ from training import provenance
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
-from training.fitting.fit import Diverged, FitResult, Progress, fit, initialisation_of, knowledge_of
+from training.fitting.fit import Diverged, FitResult, Progress, fit
+from training.knowledge import initialisation_of, knowledge_of
+from training.migration import carried_over
 from training.results import QUARTERS, Row
 from training.row_errors import row_errors
 
@@ -138,7 +139,7 @@ def run_row(
         file = folder / "row.json"
         output = preset or folder / f"{name}.safetensors"
         if file.exists() and output.exists():
-            row = _read_row(file)
+            row = carried_over(_read_row(file), configuration)
             if row.digest == configuration.digest:
                 return row
         dataset = load_dataset(configuration.data, cache)
@@ -232,7 +233,6 @@ def default_runs() -> Path:
 def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: FitResult) -> PresetInfo:
     """What the preset of a finished fit says of itself, its errors measured here."""
     data, recipe = configuration.data, configuration.recipe
-    sizes: object = read(MODELS[configuration.model][1], configuration.model_configuration, "model_configuration")
     validation, test = (
         evaluate_model(result.model, dataset, split, configuration.steps).total() for split in ("validation", "test")
     )
@@ -240,7 +240,7 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         title=configuration.title,
         description=configuration.description,
         model=configuration.model,
-        model_configuration=write(sizes),
+        model_configuration=write(result.model.configuration),
         string=data.string,
         tension_modulated=data.tension_modulated,
         initial=data.initial,

@@ -16,6 +16,7 @@ import typer
 
 from app.commands import abx, batch, bench, evaluation, family, info, listing, motion, render, sweep, tables, training
 from app.commands.console import say
+from app.shared.thread_priority import wait_asleep
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
 NAME = "learned-strings"
@@ -76,6 +77,7 @@ cli.add_typer(family.family, name="family")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command line (default: the process's own) and returns the exit status."""
+    wait_asleep()
     try:
         typer.main.get_command(cli).main(list(sys.argv[1:] if arguments is None else arguments), prog_name=NAME)
     except SystemExit as exit:

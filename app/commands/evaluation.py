@@ -289,9 +289,9 @@ def _on(preset: Preset, run: str) -> Preset:
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
     """The data set that a preset names, or that of a run."""
-    from engine.schema import SchemaError, read
+    from engine.schema import SchemaError
     from training.by_name import load
-    from training.configuration import TrainingConfiguration
+    from training.configuration import read_configuration
 
     info = preset.info
     if on is not None:
@@ -301,7 +301,7 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
             f"{preset.path}: learned many strings: `family evaluate` measures it on such, --on CONFIG on a run's data"
         )
     try:
-        data = read(TrainingConfiguration, info.training, f"{preset.path}: metadata.training").data
+        data = read_configuration(info.training, f"{preset.path}: metadata.training").data
     except SchemaError as error:
         raise Failure(f"{error}; without it the preset's data set cannot be made") from error
     size = 4 * data.count * (data.steps // data.stride + 1) * data.modes

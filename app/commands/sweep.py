@@ -100,12 +100,16 @@ def merge(
     ],
     results: Results = None,
 ) -> None:
-    """Add the rows of other results files. Of one run the later row stays, and one that is done before any other."""
+    """Add the rows of other results files. Of one run the later row stays, and one that is done before any other.
+
+    Rows of an earlier version are found under this one's digests, as far as their names still mean their runs.
+    """
+    from training.migration import migrated
     from training.results import RESULTS, add_rows, read_results
 
     file = results or RESULTS
     before = len(read_results(file))
-    rows = [row for other in others for row in read_results(other)]
+    rows = migrated(row for other in others for row in read_results(other))
     after = len(add_rows(file, rows))
     print(f"{file}: {after} rows, {after - before} of them new")
 

@@ -34,7 +34,7 @@ LISTEN_RANGE = (0.01, 0.99)
 def table(
     results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
     recipe: Annotated[
-        Literal["ours", "blind", "paper", "all"], typer.Option(help="Whose recipe the runs followed.")
+        Literal["ours", "blind", "hinted", "paper", "all"], typer.Option(help="Whose recipe the runs followed.")
     ] = "all",
     format: Annotated[Literal["markdown", "csv"], typer.Option(help="csv is tidy: a line a cell.")] = "markdown",
     rows: Annotated[

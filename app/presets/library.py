@@ -44,13 +44,6 @@ class PresetEntry:
         """As it is listed: a copy in the user's folder is told from the shipped one."""
         return f"{self.info.title} (yours)" if self.own else self.info.title
 
-    @property
-    def unplayable(self) -> str:
-        """Why its model cannot be let go from rest, or nothing."""
-        if self.info.model_configuration.get("input") == "two_frames":
-            return "its model needs the frame before the first, which a string at rest does not have"
-        return ""
-
 
 class Library:
     """The presets in the order of the list, found by name. `changed` tells that there are others now."""

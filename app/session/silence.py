@@ -24,12 +24,8 @@ def why_silent(choices: Choices, library: Library) -> str:
         return "silent: the amplitude is 0"
     if choices.volume_db <= VOLUME_RANGE_DB[0]:
         return "silent: the volume is at its lowest"
-    if name := other_preset(choices.source_heard):
-        entry = library.find(name)
-        if entry is None:
-            return f"silent: the preset {name} is not there"
-        if entry.unplayable:
-            return f"silent: {entry.unplayable}"
+    if (name := other_preset(choices.source_heard)) and library.find(name) is None:
+        return f"silent: the preset {name} is not there"
     return _why_points_silent(choices) or _why_solo_silent(choices, library)
 
 

@@ -1,4 +1,7 @@
-"""Which threads go first where they are more than the cores: sound, then picture, then rendering, then all else."""
+"""Which threads go first where they are more than the cores: sound, then picture, then rendering, then all else.
+
+And how those wait that have nothing to do.
+"""
 
 from __future__ import annotations
 
@@ -32,6 +35,15 @@ def step_back(rank: Rank) -> None:
 
 
 REAL_TIME_PRIORITY = 4  # below the sound server itself
+
+
+def wait_asleep() -> None:
+    """Lets threads that compute for torch sleep until there is more to do; to be called before torch is loaded.
+
+    They would spin otherwise, each on a core, and keep from it whoever should work there: beside other busy
+    processes a command took two to three times as long, and as much of the processor, as with one thread.
+    """
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
 def native_threads() -> set[int]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -85,10 +84,15 @@ class Controller(QObject):
         self._last_tick_s = time.monotonic()
         self._timer = QTimer(self, interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
+        self._deck_timer = QTimer(self, interval=FRAME_MS // 2, singleShot=True, timerType=Qt.TimerType.PreciseTimer)
+        self._deck_timer.timeout.connect(self._show_deck)
         self._lively_until_s = 0.0
         self._ticks = 0
         self._facts_due_s = 0.0
-        self._elapsed_before_s = 0.0
+        self._decks_shown_s = {
+            True: self._last_tick_s,
+            False: self._last_tick_s,
+        }  # the left one's, and the right one's
         self._peak_db = METER_FLOOR_DB
         self._abx: AbxDialog | None = None  # while it is open, the sound is its own
         self._help: HelpDialog | None = None
@@ -203,7 +207,7 @@ class Controller(QObject):
     def listening_test(self) -> None:
         """Opens the ABX test on what is on stage; until it is closed, the sound belongs to it."""
         entry = self.entry
-        if entry is None or entry.unplayable:
+        if entry is None:
             self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
@@ -251,6 +255,7 @@ class Controller(QObject):
         if self._abx is not None:
             self._abx.abandon()
         self._timer.stop()
+        self._deck_timer.stop()
         self._settings = self._settings.model_copy(
             update={
                 "choices": self.session.choices,
@@ -315,19 +320,24 @@ class Controller(QObject):
             window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
             self.audio.show(status, performance.notes, take)
         moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
-        of_decks = replace(moment, elapsed_s=elapsed_s + self._elapsed_before_s)
-        self._elapsed_before_s = elapsed_s
         for panel in self.panels:
-            if panel.view.isVisible():
-                if isinstance(panel, StringPanel):
-                    panel.show_moment(moment)
-                elif panel.on_the_left == bool(self._ticks % 2):  # by turns: no picture keeps a key waiting for long
-                    panel.show_moment(of_decks)
+            if isinstance(panel, StringPanel) and panel.view.isVisible():
+                panel.show_moment(moment)
+        self._deck_timer.start()
         if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
             self._lively_until_s = now_s + LIVELY_S
         wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS
         if self._timer.interval() != wanted_ms:
             self._timer.setInterval(wanted_ms)
+
+    def _show_deck(self) -> None:
+        """One by turns, and between two pictures of the string: a key waits for what is being painted."""
+        on_the_left, now_s, performance = bool(self._ticks % 2), time.monotonic(), self.performance
+        elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
+        moment = Moment(performance.take, performance.position_s, performance.moving, elapsed_s)
+        for panel in self.panels:
+            if not isinstance(panel, StringPanel) and panel.on_the_left == on_the_left and panel.view.isVisible():
+                panel.show_moment(moment)
 
     def _show_level(self, elapsed_s: float) -> None:
         mixer = self.sound.mixer

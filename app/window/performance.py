@@ -111,7 +111,7 @@ class Performance(QObject):
             return 0.0
         heard_s = shown.parked_s
         if shown.note is not None:
-            heard_s = shown.note.seconds - self._sound.mixer.output_latency_s
+            heard_s = max(shown.note.seconds - self._sound.mixer.output_latency_s, shown.note.from_s)
         return min(max(heard_s, 0.0), shown.take.seconds)
 
     @property
@@ -135,7 +135,7 @@ class Performance(QObject):
     def strike(self, choices: Choices) -> Note | None:
         """Lets the string go as `choices` say, beside those that ring. From any thread; the picture is told later."""
         entry = self._library.find(choices.preset)
-        if entry is None or entry.unplayable:
+        if entry is None:
             return None
         note = self.notes.strike(stroke_of(choices, entry.path, self._library))
         self._latest = note

@@ -6,6 +6,7 @@
     truth      a voice of the solved string
     rendered   a voice that reads samples which somebody else renders
     voice      what all voices share: listening points, pick-up, gain, silence
+    limiter    the safety limiter, which looks ahead
     mixer      the sum of all voices, volume, limiter, meters; the device's callback
     cache      where they are kept once they are compiled
     warm       compiles, or loads, all of them

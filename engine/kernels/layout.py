@@ -12,6 +12,7 @@ from numba import njit
 from engine.kernels.compiled import COMPILED
 
 QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
+AHEAD = 32  # frames that the limiter looks ahead, and by which it delays what is heard; even, and a quantum at most
 
 # A voice's state
 WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
@@ -173,7 +174,7 @@ M_PUSHED = 7  # W voices that were handed over
 M_TAKEN = 8  # W and taken up
 M_WANTED_VOLUME = 9  # R
 M_VOLUME = 10  # R
-M_LIMITER = 11  # R its level
+M_LIMITER = 11  # R the level that it holds
 M_RELEASE = 12  # R its factor a frame
 M_REDUCTION = 13  # R the least gain since it was read, 1: none
 M_PEAK = 14  # R the highest sample since it was read
@@ -194,8 +195,10 @@ M_MIX = M_GAP_LIST + GAPS * GAP_FIELDS  # R (QUANTUM, 2)
 M_OUT = M_MIX + 2 * QUANTUM  # R (4, QUANTUM): two sets of weights at two points
 M_TAPS = M_OUT + 4 * QUANTUM  # R the differentiator's, (2 REACH + 1)
 REACH = 32  # frames of the differentiator to either side
-M_GAINS = M_TAPS + 2 * REACH + 2  # R (QUANTUM,): the limiter's
-M_SCRATCH = M_GAINS + QUANTUM
+M_WAITING = M_TAPS + 2 * REACH + 2  # R (AHEAD + QUANTUM, 2): what the limiter has not given yet, and the mix
+M_PEAKS = M_WAITING + 2 * (AHEAD + QUANTUM)  # R (AHEAD + QUANTUM,): the levels of these
+M_GAINS = M_PEAKS + AHEAD + QUANTUM  # R (AHEAD + QUANTUM,): the gains that were held since
+M_SCRATCH = M_GAINS + AHEAD + QUANTUM
 MOST_MODES = 512
 SCRATCH_ROWS = 40
 SCRATCH_SLOTS = SCRATCH_ROWS * MOST_MODES + 4 * QUANTUM * MOST_MODES

@@ -13,12 +13,10 @@ from numba import carray, cfunc, njit, types
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
 from engine.kernels.voice import add, note_gap
 
-CEILING = 10 ** (-0.3 / 20)
-BELIEVED = 100.0  # +40 dBFS: the level that the limiter believes at most, so that one wild sample is soon forgotten
-ATTACK = 1 / 48  # the most that the limiter's gain falls in a frame, where it can know beforehand
 TONE_HZ, TONE_LEVEL, TONE_FADE = 440.0, 0.1, 960
 UNDERFLOW = 4  # PortAudio's flag
 
@@ -54,11 +52,12 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
     _take_up(counts)
+    given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0
     for place in range(counts[at.M_ACTIVE]):
         address = counts[at.M_VOICES + place]
         voice = carray(pointer(address), (1 << 40,), np.float64)
-        state = add(voice, mixer, now_s)
+        state = add(voice, mixer, given_s)
         fence()
         voice.view(np.int64)[at.STATE] = state  # one that is over may be freed from here on
         if state == at.SOUNDING or state == at.WAITING:
@@ -92,10 +91,6 @@ def _finish(mixer: np.ndarray) -> None:
     """Volume, test tone, limiter and meter."""
     counts = mixer.view(np.int64)
     volume, wanted, smoothing = mixer[at.M_VOLUME], mixer[at.M_WANTED_VOLUME], mixer[at.M_SMOOTHING]
-    level, release = mixer[at.M_LIMITER], mixer[at.M_RELEASE]
-    reduction, peak = mixer[at.M_REDUCTION], mixer[at.M_PEAK]
-    gains = mixer[at.M_GAINS : at.M_GAINS + at.QUANTUM]
-    limited = False
     for frame in range(at.QUANTUM):
         if volume != wanted:
             volume = wanted + (volume - wanted) * smoothing
@@ -115,25 +110,14 @@ def _finish(mixer: np.ndarray) -> None:
         if not (abs(left) < 1e6 and abs(right) < 1e6):  # voices are watched; this is the last line of defence
             left = right = 0.0
             counts[at.M_NON_FINITE] += 1
-        loudest = min(max(abs(left), abs(right)), BELIEVED)
-        level = max(loudest, release * level)
-        gains[frame] = 1.0
-        if level > CEILING and counts[at.M_LIMITING]:
-            gains[frame] = CEILING / level
-            limited = True
         mixer[at.M_MIX + 2 * frame], mixer[at.M_MIX + 2 * frame + 1] = left, right
-    if limited:  # a gain that falls within the quantum begins to do so before its peak, where there is time
-        for frame in range(at.QUANTUM - 2, -1, -1):
-            gains[frame] = min(gains[frame], gains[frame + 1] + ATTACK)
-        for frame in range(at.QUANTUM):
-            gain = gains[frame]
-            reduction = min(reduction, gain)
-            for slot in range(at.M_MIX + 2 * frame, at.M_MIX + 2 * frame + 2):
-                mixer[slot] = min(max(mixer[slot] * gain, -CEILING), CEILING)
+    mixer[at.M_VOLUME] = volume
+    if counts[at.M_LIMITING]:
+        limit(mixer)
+    peak = mixer[at.M_PEAK]
     for slot in range(at.M_MIX, at.M_MIX + 2 * at.QUANTUM):
         peak = max(peak, abs(mixer[slot]))
-    mixer[at.M_VOLUME], mixer[at.M_LIMITER] = volume, level
-    mixer[at.M_REDUCTION], mixer[at.M_PEAK] = reduction, peak
+    mixer[at.M_PEAK] = peak
 
 
 @cfunc(

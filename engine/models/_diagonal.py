@@ -15,7 +15,6 @@ from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models.base import Physics, StringModel
-from engine.models.inputs import InputKind
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
 SEGMENT = 64  # frames of the fine table of powers
@@ -91,12 +90,14 @@ def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor
     return nn.functional.linear(torch.view_as_real(latents).flatten(-2), interleaved, bias)
 
 
+def read_weight(weight: Tensor, readout: Tensor | None) -> Tensor:
+    """The weight (grid_points, inputs) of a last layer followed by `readout` (grid_points, points), as one."""
+    return weight if readout is None else readout.to(weight).T @ weight
+
+
 def read_layer(layer: nn.Linear, readout: Tensor | None) -> tuple[Tensor, Tensor]:
     """Weight and bias of a last layer followed by `readout` (grid_points, points), as one layer."""
-    if readout is None:
-        return layer.weight, layer.bias
-    readout = readout.to(layer.weight)
-    return readout.T @ layer.weight, layer.bias @ readout
+    return read_weight(layer.weight, readout), read_weight(layer.bias[:, None], readout)[:, 0]
 
 
 def linear_string_eigenvalues(
@@ -123,20 +124,13 @@ def linear_string_eigenvalues(
     return torch.complex(linear.real * stretch, linear.imag * raised)
 
 
-def linear_string_encoder(kind: InputKind, analysis: Tensor, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor]:
-    """Real and imaginary rows, (n, inputs) each, of an encoder whose latents move as Re(λᵏ z₀) = the mode's q_k.
+def linear_string_encoder(analysis: Tensor) -> Tensor:
+    """Weights (2n, grid_points), real parts first, of an encoder whose latents move as Re(λᵏ z₀) = the mode's q_k.
 
-    z₀ = q₀ + ib, where b follows from q̇₀ = Re(log λ · z₀), or from q₋₁ = Re(z₀ / λ). From the displacement alone
-    b = 0: with the damping of a string that is a string at rest, to about σ/ω.
+    z₀ = q₀: with the damping that is a string at rest to about σ/ω. (`eigenvalues.slope_at_rest` is what lacks; the
+    starts of Koopman and Koopman_var have always left it to the training.)
     """
-    none = torch.zeros_like(analysis)
-    if kind == "displacement":
-        return analysis, none
-    nu, theta = -log_eigenvalues.real[:, None], log_eigenvalues.imag[:, None]
-    real = torch.cat([analysis, none], dim=1)
-    if kind == "displacement_velocity":
-        return real, torch.cat([-nu / theta * analysis, -analysis / theta], dim=1)
-    return real, torch.cat([-analysis / theta.tan(), torch.exp(-nu) / theta.sin() * analysis], dim=1)
+    return torch.cat([analysis, torch.zeros_like(analysis)])
 
 
 def store_eigenvalues(nu_log: Tensor, theta_log: Tensor, log_eigenvalues: Tensor) -> None:

@@ -23,38 +23,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from engine.models.string_modes import StringModes
+
 ENDS = 2  # modes a channel that is read from the ends
-
-
-@dataclass(frozen=True)
-class StringModes:
-    """Of a string in normalised units, float64; times are in samples.
-
-    A mode that starts at q moves as q Re s exp[(log λ) t + i Σ κ_m q_m² t], its own index left out.
-
-    Attributes:
-        shapes: (modes, grid_points).
-        log_eigenvalues: log λ, complex128 (modes,).
-        starts: s, complex128 (modes,).
-        coupling: κ, (modes, modes).
-        squares: q² of typical strings, (strings, modes).
-    """
-
-    shapes: Tensor
-    log_eigenvalues: Tensor
-    starts: Tensor
-    coupling: Tensor
-    squares: Tensor
-
-    @property
-    def analysis(self) -> Tensor:
-        """(modes, grid_points): of a displacement, each mode's amplitude."""
-        return torch.linalg.pinv(self.shapes).T
-
-    @property
-    def drift(self) -> Tensor:
-        """The typical Σ κ_m q_m², (modes,)."""
-        return self.coupling @ self.squares.mean(0)
 
 
 @dataclass(frozen=True)

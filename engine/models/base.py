@@ -19,7 +19,6 @@ from typing import Any, ClassVar, Generic, TypeVar
 import torch
 from torch import Tensor, nn
 
-from engine.models.inputs import second_at_rest
 from engine.resonators.base import Resonator
 
 State = TypeVar("State")
@@ -73,8 +72,11 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
 
     @abstractmethod
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> State:
-        """The state at frame 0 for displacements (batch, grid_points); `second` as in `engine.models.inputs`."""
+    def encode(self, displacement: Tensor) -> State:
+        """The state at frame 0 of strings that are released at rest from displacements (batch, grid_points).
+
+        Displacement alone tells no phase but that of a string at rest (the paper, §4.1 and its conclusion).
+        """
 
     @abstractmethod
     def advance(self, state: State, steps: int, readout: Tensor | None = None) -> tuple[Tensor, State]:
@@ -105,12 +107,8 @@ class StringModel(nn.Module, ABC, Generic[State]):
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
     def release(self, displacement: Tensor) -> State:
-        """The state at frame 0 of strings that are released at rest from displacements (batch, grid_points).
-
-        Raises:
-            ValueError: the model needs the frame before, which they do not have.
-        """
-        return self.encode(displacement, second_at_rest(self.configuration.input, displacement))
+        """As `encode`, by the name of what happens to the string."""
+        return self.encode(displacement)
 
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
         """Frames 1 … steps after a release from `displacement` (batch, grid_points): (batch, steps, points)."""

@@ -19,9 +19,9 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models._diagonal import DiagonalModel, KoopmanState, dense
+from engine.models import eigenvalues
+from engine.models._diagonal import DiagonalModel, KoopmanState, dense, read_weight
 from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
-from engine.models.inputs import InputKind, input_size, join_input
 
 _ROWS_AT_ONCE = 16_384  # of the Hankel matrix: bounds the memory of a fit
 _VANISHED = -700.0  # log |λ| of a mode that is not there: finite in a file, and λ¹ is as good as 0
@@ -34,14 +34,11 @@ class DMDConfiguration:
     Attributes:
         lags: frames in the embedding.
         rank: singular vectors kept, which is the number of modes. Two for each mode of the string are enough.
-        input: what a rendering sets out from. The embedding's other frames are not asked for: a fit knows how they
-            belong to the velocity or to the one frame before.
     """
 
     grid_points: int = 101
     lags: int = 2
     rank: int = 50
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "lags", "rank")
@@ -49,8 +46,6 @@ class DMDConfiguration:
             raise ValueError(
                 f"rank must be at most lags times grid_points, {self.lags * self.grid_points}, not {self.rank}"
             )
-        if self.lags == 1 and self.input != "displacement":
-            raise ValueError(f"lags must be at least 2 for the input {self.input!r}, not 1")
 
 
 class DMD(DiagonalModel):
@@ -69,9 +64,8 @@ class DMD(DiagonalModel):
         self.magnitude_log = nn.Parameter(torch.full((r,), _VANISHED, dtype=torch.float64))
         self.angle = nn.Parameter(torch.zeros(r, dtype=torch.float64))
         self.modes = nn.Parameter(torch.zeros(self.grid_points, 2 * r))  # Φ of one frame, real parts first
-        inputs = input_size(configuration.input, self.grid_points)
         self.encoder: Tensor
-        self.register_buffer("encoder", torch.zeros(inputs, 2 * r))  # real parts first
+        self.register_buffer("encoder", torch.zeros(self.grid_points, 2 * r))  # real parts first
 
     @classmethod
     def fit(cls, trajectories: Tensor, configuration: DMDConfiguration) -> DMD:
@@ -101,25 +95,20 @@ class DMD(DiagonalModel):
         """Whether a mode grows, |λ| > 1: a fit to noisy or non-linear motion may find one."""
         return bool((self.magnitude_log > 0).any())
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanState:
-        """The amplitudes b that agree best, in least squares, with what is given.
+    def encode(self, displacement: Tensor) -> KoopmanState:
+        """The amplitudes b of a string at rest that agree best, in least squares: Φ b = u₀ and Φ (b log λ) = 0.
 
-        With the input "displacement" those of a string at rest: Φ b = u₀ and Φ (b log λ) = 0, its velocity. (With one
-        lag the modes hold no velocity, and only the first is asked.) With "displacement_velocity" the velocity is
-        given instead, and with "two_frames" u₋₁; both are exact where the fit is. But frames alone do not tell a mode
-        above half the sample rate from its alias, whose velocity is another one: there, two frames are the better.
+        With one lag the modes hold no velocity, and only the first is asked. Frames alone do not tell a mode above
+        half the sample rate from its alias, whose velocity is another one.
         """
-        b = join_input(self.configuration.input, displacement, second) @ self.encoder
+        b = displacement @ self.encoder
         return KoopmanState(torch.complex(*b.chunk(2, dim=-1)), 0)
 
     def powers(self, frames: Tensor) -> Tensor:
-        k = frames.to(torch.float64)[:, None]
-        angle = torch.remainder(k * self.angle.double(), 2 * math.pi)
-        return torch.polar(torch.exp(k * self.magnitude_log.double()), angle)
+        return eigenvalues.powers(torch.complex(self.magnitude_log.double(), self.angle.double()), frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
-        modes = self.modes if readout is None else readout.to(self.modes).T @ self.modes
-        real, imaginary = modes.chunk(2, dim=-1)
+        real, imaginary = read_weight(self.modes, readout).chunk(2, dim=-1)
         return dense(latents, torch.cat([real, -imaginary], dim=-1))
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
@@ -189,17 +178,13 @@ def _hankel_rows(trajectories: Tensor, frames: int) -> Iterator[Tensor]:
 
 
 def _encoder(c: DMDConfiguration, magnitude_log: Tensor, angle: Tensor, modes: Tensor) -> Tensor:
-    """b of the encoder's input: complex128 (n, inputs). See `DMD.encode`."""
+    """b of a displacement: complex128 (n, grid_points). See `DMD.encode`."""
     frame = modes[: c.grid_points]
     if c.lags == 1:
         return torch.linalg.pinv(frame)
-    if c.input == "two_frames":
-        return torch.linalg.pinv(modes[: 2 * c.grid_points])
     # a real λ < 0 alternates from frame to frame: at rest it is a cosine
     turning = torch.where(angle.abs() < math.pi, angle, 0.0)
     rate = torch.complex(magnitude_log, turning)
     # velocity and displacement weigh alike
     unit = rate.abs().square().mean().sqrt()
-    both = torch.linalg.pinv(torch.cat([frame, frame * (rate / unit)]))
-    at_rest, moving = both[:, : c.grid_points], both[:, c.grid_points :] / unit
-    return at_rest if c.input == "displacement" else torch.cat([at_rest, moving], dim=1)
+    return torch.linalg.pinv(torch.cat([frame, frame * (rate / unit)]))[:, : c.grid_points]

@@ -21,12 +21,16 @@ def log_eigenvalues(nu_log: Tensor, theta_log: Tensor) -> Tensor:
     return torch.complex(-nu_log.double().exp(), theta_log.double().exp())
 
 
-def powers(nu_log: Tensor, theta_log: Tensor, steps: Tensor) -> Tensor:
-    """λᵏ, complex128 (steps, n), for k in `steps` (steps,), which may be any real times in samples."""
+def powers(log_eigenvalues: Tensor, steps: Tensor) -> Tensor:
+    """λᵏ, complex128 (steps, n), of log λ, complex128 (n,), for k in `steps` (steps,): any real times in samples."""
     k = steps.to(torch.float64)[:, None]
-    magnitude = torch.exp(-k * nu_log.double().exp())
-    phase = torch.remainder(k * theta_log.double().exp(), 2 * math.pi)
-    return torch.polar(magnitude, phase)
+    phase = torch.remainder(k * log_eigenvalues.imag, 2 * math.pi)
+    return torch.polar(torch.exp(k * log_eigenvalues.real), phase)
+
+
+def slope_at_rest(log_eigenvalues: Tensor) -> Tensor:
+    """b, float64 (n,), with which q Re[(1 + ib) λᵏ] sets out at rest from q: 0 = Re[(1 + ib) log λ], b = -σ/ω."""
+    return log_eigenvalues.real / log_eigenvalues.imag
 
 
 def draw_ring(

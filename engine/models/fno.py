@@ -27,9 +27,9 @@ from torch.utils.checkpoint import checkpoint
 
 from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
 from engine.models._fno_transform import transform_matrices
-from engine.models._fno_wiring import Kernels, StringModes, Wiring, wire_fgru, wire_frnn
+from engine.models._fno_wiring import Kernels, Wiring, wire_fgru, wire_frnn
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
-from engine.models.inputs import InputKind, input_size, join_input
+from engine.models.string_modes import StartsFromModes, StringModes
 
 if TYPE_CHECKING:
     from engine.models import _fno_kernel as kernel
@@ -43,12 +43,10 @@ class FGRUConfiguration:
 
     Attributes:
         width: channels of the hidden field.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
     width: int = 32
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "width")
@@ -61,13 +59,11 @@ class FRNNConfiguration:
     Attributes:
         width: channels of the hidden field.
         depth: Fourier layers in a step.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
     width: int = 32
     depth: int = 3
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "width", "depth")
@@ -112,30 +108,21 @@ class FourierConvolution(nn.Module):
         nn.init.uniform_(self.bias, 0, 1 / width, generator=generator)
 
 
-class _FourierRecurrent(StringModel[FieldState]):
+class _FourierRecurrent(StringModel[FieldState], StartsFromModes):
     """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
 
     initialisations: ClassVar = {"paper": ""}
     kept_fields: int  # of a step, for its gradient
 
-    def __init__(self, grid_points: int, width: int, kind: InputKind) -> None:
+    def __init__(self, grid_points: int, width: int) -> None:
         super().__init__()
         self.grid_points = grid_points
-        self.input = kind
-        self.in_mapping = nn.Linear(input_size(kind, 1), width)
+        self.in_mapping = nn.Linear(1, width)
         self.out_mapping = nn.Linear(width, 1)
 
     @abstractmethod
     def step(self, hidden: Tensor) -> Tensor:
         """One sample of the definition: (batch, grid_points, width) to the same shape."""
-
-    @abstractmethod
-    def store_modes(self, modes: StringModes) -> None:
-        """Makes it a string of these modes, as far as its form can be one (`_fno_wiring`).
-
-        Raises:
-            ValueError: it has too few channels or points for them.
-        """
 
     @abstractmethod
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
@@ -145,9 +132,8 @@ class _FourierRecurrent(StringModel[FieldState]):
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         """The kernel: advances hidden (batch, grid_points, width), fills frames (batch, steps, grid_points)."""
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> FieldState:
-        second = None if second is None else second[..., None]
-        return FieldState(self.in_mapping(join_input(self.input, displacement[..., None], second)))
+    def encode(self, displacement: Tensor) -> FieldState:
+        return FieldState(self.in_mapping(displacement[..., None]))
 
     def advance(self, state: FieldState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, FieldState]:
         frames, hidden = self._advance_any_way(state.hidden, steps)
@@ -222,9 +208,10 @@ class FGRU(_FourierRecurrent):
     """See the module."""
 
     kept_fields = 8
+    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width, configuration.input)
+        super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
         sizes = configuration.grid_points, configuration.width
         self.z_layer = FourierConvolution(*sizes)
@@ -237,6 +224,7 @@ class FGRU(_FourierRecurrent):
         return (1 - z) * hidden + z * torch.tanh(self.h_layer(r * hidden))
 
     def store_modes(self, modes: StringModes) -> None:
+        """See `_fno_wiring`."""
         wiring = wire_fgru(modes, self.configuration.width)
         layers = self.z_layer, self.r_layer, self.h_layer
         self._store(wiring, dict(zip(layers, wiring.layers, strict=True)))
@@ -260,8 +248,10 @@ class FGRU(_FourierRecurrent):
 class FRNN(_FourierRecurrent):
     """See the module. Nothing bounds it: it may blow up, more so before it is trained."""
 
+    holds_coupling: ClassVar = False
+
     def __init__(self, configuration: FRNNConfiguration) -> None:
-        super().__init__(configuration.grid_points, configuration.width, configuration.input)
+        super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
         self.kept_fields = 4 * configuration.depth
         sizes = configuration.grid_points, configuration.width
@@ -276,7 +266,7 @@ class FRNN(_FourierRecurrent):
         return hidden
 
     def store_modes(self, modes: StringModes) -> None:
-        """As a linear string: its frequencies follow nothing."""
+        """As a linear string: its frequencies follow nothing. See `_fno_wiring`."""
         wiring = wire_frnn(modes, self.configuration.width, self.configuration.depth)
         self._store(wiring, dict(zip(self._convolutions, wiring.layers, strict=True)))
         with torch.no_grad():

@@ -67,7 +67,7 @@ from engine.models._diagonal import (
 )
 from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
-from engine.models.inputs import InputKind, input_size, join_input
+from engine.models.string_modes import StartsFromModes, StringModes
 
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
 SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
@@ -84,7 +84,6 @@ class IntegratedPhaseConfiguration:
 
     Attributes:
         state_size: number n of complex eigenvalues: one for each mode, or more to spare.
-        input: what the encoder is given; see `engine.models.inputs`.
         encoder_widths: hidden widths of the MLP that is added to the linear encoder.
         eigenvalue_widths: hidden widths of g.
         multiplier_widths: hidden widths of Koopman_var's multiplier, 1 + MLP(|z|²). Evaluated at every frame.
@@ -104,7 +103,6 @@ class IntegratedPhaseConfiguration:
 
     grid_points: int = 101
     state_size: int = 25
-    input: InputKind = "displacement"
     encoder_widths: tuple[int, ...] = (128, 128)
     eigenvalue_widths: tuple[int, ...] = (128, 128)
     multiplier_widths: tuple[int, ...] = ()
@@ -174,7 +172,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
+class KoopmanIntegrated(StringModel[IntegratedPhaseState], StartsFromModes):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -184,14 +182,15 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
     }
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
     coupling_parameters: ClassVar = frozenset({"K"})
+    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
         super().__init__()
         self.configuration = c = configuration
         self.grid_points = c.grid_points
-        n, values = c.state_size, input_size(c.input, c.grid_points)
-        self.encoder = nn.Linear(values, 2 * n)
-        self.encoder_residual = _mlp(values, c.encoder_widths, 2 * n)
+        n = c.state_size
+        self.encoder = nn.Linear(c.grid_points, 2 * n)
+        self.encoder_residual = _mlp(c.grid_points, c.encoder_widths, 2 * n)
         # float64: of frequencies rounded to 1e-7 the phase errs within seconds by more than all else does
         self.nu_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
         self.theta_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
@@ -210,12 +209,10 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
         self.A_in = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
         self.A_out = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> IntegratedPhaseState:
-        """See the contract; `second` as in `engine.models.inputs.join_input`."""
-        values = join_input(self.configuration.input, displacement, second)
-        z = self.encoder(values)
+    def encode(self, displacement: Tensor) -> IntegratedPhaseState:
+        z = self.encoder(displacement)
         if self.encoder_residual is not None:
-            z = z + self.encoder_residual(values)
+            z = z + self.encoder_residual(displacement)
         if self.M_in is not None:
             real, imag = z.chunk(2, dim=-1)
             z = torch.cat(self._modulate(self.M_in, self.A_in, real, imag, slice(None)), dim=-1)
@@ -534,39 +531,32 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
                 self._initialise_averaging(physics)
 
     @torch.no_grad()
-    def store_modes(self, shapes: Tensor, log_eigenvalues: Tensor, starts: Tensor, coupling: Tensor) -> None:
-        """A latent for each of some modes, at first all that is heard; spare latents stay silent.
+    def store_modes(self, modes: StringModes) -> None:
+        """A latent for each mode, at first all that is heard; spare latents stay silent.
 
         z_n(0) = s_n q_n of a displacement Σ_n q_n shape_n, and û = Σ_n Re z_n shape_n.
-
-        Args:
-            shapes: (modes, grid_points), linearly independent.
-            log_eigenvalues: -σ + iω, complex (modes,).
-            starts: s, complex (modes,).
-            coupling: rad/sample that the square of each mode's q at the start adds to each ω, (modes, modes).
 
         Raises:
             ValueError: more modes than latents.
         """
-        n, modes = self.configuration.state_size, len(shapes)
-        if modes > n:
-            raise ValueError(f"state_size must be at least {modes}, the modes that the data show, not {n}")
-        analysis = torch.linalg.pinv(shapes).T
-        self.nu_log[:modes] = (-log_eigenvalues.real).log()
-        self.theta_log[:modes] = log_eigenvalues.imag.log()
+        n, count = self.configuration.state_size, len(modes.shapes)
+        if count > n:
+            raise ValueError(f"state_size must be at least {count}, the modes that the data show, not {n}")
+        analysis, starts, omega = modes.analysis, modes.starts, modes.log_eigenvalues.imag
+        self.nu_log[:count] = (-modes.log_eigenvalues.real).log()
+        self.theta_log[:count] = omega.log()
         for linear in (self.encoder, self.decoder):
             nn.init.zeros_(linear.weight)
-        self.encoder.weight[:modes, : self.grid_points] = (starts.real[:, None] * analysis).to(self.K.dtype)
-        self.encoder.weight[n : n + modes, : self.grid_points] = (starts.imag[:, None] * analysis).to(self.K.dtype)
-        self.decoder.weight[:, :modes] = shapes.T.to(self.K.dtype)
-        coupling = coupling / starts.abs().square()
+        self.encoder.weight[:count] = (starts.real[:, None] * analysis).to(self.K.dtype)
+        self.encoder.weight[n : n + count] = (starts.imag[:, None] * analysis).to(self.K.dtype)
+        self.decoder.weight[:, :count] = modes.shapes.T.to(self.K.dtype)
+        coupling = modes.coupling / starts.abs().square()
         if self.energy_units is not None and self.rate_units is not None:
-            omega = log_eigenvalues.imag
-            self.rate_units[:modes] = omega
-            self.energy_units[:modes] = (coupling / omega[:, None]).abs().median(0).values
-            coupling = coupling / self.energy_units[:modes]
-        rate_units = self._rate_units[:modes, None] if isinstance(self._rate_units, Tensor) else self._rate_units
-        self.K[n : n + modes, :modes] = (coupling / rate_units).to(self.K.dtype)
+            self.rate_units[:count] = omega
+            self.energy_units[:count] = (coupling / omega[:, None]).abs().median(0).values
+            coupling = coupling / self.energy_units[:count]
+        rate_units = self._rate_units[:count, None] if isinstance(self._rate_units, Tensor) else self._rate_units
+        self.K[n : n + count, :count] = (coupling / rate_units).to(self.K.dtype)
 
     def _initialise_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes
@@ -587,7 +577,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             self.A_out.copy_(-self.A_in)
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
-        n, points, modes = self.configuration.state_size, self.grid_points, physics.modes
+        n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         mode = torch.arange(n) % modes
@@ -596,25 +586,10 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState]):
             self.energy_units.copy_(physics.resonator.relative_tension_rise(unit_m))
             self.rate_units.copy_(physics.resonator.omega[mode] / physics.rate_hz)
         analysis = physics.resonator.analysis.T[mode]
-        first, second = _imaginary_parts(self.configuration.input, log_eigenvalues)
-        self.encoder.weight.zero_()
-        self.encoder.weight[:n, :points] = analysis.to(self.encoder.weight)
-        self.encoder.weight[n:, :points] = (first[:, None] * analysis).to(self.encoder.weight)
-        if second is not None:
-            self.encoder.weight[n:, points:] = (second[:, None] * analysis).to(self.encoder.weight)
+        imaginary = eigenvalues.slope_at_rest(log_eigenvalues)[:, None] * analysis
+        self.encoder.weight.copy_(torch.cat([analysis, imaginary]))
         self.decoder.weight.zero_()
         self.decoder.weight[:, :modes] = physics.resonator.shapes.T.to(self.decoder.weight)
-
-
-def _imaginary_parts(kind: InputKind, log_eigenvalues: Tensor) -> tuple[Tensor, Tensor | None]:
-    """Factors (n,) of a mode's q and of its second input in Im z, where q = Re z and the motion is linear.
-
-    From q̇ = Re (z log λ), zero where only the displacement is known, or from the frame before, Re (z/λ).
-    """
-    sigma, omega = -log_eigenvalues.real, log_eigenvalues.imag
-    if kind == "two_frames":
-        return -1 / omega.tan(), torch.exp(-sigma) / omega.sin()
-    return -sigma / omega, -1 / omega if kind == "displacement_velocity" else None
 
 
 def _integrated_nodes(time: Fraction, spacing: int) -> int:

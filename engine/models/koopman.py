@@ -32,13 +32,12 @@ from engine.models._diagonal import (
 )
 from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
-from engine.models.inputs import InputKind, input_size, join_input
 
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
-STRAIGHT = 4.0  # in the data's deviations: where "physics" holds the units, so that most plucks leave them straight
+HELD_AT = 4.0  # standard deviations of displacement above SELU's bend: most plucks stay above it ("physics")
 SHARPEST = 0.05  # "physics": share by which the strongest plucks raise a mode's frequency
-FAR = 12.0  # the same for `store_basis`, which must be exact for the strongest plucks too
-UNHEARD = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
+HELD_AT_EXACT = 12.0  # the same for `store_basis`: the strongest plucks stay above it, too
+SPARE_WEIGHT = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,6 @@ class KoopmanConfiguration:
         encoder_widths, decoder_widths: hidden widths of the MLPs.
         mixing_layer: a dense layer 2n → 2n at the encoder's end, without an activation before it. The paper's text
             does not name it, its number of parameters has it.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
@@ -58,7 +56,6 @@ class KoopmanConfiguration:
     encoder_widths: tuple[int, ...] = (128, 128)
     decoder_widths: tuple[int, ...] = (128, 128)
     mixing_layer: bool = True
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "state_size", "encoder_widths", "decoder_widths")
@@ -75,19 +72,18 @@ class Koopman(DiagonalModel):
         self.configuration = configuration
         self.grid_points = configuration.grid_points
         n = configuration.state_size
-        inputs = input_size(configuration.input, configuration.grid_points)
-        self.encoder = perceptron(inputs, *configuration.encoder_widths, 2 * n)
+        self.encoder = perceptron(configuration.grid_points, *configuration.encoder_widths, 2 * n)
         if configuration.mixing_layer:
             self.encoder.append(nn.Linear(2 * n, 2 * n))
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.decoder = perceptron(2 * n, *configuration.decoder_widths, configuration.grid_points)
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanState:
-        return KoopmanState(pack(self.encoder(join_input(self.configuration.input, displacement, second))), 0)
+    def encode(self, displacement: Tensor) -> KoopmanState:
+        return KoopmanState(pack(self.encoder(displacement)), 0)
 
     def powers(self, frames: Tensor) -> Tensor:
-        return eigenvalues.powers(self.nu_log, self.theta_log, frames)
+        return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         first, *others = dense_layers(self.decoder)
@@ -133,7 +129,7 @@ class Koopman(DiagonalModel):
         """
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         synthesis = torch.cat([shapes.T, torch.zeros_like(shapes.T)], dim=1)
-        _store_linear_map(dense_layers(self.decoder), synthesis, generator, straight=FAR, spare=False)
+        _store_linear_map(dense_layers(self.decoder), synthesis, generator, held_at=HELD_AT_EXACT, spare=False)
 
     def _initialise_linear_string(self, physics: Physics, generator: torch.Generator) -> None:
         c, modes = self.configuration, physics.modes
@@ -144,10 +140,10 @@ class Koopman(DiagonalModel):
         encoder = dense_layers(self.encoder)
         if c.mixing_layer:
             nn.init.eye_(encoder.pop().weight)
-        _store_linear_map(encoder, torch.cat(linear_string_encoder(c.input, analysis, log_eigenvalues)), generator)
+        _store_linear_map(encoder, linear_string_encoder(analysis), generator)
         synthesis = torch.zeros(c.grid_points, 2 * c.state_size)
         synthesis[:, :modes] = physics.resonator.shapes.T
-        _store_linear_map(dense_layers(self.decoder), synthesis, generator, UNHEARD)
+        _store_linear_map(dense_layers(self.decoder), synthesis, generator, SPARE_WEIGHT)
 
 
 def _store_linear_map(
@@ -155,7 +151,7 @@ def _store_linear_map(
     matrix: Tensor,
     generator: torch.Generator,
     others: float = 0.0,
-    straight: float = STRAIGHT,
+    held_at: float = HELD_AT,
     spare: bool = True,
 ) -> None:
     """Makes dense layers with SELU between `matrix` (outputs, inputs), where no unit leaves SELU's straight part.
@@ -165,7 +161,7 @@ def _store_linear_map(
 
     Args:
         others: size of the last layer's random weights for what `matrix` does not read.
-        straight: where the units are held.
+        held_at: the units' value where the input is zero, in standard deviations of displacement.
         spare: whether the first layer's units hold what `matrix` does not read, too; latents that nearly cancel in
             what is read are large in all else.
 
@@ -183,9 +179,9 @@ def _store_linear_map(
             else _reading(layer, matrix, generator, spare)
         )
         layer.weight.copy_(weight)
-        layer.bias.copy_(straight - weight @ silent)
+        layer.bias.copy_(held_at - weight @ silent)
         through = SELU_SLOPE * weight @ through
-        silent = torch.full((len(weight),), SELU_SLOPE * straight, dtype=torch.float64)
+        silent = torch.full((len(weight),), SELU_SLOPE * held_at, dtype=torch.float64)
     weight = matrix @ torch.linalg.pinv(through)
     if not torch.allclose(weight @ through, matrix, atol=1e-6 * float(matrix.abs().max())):
         narrow = min(layer.out_features for layer in hidden)

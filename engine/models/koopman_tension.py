@@ -41,7 +41,6 @@ import torch
 from torch import Tensor, nn
 
 from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
-from engine.models.inputs import InputKind, join_input
 
 SERIES = 1 / 12  # r and p of small hω
 SPARE = 1.5  # of the energy at the start: more is not believed
@@ -58,7 +57,6 @@ class KoopmanTensionConfiguration:
         degree: of each curve's polynomial in (hω)².
         node_phase: the largest phase in rad that the first mode turns between nodes.
         highest_phase: the same of the highest mode; below π/2 no two modes are pumped.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
@@ -66,7 +64,6 @@ class KoopmanTensionConfiguration:
     degree: int = 3
     node_phase: float = 0.05
     highest_phase: float = 1.56
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "modes")
@@ -165,13 +162,10 @@ class KoopmanTension(StringModel[KoopmanTensionState]):
         other._take(physics)
         return other.train(self.training)
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanTensionState:
-        """See the contract; `second` as in `engine.models.inputs.join_input`."""
-        join_input(self.configuration.input, displacement, second)
+    def encode(self, displacement: Tensor) -> KoopmanTensionState:
         sigma, omega = self._rates()
         q = displacement.double() @ self.analysis
-        speed = torch.zeros_like(q) if second is None else second.double() @ self.analysis
-        x, y = q, -(speed + sigma * q) / omega
+        x, y = q, -sigma * q / omega
         stretch = (self._stretch * q.square()).sum(-1)
         # 2 × the energy: of the linear string, and what the tension holds
         energy = (omega.square() * (x.square() + y.square())).sum(-1)

@@ -38,7 +38,6 @@ from engine.models._diagonal import (
 )
 from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
-from engine.models.inputs import InputKind, input_size, join_input
 
 LONG = 4 * FRAMES_AT_ONCE  # frames, times the batch, of a block with interpolated multipliers: they hold few latents
 SHORT = 512  # frames of a block of which every multiplier is computed: to look for fewer takes as long
@@ -51,13 +50,11 @@ class KoopmanVarConfiguration:
     Attributes:
         state_size: number n of complex eigenvalues.
         multiplier_widths: hidden widths of the multiplier's MLP.
-        input: what the encoder is told; see `engine.models.inputs`.
     """
 
     grid_points: int = 101
     state_size: int = 128
     multiplier_widths: tuple[int, ...] = (128, 128, 128)
-    input: InputKind = "displacement"
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "state_size", "multiplier_widths")
@@ -81,17 +78,17 @@ class KoopmanVar(DiagonalModel):
         self.grid_points = configuration.grid_points
         self.multiplier_tolerance = 1e-5
         n = configuration.state_size
-        self.encoder = nn.Linear(input_size(configuration.input, configuration.grid_points), 2 * n)
+        self.encoder = nn.Linear(configuration.grid_points, 2 * n)
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.multiplier = perceptron(n, *configuration.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, configuration.grid_points)
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> KoopmanState:
-        return KoopmanState(pack(self.encoder(join_input(self.configuration.input, displacement, second))), 0)
+    def encode(self, displacement: Tensor) -> KoopmanState:
+        return KoopmanState(pack(self.encoder(displacement)), 0)
 
     def powers(self, frames: Tensor) -> Tensor:
-        return eigenvalues.powers(self.nu_log, self.theta_log, frames)
+        return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         return dense(latents * self._multipliers(latents), *read_layer(self.decoder, readout))
@@ -188,9 +185,7 @@ class KoopmanVar(DiagonalModel):
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         analysis = physics.resonator.analysis.T[torch.arange(n) % modes]
-        self.encoder.weight.copy_(
-            torch.cat(linear_string_encoder(self.configuration.input, analysis, log_eigenvalues))
-        )
+        self.encoder.weight.copy_(linear_string_encoder(analysis))
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
         self.decoder.weight[:, :modes] = physics.resonator.shapes.T

@@ -13,7 +13,6 @@ import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
-from engine.models.inputs import InputKind, input_size
 from engine.models.ssm import DiagonalSSM, SSMString
 
 
@@ -22,13 +21,11 @@ class LRUConfiguration:
     """Sizes; the defaults are the paper's (636,221 parameters).
 
     Attributes:
-        input: what the encoder is told; see `engine.models.inputs`.
         state_size: complex states of every layer.
         layers: blocks after the first layer.
     """
 
     grid_points: int = 101
-    input: InputKind = "displacement"
     state_size: int = 128
     layers: int = 8
 
@@ -55,7 +52,7 @@ class LRULayer(DiagonalSSM):
     def input_matrix(self) -> Tensor:
         return self.B * self.gamma_log.exp()[:, None, None]
 
-    def initialise(self, generator: torch.Generator) -> None:
+    def initialise(self, how: str, generator: torch.Generator) -> None:
         """λ uniform in the ring 0.99 ≤ |λ| ≤ 1; γ keeps the states at unit variance under white noise."""
         nu_log, theta_log = eigenvalues.draw_ring(self.nu_log.shape[0], generator)
         self.nu_log.copy_(nu_log)
@@ -81,8 +78,7 @@ class LRU(SSMString):
     def __init__(self, configuration: LRUConfiguration) -> None:
         points, states = configuration.grid_points, configuration.state_size
         super().__init__(
-            configuration.input,
-            LRULayer(states, input_size(configuration.input, points), points),
+            LRULayer(states, points, points),
             [LRULayer(states, points, points) for _ in range(configuration.layers)],
         )
         self.configuration = configuration

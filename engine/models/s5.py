@@ -1,8 +1,9 @@
 """S5: diagonal state-space layers discretised from continuous time, in conjugate pairs.
 
-Source: the paper, §3.2, after Smith et al. 2023. With the step Δ = exp(log_step) learned for every state and
-zero-order hold, λ = exp(ΛΔ) and B̄ = (λ - 1) Λ⁻¹ B. One state of each conjugate pair is kept; the output is 2 Re(C x).
-The real part of Λ is not bounded: a trained model may have |λ| > 1, which `unstable` lists.
+Source: the paper, §3.2, after Smith et al. 2023; its start as in the paper's own code (rodrigodzf/physmodjax). With
+the step Δ = exp(log_step) learned for every state and zero-order hold, λ = exp(ΛΔ) and B̄ = (λ - 1) Λ⁻¹ B. One state
+of each conjugate pair is kept; the output is 2 Re(C x). The real part of Λ is not bounded: a trained model may have
+|λ| > 1, which `unstable` lists.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
-from engine.models.inputs import InputKind, input_size
 from engine.models.ssm import DiagonalSSM, SSMString, draw_lecun, scale_rows
 
-SMALLEST_STEP, LARGEST_STEP = 0.001, 0.1  # of the initial draw of Δ, in the source's arbitrary unit of time
+# the initial draw of Δ, in the source's arbitrary unit of time; Smith et al. have 1e-3 as the smallest, too
+SMALLEST_STEP = {"paper": 1e-4, "physics": 1e-3}
+LARGEST_STEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -25,14 +27,12 @@ class S5Configuration:
     """Sizes; the defaults are the paper's (307,879 parameters).
 
     Attributes:
-        input: what the encoder is told; see `engine.models.inputs`.
         state_size: states of every layer; half of them, one of each conjugate pair, are stored.
         hippo_blocks: diagonal blocks of the initial state matrix, each a HiPPO-LegS matrix.
         layers: blocks after the first layer.
     """
 
     grid_points: int = 101
-    input: InputKind = "displacement"
     state_size: int = 128
     hippo_blocks: int = 16
     layers: int = 6
@@ -77,8 +77,12 @@ class S5Layer(DiagonalSSM):
     def input_matrix(self) -> Tensor:
         return scale_rows(self.B, torch.special.expm1(self.log_eigenvalues()) / self._rates())
 
-    def initialise(self, generator: torch.Generator) -> None:
-        """HiPPO-LegS in `hippo_blocks` blocks; B and C are real draws in its coordinates; Δ is log-uniform."""
+    def initialise(self, how: str, generator: torch.Generator) -> None:
+        """HiPPO-LegS in `hippo_blocks` blocks; B and C are real draws in its coordinates; Δ is log-uniform.
+
+        The paper's code draws C by `lecun_normal` on (outputs, 2P, 2), whose fan-in counts the outputs, too: 2P · H
+        with 2P states of both halves. For "physics" it is 2P, and the smallest Δ is another, as in its runs so far.
+        """
         states, _, inputs = self.B.shape
         outputs, size = self.C.shape[0], 2 * states // self.hippo_blocks
         rates, vectors = hippo_normal(size)
@@ -89,10 +93,11 @@ class S5Layer(DiagonalSSM):
         real_B = draw_lecun((2 * states, inputs), 2 * states, generator)
         drawn = everywhere.mH @ real_B.to(everywhere)
         self.B.copy_(torch.stack([drawn.real, drawn.imag], dim=1))
-        pair = draw_lecun((outputs, 2 * states, 2), 2 * states, generator)
+        fan_in = 2 * states * (outputs if how == "paper" else 1)
+        pair = draw_lecun((outputs, 2 * states, 2), fan_in, generator)
         self.C.copy_(torch.view_as_real(torch.view_as_complex(pair) @ everywhere))
         self.D.normal_(generator=generator)
-        self.log_step.uniform_(math.log(SMALLEST_STEP), math.log(LARGEST_STEP), generator=generator)
+        self.log_step.uniform_(math.log(SMALLEST_STEP[how]), math.log(LARGEST_STEP), generator=generator)
 
     def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
         modes = len(log_eigenvalues)
@@ -114,8 +119,7 @@ class S5(SSMString):
     def __init__(self, configuration: S5Configuration) -> None:
         points, states, blocks = configuration.grid_points, configuration.state_size // 2, configuration.hippo_blocks
         super().__init__(
-            configuration.input,
-            S5Layer(states, input_size(configuration.input, points), points, blocks),
+            S5Layer(states, points, points, blocks),
             [S5Layer(states, points, points, blocks) for _ in range(configuration.layers)],
         )
         self.configuration = configuration

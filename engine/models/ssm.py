@@ -14,24 +14,17 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation
-from engine.models.inputs import InputKind, join_input
+from engine.models.eigenvalues import powers, slope_at_rest
 
 CHUNK = 32  # steps between two exact carries; fewer cost more carries, more collect more rounding
 ROWS_AT_ONCE = 1024  # batch × steps that go through the layers together and still fit the cache
-
-
-def powers(log_eigenvalues: Tensor, exponents: Tensor) -> Tensor:
-    """λᵏ, complex128 (steps, n), of log λ, complex128 (n,), for k in `exponents` (steps,): exact phases for any k."""
-    k = exponents.to(torch.float64)[:, None]
-    magnitude = torch.exp(k * log_eigenvalues.real)
-    return torch.polar(magnitude, torch.remainder(k * log_eigenvalues.imag, 2 * math.pi))
 
 
 def first_powers(log_eigenvalues: Tensor, count: int) -> Tensor:
@@ -183,23 +176,26 @@ class DiagonalSSM(nn.Module, ABC):
         """B̄ in the layout of B."""
 
     @abstractmethod
-    def initialise(self, generator: torch.Generator) -> None:
-        """Draws every weight as the source does."""
+    def initialise(self, how: str, generator: torch.Generator) -> None:
+        """Draws every weight: for "paper" as the source does, for "physics" what the string is then written into."""
 
     @abstractmethod
     def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
         """Stores the first states so that they have these λ, complex128 (modes,), and this B̄, in the layout of B."""
 
-    def enter(self, inputs: Tensor, matrix: Tensor) -> Tensor:
+    def input(self, inputs: Tensor, matrix: Tensor) -> Tensor:
         """`matrix` u, complex (..., states), of real inputs (..., inputs)."""
         return torch.view_as_complex(functional.linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
 
-    def apart(self) -> tuple[Tensor, Tensor]:
-        """B̄ (2 states, inputs) and the matrix of Re(C̄ x) (outputs, 2 states), all real parts before all imaginary."""
+    def diagonal(self) -> tuple[Tensor, Tensor]:
+        """Around the diagonal recurrence: B̄ (2 states, inputs), and the matrix of Re(C̄ x) (outputs, 2 states).
+
+        All real parts come before all imaginary ones.
+        """
         real, imaginary = (self.conjugates * self.C).unbind(-1)
         return self.input_matrix().transpose(0, 1).flatten(0, 1), torch.cat([real, -imaginary], dim=1)
 
-    def read(self, states: Tensor) -> Tensor:
+    def output(self, states: Tensor) -> Tensor:
         """Re(C̄ x), (..., outputs)."""
         matrix = (
             torch.conj_physical(torch.view_as_complex(self.C)) * self.conjugates
@@ -208,9 +204,9 @@ class DiagonalSSM(nn.Module, ABC):
 
     def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """y (steps, batch, outputs) for u (steps, batch, inputs), and the last x."""
-        driven = self.enter(inputs, self.input_matrix())
+        driven = self.input(inputs, self.input_matrix())
         states, last = recur(driven, self.log_eigenvalues(), state)
-        return torch.addcmul(self.read(states), self.D, inputs), last
+        return torch.addcmul(self.output(states), self.D, inputs), last
 
 
 class Block(nn.Module):
@@ -231,28 +227,59 @@ class Block(nn.Module):
         gated = functional.glu(self.gate(functional.gelu(outputs, approximate="tanh")), dim=-1)
         return inputs + gated, last
 
+    def folded_weights(self) -> list[Tensor]:
+        """What `fold` depends on; the gate is used as it is."""
+        norm = self.normalization
+        assert norm.running_mean is not None and norm.running_var is not None
+        assert norm.num_batches_tracked is not None  # counts where the statistics change: their versions do not
+        statistics = [norm.running_mean, norm.running_var, norm.num_batches_tracked]
+        return [norm.weight, norm.bias, *statistics, *self.seq.parameters(recurse=False)]
+
     def fold(self) -> FoldedBlock:
         """This block in evaluation."""
         norm = self.normalization
         assert norm.running_mean is not None and norm.running_var is not None
         scale = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
         shift = norm.bias - norm.running_mean * scale
-        enter, read = self.seq.apart()
+        into_states, output = self.seq.diagonal()
         return FoldedBlock(
-            enter=enter * scale,
-            enter_bias=enter @ shift,
+            input=into_states * scale,
+            input_bias=into_states @ shift,
             eigenvalues=torch.view_as_real(self.seq.log_eigenvalues().exp()),
-            read=read,
+            output=output,
             through=self.seq.D * scale,
             through_bias=self.seq.D * shift,
             gate=self.gate,
         )
 
-    def initialise(self, generator: torch.Generator) -> None:
+    def initialise(self, how: str, generator: torch.Generator) -> None:
         self.normalization.reset_parameters()
-        self.seq.initialise(generator)
+        self.seq.initialise(how, generator)
         self.gate.weight.copy_(draw_lecun(tuple(self.gate.weight.shape), self.gate.in_features, generator))
         self.gate.bias.zero_()
+
+
+class Weight(NamedTuple):
+    """A tensor as it was at a time, to tell whether it has changed since.
+
+    Attributes:
+        tensor: itself.
+        alias: of its memory, which is thus not given to another tensor.
+        version: what counts its changes in place; None where nothing does.
+    """
+
+    tensor: Tensor
+    alias: Tensor
+    version: int | None
+
+    @classmethod
+    def of(cls, tensor: Tensor) -> Weight:
+        return cls(tensor, tensor.detach(), None if tensor.is_inference() else tensor._version)
+
+    def is_still(self, tensor: Tensor) -> bool:
+        """Whether `tensor` is the same, with the same values."""
+        same = tensor is self.tensor and tensor.data_ptr() == self.alias.data_ptr()
+        return same and self.version is not None and tensor._version == self.version
 
 
 @dataclass(frozen=True)
@@ -260,17 +287,17 @@ class FoldedBlock:
     """A block in evaluation for rendering on a CPU: batch norm is in the matrices, and what is left is few calls.
 
     Attributes:
-        enter, enter_bias: what drives the states, (2 states, features), all real parts first.
+        input, input_bias: what is added to the states, (2 states, features), all real parts first.
         eigenvalues: λ, float64 (states, 2).
-        read: (features, 2 states).
+        output: (features, 2 states).
         through, through_bias: D, (features,).
         gate: of the block.
     """
 
-    enter: Tensor
-    enter_bias: Tensor
+    input: Tensor
+    input_bias: Tensor
     eigenvalues: Tensor
-    read: Tensor
+    output: Tensor
     through: Tensor
     through_bias: Tensor
     gate: nn.Linear
@@ -280,11 +307,11 @@ class FoldedBlock:
         from engine.models import _ssm_kernel as kernel  # Numba only when it is needed
 
         last = state.clone()
-        states = functional.linear(frames, self.enter, self.enter_bias)
+        states = functional.linear(frames, self.input, self.input_bias)
         kernel.stream(
             states.unflatten(-1, (2, -1)).numpy(), self.eigenvalues.numpy(), torch.view_as_real(last).numpy()
         )
-        outputs = functional.linear(states, self.read)
+        outputs = functional.linear(states, self.output)
         if frames.dtype != torch.float32:
             outputs = outputs + self.through * frames + self.through_bias
             return frames + functional.glu(self.gate(functional.gelu(outputs, approximate="tanh"))), last
@@ -309,38 +336,36 @@ class SSMString(StringModel[SSMState], ABC):
 
     initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
 
-    def __init__(self, kind: InputKind, first_layer: DiagonalSSM, blocks: Sequence[DiagonalSSM]) -> None:
+    def __init__(self, first_layer: DiagonalSSM, blocks: Sequence[DiagonalSSM]) -> None:
         super().__init__()
-        self.input: InputKind = kind
         self.grid_points = grid_points = first_layer.C.shape[0]
         self.first_layer = first_layer
         self.layers = nn.ModuleList([Block(seq, grid_points) for seq in blocks])
+        self._folded: tuple[list[Weight], list[FoldedBlock]] = [], []
 
-    def rest(self, batch: int) -> SSMState:
+    def initial_state(self, batch: int) -> SSMState:
         """The state of `batch` strings at rest."""
         ssms = self._ssms()
         return SSMState(
             tuple(torch.zeros(batch, s.B.shape[0], dtype=torch.complex128, device=s.B.device) for s in ssms)
         )
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> SSMState:
-        """See the contract; `second` as in `engine.models.inputs.join_input`."""
-        origin = join_input(self.input, displacement, second)
-        origin = self.first_layer.enter(origin, self.first_layer.input_matrix()).to(torch.complex128)
-        return SSMState((origin, *self.rest(displacement.shape[0]).latents[1:]))
+    def encode(self, displacement: Tensor) -> SSMState:
+        origin = self.first_layer.input(displacement, self.first_layer.input_matrix()).to(torch.complex128)
+        return SSMState((origin, *self.initial_state(displacement.shape[0]).latents[1:]))
 
     def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
         return self._run(state, steps, None, readout)
 
-    def drive(self, state: SSMState, excitation: Tensor, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
+    def excite(self, state: SSMState, excitation: Tensor, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
         """Like `advance`, with any excitation: §3.2 with u_k for every k in place of u_k δ_k.
 
-        An impulse at k = 0 from `rest` is `encode` and `advance` of the same displacement; zeros are `advance`.
+        An impulse at k = 0 from `initial_state` is `encode` and `advance` of the same displacement; zeros are
+        `advance`.
 
         Args:
-            excitation: (batch, steps, inputs), what the string is given at the present frame, at the next …, in the
-                form of the model's input (grid_points, or twice that with a second array) and normalised units. It
-                is heard from the frame after on.
+            excitation: (batch, steps, grid_points), what the string is given at the present frame, at the next …, in
+                normalised units. It is heard from the frame after on.
         """
         return self._run(state, excitation.shape[1], excitation.transpose(0, 1), readout)
 
@@ -360,14 +385,14 @@ class SSMString(StringModel[SSMState], ABC):
         """See the contract.
 
         paper: as the source draws every layer.
-        physics: the first layer is the linear string, released from rest or with what else the model is given, on its
-            first `modes` states; its other states are not yet heard, and the blocks, which correct it, start at
-            zero. Prior knowledge that the paper's models do not have: say so in a table.
+        physics: the first layer is the linear string, released from rest, on its first `modes` states; its other
+            states are not yet heard, and the blocks, which correct it, start at zero. Prior knowledge that the
+            paper's models do not have: say so in a table.
         """
         check_initialisation(self, how)
         with torch.no_grad():
             for ssm_or_block in (self.first_layer, *self.layers):
-                ssm_or_block.initialise(generator)
+                ssm_or_block.initialise(how, generator)
             if how == "physics":
                 self._initialise_linear_string(physics)
 
@@ -378,17 +403,10 @@ class SSMString(StringModel[SSMState], ABC):
                 f"initialisation 'physics' needs a stored state for each of the {modes} modes, not {first.B.shape[0]}"
             )
         log_eigenvalues = physics.log_eigenvalues
-        # q_k = Re(z λᵏ) with Re z = q₀; Im z is what makes the velocity or the frame before right
-        if self.input == "two_frames":
-            before = torch.exp(-log_eigenvalues)
-            imaginary = (before.real / before.imag, -1 / before.imag)
-        else:
-            imaginary = (log_eigenvalues.real / log_eigenvalues.imag, -1 / log_eigenvalues.imag)
+        # q_k = Re(z λᵏ) with Re z = q₀; Im z makes the velocity zero
         analysis = physics.resonator.analysis.T
-        matrix = torch.zeros(modes, 2, 2 * points, dtype=torch.float64)
-        matrix[:, 0, :points] = analysis
-        matrix[:, 1] = torch.cat([factor[:, None] * analysis for factor in imaginary], dim=1)
-        first.set_modes(log_eigenvalues, matrix[:, :, : first.B.shape[2]])
+        imaginary = slope_at_rest(log_eigenvalues)[:, None] * analysis
+        first.set_modes(log_eigenvalues, torch.stack([analysis, imaginary], dim=1))
         first.C.zero_()
         first.C[:, :modes, 0] = (physics.resonator.shapes.T / first.conjugates).to(first.C)
         for block in self.layers:
@@ -398,6 +416,21 @@ class SSMString(StringModel[SSMState], ABC):
     def _ssms(self) -> list[DiagonalSSM]:
         return [module for module in self.modules() if isinstance(module, DiagonalSSM)]  # the first layer's first
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_folded": ([], [])}  # a copy folds its own weights
+
+    def _folded_blocks(self) -> list[FoldedBlock]:
+        """The blocks for rendering: folded once, and again when a weight is another."""
+        weights, folded = self._folded
+        layers = cast("list[Block]", list(self.layers))
+        tensors = [tensor for block in layers for tensor in block.folded_weights()]
+        if len(weights) != len(tensors) or not all(map(Weight.is_still, weights, tensors)):
+            folded = [block.fold() for block in layers]
+            weights = [Weight.of(tensor) for tensor in tensors]
+            if all(weight.version is not None for weight in weights):
+                self._folded = weights, folded
+        return folded
+
     def _run(
         self, state: SSMState, steps: int, excitation: Tensor | None, readout: Tensor | None
     ) -> tuple[Tensor, SSMState]:
@@ -405,9 +438,7 @@ class SSMString(StringModel[SSMState], ABC):
         at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
         rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
         layers = cast("Iterable[Block]", self.layers)
-        blocks: Iterable[Block | FoldedBlock] = (block.fold() if rendering else block for block in layers)
-        if steps > at_once:
-            blocks = list(blocks)  # a single stretch folds one block after the other, in the same memory
+        blocks: Sequence[Block | FoldedBlock] = self._folded_blocks() if rendering else list(layers)
         parts = []
         for done in range(0, steps, at_once):
             count = min(at_once, steps - done)
@@ -417,7 +448,7 @@ class SSMString(StringModel[SSMState], ABC):
         return torch.cat(parts).transpose(0, 1), state
 
     def _stretch(
-        self, blocks: Iterable[Block | FoldedBlock], state: SSMState, steps: int, excitation: Tensor | None
+        self, blocks: Sequence[Block | FoldedBlock], state: SSMState, steps: int, excitation: Tensor | None
     ) -> tuple[Tensor, SSMState]:
         """Frames, time-major, and the state after them."""
         first = self.first_layer
@@ -428,8 +459,8 @@ class SSMString(StringModel[SSMState], ABC):
             # y is one sample late: x_{k+1} = λ (x_k + B̄ u_k)
             log_eigenvalues = first.log_eigenvalues()
             matrix = scale_rows(first.input_matrix(), log_eigenvalues.exp())
-            states, last = recur(first.enter(excitation, matrix), log_eigenvalues, state.latents[0])
-        frames, latents = first.read(states), [last]
+            states, last = recur(first.input(excitation, matrix), log_eigenvalues, state.latents[0])
+        frames, latents = first.output(states), [last]
         for block, latent in zip(blocks, state.latents[1:], strict=True):
             frames, last = block(frames, latent)
             latents.append(last)

@@ -36,7 +36,20 @@ def _one_string(data: Metadata) -> Metadata:
     return dict(data)
 
 
-MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows, 2: _one_string}
+def _displacement_alone(data: Metadata) -> Metadata:
+    """3 → 4: every model sets out from the displacement; no other input was ever shipped."""
+    sizes = data.get("model_configuration")
+    if not isinstance(sizes, dict):
+        return data
+    kind = sizes.get("input", "displacement")
+    if kind != "displacement":
+        raise UnknownVersion(
+            f"model_configuration.input {kind!r} is no longer read; train the model again on displacement alone"
+        )
+    return {**data, "model_configuration": {name: value for name, value in sizes.items() if name != "input"}}
+
+
+MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows, 2: _one_string, 3: _displacement_alone}
 FORMAT_VERSION = max(MIGRATIONS) + 1
 
 

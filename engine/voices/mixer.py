@@ -32,7 +32,7 @@ class Mixer:
     """Its memory is what the kernels work on; commands come from any thread, frames are taken by one.
 
     Args:
-        limited: whether the safety limiter is at work: for ears, not for files.
+        limited: whether the safety limiter is at work: for ears, not for files. It delays by `layout.AHEAD` frames.
     """
 
     def __init__(self, rate_hz: int, channels: int = 2, limited: bool = True) -> None:
@@ -45,6 +45,7 @@ class Mixer:
         memory[at.M_RATE] = rate_hz
         counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
         memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
+        memory[at.M_GAINS : at.M_GAINS + at.AHEAD] = 1.0
         memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
         memory[at.M_SMOOTHING] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
         counts[at.M_TONE_FRAME] = counts[at.M_TONE_LENGTH] = 0
@@ -127,8 +128,12 @@ class Mixer:
 
     @property
     def output_latency_s(self) -> float:
-        """From a callback to its first sample at the loudspeaker, as the device said last; 0 where it does not."""
-        return max(0.0, float(self.memory[at.M_DAC_S] - self.memory[at.M_NOW_S]))
+        """From a voice to the loudspeaker: the limiter's delay, and from a callback to its first sample.
+
+        The latter is what the device said last; 0 where it says nothing.
+        """
+        delay_s = at.AHEAD / self.rate_hz if self._counts[at.M_LIMITING] else 0.0
+        return delay_s + max(0.0, float(self.memory[at.M_DAC_S] - self.memory[at.M_NOW_S]))
 
     def take_peak(self) -> float:
         """The highest sample since it was asked for the last time."""

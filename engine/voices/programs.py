@@ -77,7 +77,7 @@ class Program:
 
 def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Program | None:
     """The program of a model whose latents move by themselves and whose decoder is linear; None for any other."""
-    if isinstance(model, DMD) and model.configuration.input == "displacement":
+    if isinstance(model, DMD):
         return _dmd_program(model, info, rate_hz)
     if isinstance(model, KoopmanIntegrated) and _is_bank(model):
         return _integrated_program(model, info, rate_hz)
@@ -89,7 +89,7 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
 def _is_bank(model: KoopmanIntegrated) -> bool:
     c = model.configuration
     widths = (c.state_size, *c.eigenvalue_widths)
-    plain = model.multiplier is None and model.decoder_residual is None and c.input == "displacement"
+    plain = model.multiplier is None and model.decoder_residual is None
     return plain and max(widths) <= at.MOST_MODES and len(c.eigenvalue_widths) < 7
 
 

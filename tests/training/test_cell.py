@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass, replace
 
 import pytest
 
-from engine.models import MODELS, build_model
+from engine.models import LRU, MODELS, LRUConfiguration, build_model
 from engine.schema import SchemaError
 from training.by_name import load
 from training.cell import Case, Cell, configuration_of, recipe_names
@@ -54,12 +55,25 @@ def test_the_papers_recipe_is_the_papers() -> None:
 
 
 def test_a_digest_is_for_good() -> None:
-    """Rows are known by it: where this fails, a default has changed; leave it, or raise DATA_VERSION."""
+    """Rows are known by it: where this fails, a default has changed; leave it, or carry rows over (`migration`)."""
     cells = [
         Cell("koopman_var", True, "noise", 4000, 400, "paper"),
         Cell("koopman_integrated", False, "noise", 16000),
     ]
-    assert [configuration_of(cell).digest for cell in cells] == ["df9b2370c10cc03e", "0e114ab26846233c"]
+    assert [configuration_of(cell).digest for cell in cells] == ["34d33598fc703024", "ec5dd779c9c5ed78"]
+
+
+def test_a_digest_covers_what_a_model_has_by_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = configuration_of(Cell("lru", True, "noise", 4000))
+    assert replace(found, model_configuration={"state_size": 128}).digest == found.digest
+    digest = found.digest
+
+    @dataclass(frozen=True)
+    class Larger(LRUConfiguration):
+        state_size: int = 256
+
+    monkeypatch.setitem(MODELS, "lru", (LRU, Larger))
+    assert found.digest != digest
 
 
 def test_titles_do_not_enter_the_digest_but_the_seed_does() -> None:
@@ -74,7 +88,7 @@ def test_titles_do_not_enter_the_digest_but_the_seed_does() -> None:
     [
         ("nylon_nonlinear_noise_16k_foo", "model 'foo' is not one of dmd, koopman"),
         ("nylon_nonlinear_noise_8k_lru", "rate_hz must be one of 4000, 16000"),
-        ("nylon_nonlinear_noise_4k_lru_400_theirs", "recipe 'theirs' is not one of blind, ours, paper"),
+        ("nylon_nonlinear_noise_4k_lru_400_theirs", "recipe 'theirs' is not one of blind, hinted, ours, paper"),
         ("nylon_nonlinear_noise_4k_lru_0", "horizon must be at least 1"),
         ("no_such_thing", "no training configuration 'no_such_thing'"),
     ],
@@ -105,4 +119,4 @@ def test_a_case_matches_what_it_names() -> None:
     assert not Case(tension_modulated=False).matches(cell)
     with pytest.raises(ValueError, match="model 'koop' is not one of"):
         Case(model=("koop",))
-    assert recipe_names() == ["blind", "ours", "paper"]
+    assert recipe_names() == ["blind", "hinted", "ours", "paper"]

@@ -10,7 +10,7 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError
-from training.fitting.fit import LEAST_SQUARES, PURSUIT
+from training.knowledge import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT
 from training.results import COLUMNS, Row, add_rows, read_results
 
 
@@ -38,9 +38,11 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_a_start_that_knows_the_string_is_no_black_box() -> None:
-    known = (PURSUIT, "physics", "averaging")
-    assert all(row(initialisation=how).structured for how in known)
-    assert not any(row(initialisation=how).structured for how in ("", "paper", "random", LEAST_SQUARES))
+    known = {"koopman": (PURSUIT, "physics"), "koopman_integrated": ("averaging",), "lru": ("physics",)}
+    for model, starts in known.items():
+        assert all(row(model=model, initialisation=how).structured for how in starts)
+    unknowing = ("", "paper", "random", LEAST_SQUARES, BLIND_PURSUIT, PHASES)
+    assert not any(row(model="koopman_integrated", initialisation=how).structured for how in unknowing)
 
 
 def test_rows_come_back_as_they_were(path: Path) -> None:

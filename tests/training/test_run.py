@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,13 @@ import pytest
 
 from engine.metrics import RelativeError
 from engine.presets import load_preset
+from engine.schema import write
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Progress
+from training.migration import earlier_digest
 from training.results import Row
 from training.row_errors import filled
 from training.run import LOG_FIELDS, TrainingLog, run_row, trained_range
@@ -130,9 +133,12 @@ def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_pa
         pytest.fail("trained again")
 
     assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
+    file = tmp_path / "runs" / CELL.name / "row.json"
+    earlier = {**write(row), "digest": earlier_digest(configuration())}
+    file.write_text(json.dumps(earlier))
+    assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
     with pytest.raises(ValueError, match="belongs to another configuration"):
         run_row(CELL.name, "ours", configuration(epochs=3), **places)
-    file = tmp_path / "runs" / CELL.name / "row.json"
     file.write_text("{")
     with pytest.raises(ValueError, match=r"row.json: not a row .*delete it to measure the run again"):
         run_row(CELL.name, "ours", configuration(), **places)

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from engine.models.inputs import InputKind
 from training.configuration import Recipe
-from training.data.dataset import START_EVERY, Dataset
+from training.data.dataset import Dataset
 
 
 @dataclass(frozen=True)
@@ -21,43 +20,26 @@ class Batch:
 
     Attributes:
         initial: the frame that a model sets out from, (batch, grid_points).
-        second: what its encoder is told beside; see `engine.models.inputs`.
         frames: int64 (frames,), any selection of 1 … N, counted from `initial`.
         target: the truth at these frames, (batch, frames, grid_points).
     """
 
     initial: Tensor
-    second: Tensor | None
     frames: Tensor
     target: Tensor
 
 
 class TrainingData:
-    """The training split on a device, and random batches of it.
+    """The training split on a device, and random batches of it."""
 
-    Args:
-        steps: frames of a trajectory that may be used.
-        kind: what the model's encoder is told.
-
-    Raises:
-        ValueError: the data do not hold what it is told.
-    """
-
-    def __init__(self, dataset: Dataset, steps: int, kind: InputKind, device: torch.device) -> None:
+    def __init__(self, dataset: Dataset, device: torch.device) -> None:
         c = dataset.configuration
-        if kind == "two_frames":
-            raise ValueError("a model of the input 'two_frames' cannot be trained; choose 'displacement_velocity'")
-        self._kind = kind
         self._stride = c.stride
-        self._kept = steps // c.stride
         self._amplitudes = dataset.split("train").to(device)
-        count = len(self._amplitudes)
-        # displacement a sample, as an encoder wants it; the training split comes first
-        self._velocities = dataset.velocities[:count].to(device) / c.rate_hz
         self._synthesis = (c.resonator.shapes / dataset.scale_m).float().to(device)
         mirror = c.resonator.mirror
         self._mirror = (torch.ones(c.modes) if mirror is None else mirror.float()).to(device)
-        self.count = count
+        self.count = len(self._amplitudes)
 
     def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> Batch:
         """A batch of the trajectories `rows`, over at most `horizon` frames."""
@@ -66,19 +48,12 @@ class TrainingData:
         kept = max(1, horizon // self._stride)
         frames = _frames(recipe, kept, generator)
         rows, wanted = rows.to(device), torch.cat([torch.zeros(1, dtype=torch.long), frames]).to(device)
-        starts = torch.zeros(len(rows), dtype=torch.long, device=device)
-        if recipe.random_start:
-            last = (self._kept - kept) // START_EVERY  # the whole horizon lies before the last frame
-            starts = torch.randint(0, last + 1, (len(rows),), generator=generator).to(device)
-        amplitudes = self._amplitudes[rows[:, None], START_EVERY * starts[:, None] + wanted]
-        velocities = self._velocities[rows, starts][:, None]
+        amplitudes = self._amplitudes[rows[:, None], wanted]
         if recipe.flip:
             sign, mirrored = flips(len(rows), generator, device)
-            turn = sign[..., None] * torch.where(mirrored[..., None], self._mirror, 1.0)
-            amplitudes, velocities = amplitudes * turn, velocities * turn
+            amplitudes = amplitudes * (sign[..., None] * torch.where(mirrored[..., None], self._mirror, 1.0))
         displacement = amplitudes @ self._synthesis
-        second = None if self._kind == "displacement" else (velocities @ self._synthesis)[:, 0]
-        return Batch(displacement[:, 0], second, self._stride * wanted[1:], displacement[:, 1:])
+        return Batch(displacement[:, 0], self._stride * wanted[1:], displacement[:, 1:])
 
 
 def flips(count: int, generator: torch.Generator, device: torch.device) -> tuple[Tensor, Tensor]:

@@ -28,7 +28,7 @@ from engine.truth import ModalState, SplittingSolver
 from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
 
 CHUNK = 50  # trajectories a step of the progress
-START_EVERY = 100  # kept frames between those of which the velocity is kept, from which a trajectory can be entered
+FRAMES_AT_ONCE = 100  # kept frames that are simulated in one go
 
 SPLITS = ("train", "validation", "test", "all")
 
@@ -40,13 +40,11 @@ class Dataset:
     Attributes:
         amplitudes: float32 (count, kept + 1, modes) in m of frames 0, stride, 2 stride, … steps, memory-mapped from
             the cache.
-        velocities: float32 (count, starts, modes) in m/s, of every START_EVERY-th of these.
         scale_m: one standard deviation of displacement over the training split; models see displacement/scale.
     """
 
     configuration: DatasetConfiguration
     amplitudes: Tensor
-    velocities: Tensor
     scale_m: float
 
     def split(self, name: str) -> Tensor:
@@ -112,21 +110,16 @@ def load_dataset(
     try:
         facts = json.loads((folder / "dataset.json").read_text(encoding="utf-8"))
         amplitudes = _map(folder / "amplitudes.npy", _amplitudes_shape(configuration), facts["amplitudes_crc32"])
-        velocities = _map(folder / "velocities.npy", _velocities_shape(configuration), facts["velocities_crc32"])
         scale_m = float(facts["scale_m"])
         if not (scale_m > 0 and math.isfinite(scale_m)):
             raise ValueError(f"dataset.json: scale_m is {scale_m}")
     except (ValueError, KeyError, TypeError, OSError, EOFError) as error:
         raise ValueError(f"{folder}: damaged data cache ({error}); delete that folder to make it again") from error
-    return Dataset(configuration, torch.from_numpy(amplitudes), torch.from_numpy(velocities), scale_m)
+    return Dataset(configuration, torch.from_numpy(amplitudes), scale_m)
 
 
 def _amplitudes_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
     return c.count, c.steps // c.stride + 1, c.modes
-
-
-def _velocities_shape(c: DatasetConfiguration) -> tuple[int, int, int]:
-    return c.count, -(-c.steps // (c.stride * START_EVERY)), c.modes
 
 
 def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -167,8 +160,7 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
     unfinished.mkdir()
     try:
         facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
-        for name, checksum in _simulate(configuration, unfinished, progress).items():
-            facts[f"{name}_crc32"] = checksum
+        facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", progress)
         values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
         facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
         del values  # an open mapping would hold the folder on Windows
@@ -179,25 +171,20 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _simulate(c: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> dict[str, int]:
-    """Writes both arrays; their checksums by name."""
+def _simulate(c: DatasetConfiguration, file: Path, progress: Callable[[int, int], None]) -> int:
+    """Writes the amplitudes; their checksum."""
     solver = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
     initial = draw_initial(c)
-    with (
-        closing(_ArrayFile(folder / "amplitudes.npy", _amplitudes_shape(c))) as amplitudes,
-        closing(_ArrayFile(folder / "velocities.npy", _velocities_shape(c))) as velocities,
-    ):
+    with closing(_ArrayFile(file, _amplitudes_shape(c))) as amplitudes:
         for first in range(0, c.count, CHUNK):
             progress(first, c.count)
             state = ModalState.at_rest(initial[first : first + CHUNK])
-            frames, starts = [state.amplitude[:, None]], []
-            for done in range(0, c.steps, START_EVERY * c.stride):
-                starts.append(state.velocity)
-                block, state = solver.advance(state, min(START_EVERY * c.stride, c.steps - done))
+            frames = [state.amplitude[:, None]]
+            for done in range(0, c.steps, FRAMES_AT_ONCE * c.stride):
+                block, state = solver.advance(state, min(FRAMES_AT_ONCE * c.stride, c.steps - done))
                 frames.append(block[:, c.stride - 1 :: c.stride])
             amplitudes.write(torch.cat(frames, dim=1))
-            velocities.write(torch.stack(starts, dim=1))
-        return {"amplitudes": amplitudes.checksum, "velocities": velocities.checksum}
+        return amplitudes.checksum
 
 
 def displacement_deviation(amplitudes: np.ndarray[Any, Any], shapes: Tensor) -> float:

@@ -14,10 +14,10 @@ from torch import Tensor
 from engine.metrics import ErrorSums
 from engine.presets import Preset, PresetError
 from engine.resonators.sine_transform import listening_weights, to_grid
-from engine.schema import SchemaError, read
+from engine.schema import SchemaError
 from engine.sources import ModelSource, Runaway, SourceState, StringSource, TruthSource
 from training.cell import MODEL_NAMES
-from training.configuration import DatasetConfiguration, TrainingConfiguration
+from training.configuration import DatasetConfiguration, read_configuration
 from training.data.dataset import draw_initial, split_rows
 
 FRAMES_AT_ONCE = 2048
@@ -161,7 +161,7 @@ class _Run:
 
 def _data_of(preset: Preset) -> DatasetConfiguration:
     try:
-        data = read(TrainingConfiguration, preset.info.training, f"{preset.path}: metadata.training").data
+        data = read_configuration(preset.info.training, f"{preset.path}: metadata.training").data
     except SchemaError as error:
         raise PresetError(f"{error}; without it the preset's data set is not known") from error
     if data.grid_points != preset.info.grid_points or data.modes != preset.info.modes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,24 +23,19 @@ from engine.metrics import RelativeError
 from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
 from engine.schema import SchemaError, read, write
-from training.configuration import Recipe, TrainingConfiguration
+from training.configuration import Recipe, TrainingConfiguration, read_configuration
 from training.data.batches import TrainingData, batches
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import training_loss
+from training.fitting.modes import found_modes
 from training.fitting.phases import start_from_phases
 from training.fitting.pursuit import LatentFit, pursue
 from training.fitting.soap import SOAP
+from training.knowledge import own_start
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
-LEAST_SQUARES = "least squares"  # how DMD is found: it has no start
-PURSUIT = "matching pursuit"  # see `pursuit`
-BLIND_PURSUIT = "blind matching pursuit"
-PHASES = "phases of the displacement"  # see `phases`
-MODES_AND_RANGES = "the modes of the string and the range of their frequencies"
-SYMMETRIES = "that a string may be mirrored and its sign turned"
-COUNT = "how many modes it has"
 TELL_EVERY_S = 5.0  # within an epoch
 
 
@@ -144,38 +139,21 @@ def fit(
     return run.result()
 
 
-def initialisation_of(configuration: TrainingConfiguration) -> str:
-    """How a run's model starts: the recipe's choice, or its source's own."""
-    if configuration.model == "dmd":
-        return LEAST_SQUARES
-    if configuration.recipe.latent_epochs:
-        return BLIND_PURSUIT if configuration.recipe.blind else PURSUIT
-    return PHASES if configuration.recipe.blind else _start(configuration)
+def new_model(
+    configuration: TrainingConfiguration, scale_m: float, found: Mapping[str, int] | None = None
+) -> StringModel[Any]:
+    """The untrained model of a run, initialised from its seed.
 
-
-def knowledge_of(configuration: TrainingConfiguration) -> str:
-    """What a run's start is told of the string, in words; empty: nothing but the displacement."""
-    start = initialisation_of(configuration)
-    if start in (BLIND_PURSUIT, PHASES):
-        counted = configuration.model == "koopman_integrated"  # its recipe has a latent for each mode
-        told = (SYMMETRIES if configuration.recipe.flip else "", COUNT if counted else "")
-        return ", and ".join(words for words in told if words)
-    known = {LEAST_SQUARES: "", PURSUIT: MODES_AND_RANGES}
-    return known[start] if start in known else MODELS[configuration.model][0].initialisations[start]
-
-
-def _start(configuration: TrainingConfiguration) -> str:
-    return configuration.recipe.initialisation or MODELS[configuration.model][0].own_initialisation()
-
-
-def new_model(configuration: TrainingConfiguration, scale_m: float) -> StringModel[Any]:
-    """The untrained model of a run, initialised from its seed; `scale_m` is its data set's."""
+    Args:
+        scale_m: its data set's.
+        found: sizes that its data have set.
+    """
     data = configuration.data
-    model = build_model(configuration.model, configuration.model_configuration)
+    model = build_model(configuration.model, {**configuration.model_configuration, **(found or {})})
     if model.grid_points != data.grid_points:
         raise ValueError(f"model_configuration.grid_points is {model.grid_points}, the data's are {data.grid_points}")
     model.initialise(
-        _start(configuration),
+        own_start(configuration),
         Physics(data.resonator, data.rate_hz, scale_m),
         torch.Generator().manual_seed(configuration.recipe.seed),
     )
@@ -206,19 +184,22 @@ class _Run:
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
         self._configuration, self._recipe, self._dataset = configuration, recipe, dataset
-        self._model = new_model(configuration, dataset.scale_m)
         self._latents: LatentFit | None = None
         if recipe.latent_epochs:
+            self._model = new_model(configuration, dataset.scale_m)
             generator = torch.Generator().manual_seed(recipe.seed)
             latents = pursue(self._model, dataset, configuration.steps, generator, recipe.blind)
             self._latents = latents.to(device)
         elif recipe.blind:
-            start_from_phases(self._model, dataset, configuration.steps, recipe.seed)
+            modes = found_modes(dataset, configuration.steps)
+            each = recipe.latents_per_mode
+            found = {"state_size": each * len(modes.shapes)} if each else None
+            self._model = new_model(configuration, dataset.scale_m, found)
+            start_from_phases(self._model, modes, recipe.seed)
+        else:
+            self._model = new_model(configuration, dataset.scale_m)
         self._model.to(device)
-        kind = self._model.configuration.input
-        if recipe.random_start and kind != "displacement_velocity":
-            raise ValueError("recipe.random_start needs a model of the input 'displacement_velocity'")
-        self._data = TrainingData(dataset, configuration.steps, kind, device)
+        self._data = TrainingData(dataset, device)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
         self._optimiser = _optimiser(self._model, recipe)
         self._average: AveragedModel | None = None
@@ -353,7 +334,7 @@ class _Run:
     def restore(self, checkpoint: Checkpoint, path: Path) -> None:
         facts, device = checkpoint.facts, next(self._model.parameters()).device
         try:  # read, not compared as it is: fields that came later have their defaults
-            other = read(TrainingConfiguration, facts["configuration"], f"{path}: configuration")
+            other = read_configuration(facts["configuration"], f"{path}: configuration")
             self.step, self.seconds = int(facts["step"]), float(facts["seconds"])
             self._total.fill_(facts["loss_total"])
             self._best_epoch = int(facts["best_epoch"])

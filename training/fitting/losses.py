@@ -3,6 +3,12 @@
 Koopman models are trained on prediction, encoding and consistency (§4.2); the others on prediction alone, the Fourier
 models on its logarithm. All take any selection of frames: a Koopman rollout needs no recursion, the others run up to
 the last of them.
+
+Where the paper's text and its authors' code (rodrigodzf/physmodjax, `lindyn_loss`) differ, the terms are the text's:
+consistency is of Λᵏ φ(u₀), encoding of frame 0. The code compares φ(u_k) with Koopman_var's multiplied states, and
+takes the encoding of all frames, past the multiplier; here frame 0 is decoded with it, as any other frame. Of the
+weights neither has ours: consistency is a sum over latents beside a mean over grid points, which counts it 101 times
+as much as the text's sums do, and 256 times as much as the code's means.
 """
 
 from __future__ import annotations
@@ -23,7 +29,7 @@ SILENT = 1e-12  # a string's mean square in normalised units that a relative los
 class KoopmanModel(Protocol):
     """A model whose latents can be had at any frame."""
 
-    def encode(self, displacement: Tensor, second: Tensor | None = None) -> Any: ...
+    def encode(self, displacement: Tensor) -> Any: ...
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
     def decode(self, latents: Tensor) -> Tensor: ...
 
@@ -31,24 +37,18 @@ class KoopmanModel(Protocol):
 def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tuple[Tensor, Tensor]:
     """The weighted loss that is minimised, and the mean square of the prediction's error alone.
 
-    A term of weight 0 costs nothing. Consistency compares with the encoded truth, and where the encoder is told more
-    than the displacement the truth of later frames is not at hand: there its weight must be 0.
-
-    Raises:
-        ValueError: it is not.
+    A term of weight 0 costs nothing. Consistency compares with the encoded truth.
     """
     if not isinstance(model, KoopmanModel):
         loss, prediction = _prediction(_predicted(model, batch), batch.target, recipe)
         return recipe.prediction_weight * loss, prediction
-    origin = model.encode(batch.initial, batch.second).origin
+    origin = model.encode(batch.initial).origin
     latents = model.latents(origin, batch.frames)
     loss, prediction = _prediction(model.decode(latents), batch.target, recipe)
     loss = recipe.prediction_weight * loss
     if recipe.encoding_weight:
         loss = loss + recipe.encoding_weight * _mean_square(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
-        if batch.second is not None:
-            raise ValueError("consistency_weight must be 0 for a model that is told more than the displacement")
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
         consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()
         loss = loss + recipe.consistency_weight * consistency
@@ -56,7 +56,7 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
-    frames, _ = model.advance(model.encode(batch.initial, batch.second), int(batch.frames[-1]))
+    frames, _ = model.advance(model.encode(batch.initial), int(batch.frames[-1]))
     return frames if frames.shape[1] == len(batch.frames) else frames[:, batch.frames - 1]
 
 

@@ -65,9 +65,11 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
     """Those that the displacement shows, and nothing else.
 
     Raises:
-        ValueError: the motions are no sum of vibrating shapes.
+        ValueError: the motions are no sum of vibrating shapes, or not every frame is there.
     """
-    points = dataset.configuration.grid_points
+    points, stride = dataset.configuration.grid_points, dataset.configuration.stride
+    if stride != 1:
+        raise ValueError(f"blind needs every frame: the data's stride must be 1, not {stride}")
     now, next_to_it = torch.zeros(2, points, points, dtype=torch.float64)
     for frames in _displacements(dataset, steps):
         middle = frames[:, 1:-1].flatten(0, 1)

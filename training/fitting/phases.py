@@ -20,13 +20,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from torch import Tensor
 
-from engine.models import FGRU, FRNN, StringModel
-from engine.models.fno import StringModes
-from engine.models.integrated_phase import KoopmanIntegrated
-from training.data.dataset import Dataset
-from training.fitting.modes import SLOWEST, Modes, found_modes
+from engine.models import StringModel
+from engine.models.string_modes import StartsFromModes, StringModes
+from training.configuration import FROM_PHASES
+from training.fitting.modes import SLOWEST, Modes
 
 FIRST_FRAMES = 12
 MORE_FRAMES = 1.4  # times as many in each further fit
@@ -36,43 +34,20 @@ EVALUATIONS = 12  # of a fit, at most: the next one goes on from there
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Phases:
-    """What was found; see the module. In samples, radians and normalised displacement.
+def start_from_phases(model: StringModel, modes: Modes, seed: int) -> None:
+    """Gives a model what the motions of the modes that were found show.
 
-    Attributes:
-        log_eigenvalues: -σ + iω, complex128 (modes,).
-        starts: s, complex128 (modes,).
-        coupling: κ, float64 (modes, modes).
-    """
-
-    log_eigenvalues: Tensor
-    starts: Tensor
-    coupling: Tensor
-
-
-def start_from_phases(model: StringModel, dataset: Dataset, steps: int, seed: int) -> None:
-    """Gives a model what the first `steps` frames of the training split show.
-
-    An FRNN, whose start is a linear string, is given each mode's mean motion (`mean_motions`).
+    A model whose start is a linear string is given each mode's mean motion (`mean_motions`).
 
     Raises:
-        ValueError: the model is another, its data are strided, or have more modes than it can hold.
+        ValueError: the model has no such start, or cannot hold as many modes.
     """
-    if not isinstance(model, (KoopmanIntegrated, FGRU, FRNN)):
-        raise ValueError("blind without latent_epochs needs one of the models koopman_integrated, fgru, frnn")
-    if dataset.configuration.stride != 1:
-        raise ValueError(f"blind needs every frame: the data's stride must be 1, not {dataset.configuration.stride}")
-    modes = found_modes(dataset, steps)
-    found = mean_motions(modes) if isinstance(model, FRNN) else fit_phases(modes, seed)
-    if isinstance(model, KoopmanIntegrated):
-        model.store_modes(modes.shapes, found.log_eigenvalues, found.starts, found.coupling)
-    else:
-        squares = modes.motions[:, 0].square()
-        model.store_modes(StringModes(modes.shapes, found.log_eigenvalues, found.starts, found.coupling, squares))
+    if not isinstance(model, StartsFromModes):
+        raise ValueError(f"blind without latent_epochs needs one of the models {', '.join(FROM_PHASES)}")
+    model.store_modes(fit_phases(modes, seed) if model.holds_coupling else mean_motions(modes))
 
 
-def fit_phases(modes: Modes, seed: int) -> Phases:
+def fit_phases(modes: Modes, seed: int) -> StringModes:
     """The least-squares fits of the module to all frames of `modes.motions`."""
     motions = modes.motions.numpy()
     trajectories, frames, count = motions.shape
@@ -91,10 +66,10 @@ def fit_phases(modes: Modes, seed: int) -> Phases:
         if last == frames - 1:
             break
         last = min(frames - 1, int(MORE_FRAMES * last) + 1)
-    return _phases([_upright(guess) for guess in found], slowest, count)
+    return _string_modes([_upright(guess) for guess in found], slowest, modes)
 
 
-def mean_motions(modes: Modes) -> Phases:
+def mean_motions(modes: Modes) -> StringModes:
     """Of each mode the one exponential that is nearest to all its motions, each by its own start; no coupling."""
     motions = modes.motions.numpy()
     frames, count = motions.shape[1:]
@@ -109,17 +84,20 @@ def mean_motions(modes: Modes) -> Phases:
         if last == frames - 1:
             break
         last = min(frames - 1, int(MORE_FRAMES * last) + 1)
-    return _phases([_upright(guess) for guess in found], SLOWEST / (frames - 1), count)
+    return _string_modes([_upright(guess) for guess in found], SLOWEST / (frames - 1), modes)
 
 
-def _phases(found: list[Floats], slowest: float, count: int) -> Phases:
-    """As fitted; `count` modes are coupled, or none where there is no κ."""
+def _string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringModes:
+    """As fitted; uncoupled where there is no κ."""
     omega, sigma, real, imag = np.array(found)[:, :4].T
+    count = len(found)
     coupling = np.array(found)[:, 4:] if len(found[0]) > 4 else np.zeros((count, count))
-    return Phases(
+    return StringModes(
+        modes.shapes,
         torch.from_numpy(-np.maximum(sigma, slowest) + 1j * omega),
         torch.from_numpy(real + 1j * imag),
         torch.from_numpy(coupling),
+        modes.motions[:, 0].square(),
     )
 
 

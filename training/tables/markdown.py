@@ -30,8 +30,8 @@ printed (5 seeds, validation; DMD's deviations are over the errors of single tra
 - **diverged (n of m seeds)**: these runs ended without a model; the figure beside it is of the others.
 - **prior knowledge**: training started from what is known of the string (its modes and eigenvalues, or averaged
   equations), which the paper's models do not have. Lines without these words are black boxes as in the paper.
-- **§**: these blind runs used that a string may be mirrored and its sign turned, and the integrated phase was told
-  how many modes there are; they will be run again without either.
+- **§**: hints. Training used that a string may be mirrored and its sign turned; by the recipe `hinted` the integrated
+  phase was told how many modes there are, too. The recipe `blind` has neither.
 - **our best**: the lowest validation error of our learned models (DMD is fitted, not learned) as a multiple of the
   paper's best in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below
   {PRINTED:g}."""

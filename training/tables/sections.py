@@ -12,6 +12,7 @@ from engine.schema import SchemaError
 from training.by_name import load
 from training.cell import HORIZON
 from training.configuration import TrainingConfiguration
+from training.knowledge import hints_of
 from training.results import SHORT_HORIZON, Row
 from training.tables.paper import (
     COLUMNS,
@@ -27,12 +28,7 @@ from training.tables.paper import (
 
 NOT_RUN = "not run"  # what is said in place of a figure
 NO_ERRORS = Errors(None, None)
-TOLD_OF_THE_STRING = (
-    "blind matching pursuit",
-    "phases of the displacement",
-)  # starts of blind runs before purification
-
-RecipeChoice = Literal["ours", "blind", "paper", "all"]
+RecipeChoice = Literal["ours", "blind", "hinted", "paper", "all"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +39,7 @@ class Line:
         initialisation: "" where it is no choice (DMD is fitted).
         structured: whether it started from prior knowledge of the string; see `Row.structured`.
         trained: frames that its runs were trained on; more than the table's where their first frames are measured.
+        hints: what its runs were given of the string without prior knowledge, in words; see `hints_of`.
     """
 
     model: str
@@ -50,17 +47,13 @@ class Line:
     initialisation: str
     structured: bool
     trained: int
-
-    @property
-    def told_of_the_string(self) -> bool:
-        """Whether it is of blind runs that were told of the string's symmetries, and of how many modes it has."""
-        return self.initialisation in TOLD_OF_THE_STRING
+    hints: str
 
     @property
     def label(self) -> str:
         """What is said of it beside the model's name."""
         words = f"{self.recipe} recipe" if self.recipe != "ours" else "our recipe"
-        if self.told_of_the_string:
+        if self.hints:
             words += " §"
         if self.structured:
             words += f", prior knowledge ({self.initialisation})"
@@ -177,7 +170,7 @@ def _is_measured(row: Row, horizon: int) -> bool:
 
 def _line(row: Row) -> Line:
     how = "" if row.model == "dmd" else row.initialisation  # fitted: an initialisation is asked of it by nobody
-    return Line(row.model, row.recipe, how, row.structured, row.horizon)
+    return Line(row.model, row.recipe, how, row.structured, row.horizon, hints_of(load(row.name)))
 
 
 def _entry(rows: Sequence[Row], horizon: int) -> Entry:

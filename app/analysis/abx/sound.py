@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from app.analysis.abx.trials import Identity
-from engine.kernels.mixer import CEILING
+from engine.kernels.limiter import CEILING
 from engine.spectra import spectral_distances
 
 LARGEST_PEAK = CEILING / 2  # where a sound begins anew, the end of the old one is still under it

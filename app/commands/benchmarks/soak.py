@@ -243,7 +243,7 @@ class _User(QObject):
         self.plucks = self.changes = 0
         self._stage, self._random = stage, random
         self._repertoire = Repertoire(
-            tuple(entry.name for entry in controller.library.entries if not entry.unplayable),
+            tuple(controller.library.names),
             tuple(panel.key for panel in LEFT),
             tuple(panel.key for panel in RIGHT),
         )

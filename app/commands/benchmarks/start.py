@@ -67,8 +67,10 @@ def _measure() -> dict[str, float]:
 def main() -> int:
     """Starts the app as its command does, notes the times on the way, and ends it."""
     from app.commands.benchmarks.display import choose_display
+    from app.shared.thread_priority import wait_asleep
     from app.window.main import run
 
+    wait_asleep()
     choose_display()
     times_s: dict[str, float] = {}
     status = run(lambda window: _watch(window, times_s), lambda controller: _watch_for_sound(controller, times_s))

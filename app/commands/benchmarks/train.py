@@ -55,7 +55,7 @@ def _step_s(name: str, frames: int) -> float:
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
     optimiser = torch.optim.AdamW(model.parameters())
     target = torch.randn(BATCH, frames, model.grid_points, generator=torch.Generator().manual_seed(0))
-    batch = Batch(target[:, 0], None, torch.arange(1, frames + 1), target)
+    batch = Batch(target[:, 0], torch.arange(1, frames + 1), target)
     recipe = Recipe(epochs=1)
 
     def step() -> None:

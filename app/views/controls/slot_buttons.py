@@ -145,8 +145,7 @@ class SlotButtons(QWidget):
         for entry in self._entries:
             source = f"preset:{entry.name}"
             action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
-            action.setEnabled(not entry.unplayable)
-            told = entry.unplayable or f"Its model for the same pluck, from {entry.info.rate_hz} Hz"
+            told = f"Its model for the same pluck, from {entry.info.rate_hz} Hz"
             action.setToolTip(f"{told}\n{entry.path.name}")
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)

@@ -50,7 +50,7 @@ def as_heard(
     """
     source = choices.source_heard
     if name := other_preset(source):
-        if any(entry.name == name and not entry.unplayable for entry in entries):
+        if any(entry.name == name for entry in entries):
             choices = choices.model_copy(update={"preset": name})
         source = "model"
     if source == "difference":

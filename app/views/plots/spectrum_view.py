@@ -20,6 +20,7 @@ from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
 from app.views.plots.axis_label import UprightLabel, fit_foot
 from app.views.plots.curves import set_curves
+from app.views.plots.kept_axes import keep_axes
 from app.views.plots.legend import Legend
 
 FLOOR_DB, CEILING_DB = -130.0, 0.0
@@ -108,8 +109,7 @@ class SpectrumView(QWidget):
         item.setLabel("bottom", "frequency (Hz)")
         self._label = UprightLabel(item)
         item.showGrid(x=True, y=True, alpha=0.18)
-        for side in ("left", "bottom"):  # numbers and grid stay while the curves move: a third of a painting
-            item.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)
+        keep_axes(item)
         item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.views import theme
 from app.views.plots.axis_label import fit_foot
+from app.views.plots.kept_axes import keep_axes
 from app.views.plots.kept_plot import KeptPlot
 
 SEEK_STEP_S = 0.1
@@ -39,6 +40,7 @@ class TimePlot(KeptPlot):
         item = self.getPlotItem()
         item.setLabel("bottom", "time (s)")
         item.getAxis("bottom").enableAutoSIPrefix(False)
+        keep_axes(item)
         item.setContentsMargins(0, 6, 4, 0)  # room for half of the topmost number
         item.setMenuEnabled(False)
         item.hideButtons()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import types
@@ -43,6 +44,22 @@ def test_help_is_there_without_the_heavy_imports() -> None:
     assert (done.returncode, done.stderr) == (0, "")
     for name in COMMANDS:
         assert f"\n  {name} " in done.stdout
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="GNU's OpenMP tells its settings")
+@pytest.mark.parametrize(("chosen", "turns"), [({}, "0"), ({"GOMP_SPINCOUNT": "123"}, "123")])
+def test_threads_of_a_command_sleep_while_they_wait(chosen: dict[str, str], turns: str) -> None:
+    """They spin for so many turns, by torch's own OpenMP, unless the user wants otherwise."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("OMP_", "GOMP_"))}
+    done = subprocess.run(
+        [sys.executable, "-m", "app.commands.cli", "models"],
+        cwd=ROOT,
+        env={**environment, "OMP_DISPLAY_ENV": "VERBOSE", **chosen},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert f"GOMP_SPINCOUNT = '{turns}'" in done.stderr
 
 
 def test_commands_need_neither_window_nor_sound_packages() -> None:

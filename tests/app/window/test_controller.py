@@ -231,6 +231,27 @@ def test_a_knob_asks_and_shows(qtbot: QtBot, controller: Controller) -> None:
     assert controller.session.choices.amplitude_mm == 4.0
 
 
+def test_a_key_waits_for_one_picture_at_a_time(
+    qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The string's and a deck's are no part of one event: between two events keys are heard."""
+    wait_for_take(qtbot, controller)
+    controller._timer.stop()
+    qtbot.wait(50)
+    shown: list[str] = []
+    for panel in controller.panels:
+        monkeypatch.setattr(panel, "show_moment", lambda moment, panel=panel: shown.append(panel.key))
+    decks = []
+    for _ in range(4):
+        controller._tick()
+        assert shown == ["string"]
+        qtbot.waitUntil(lambda: len(shown) > 1, timeout=5_000)
+        decks.append(shown[1:])
+        shown.clear()
+    assert sorted(decks[:2]) == [["spectrum"], ["waveform"]]
+    assert decks[:2] == decks[2:]  # by turns
+
+
 def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
     controller.performance.seek(0.1)

@@ -309,7 +309,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
         pickup = "velocity" if choice.random() < 0.4 else "displacement"
         ear = Ear((choice.uniform(0.1, 0.9),) * choice.integers(1, 3), pickup, int(choice.choice([0, 0, 5])))
         pluck, gain = Pluck(choice.uniform(0.1, 0.9), choice.uniform(1, 12)), float(choice.choice([0.0, 0.5, 1.0]))
-        kind = choice.choice(["knowing", "blind", "steel", "truth", "samples"])
+        kind = choice.choice(["knowing", "hinted", "steel", "truth", "samples"])
         if kind == "samples":
             voice = Voice.of_samples(plain_program(RATE_HZ), choice.uniform(-1, 1, (6000, 1)).astype(np.float32))
             voice.start_with_gain(gain)
@@ -317,7 +317,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
             info = small_info(True)
             voice = Voice(truth_program(info, RATE_HZ), initial_m(info, pluck), ear, gain)
         else:
-            name = {"knowing": KNOWING, "blind": f"{KNOWING}_blind", "steel": STEEL}[str(kind)]
+            name = {"knowing": KNOWING, "hinted": f"{KNOWING}_hinted", "steel": STEEL}[str(kind)]
             voice = strike(name, pluck, ear=ear, gain=gain)
         voice.begin_at(int(choice.integers(0, 4000)))
         if choice.random() < 0.3:

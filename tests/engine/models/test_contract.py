@@ -117,29 +117,3 @@ def test_a_preset_of_it_renders_what_the_model_does(
 def test_sizes_are_checked_by_name() -> None:
     with pytest.raises(SchemaError, match="unknown field 'depht'"):
         build_model("frnn", {"depht": 3})
-
-
-@pytest.mark.parametrize("name", [name for name in MODELS if name != "dmd"])
-def test_a_velocity_can_be_given_and_at_rest_it_is_zero(name: str, preset_file: Path, tmp_path: Path) -> None:
-    model = build_model(name, {"input": "displacement_velocity"})
-    model.initialise(model.own_initialisation(), PHYSICS, torch.Generator().manual_seed(0))
-    info = replace(read_info(preset_file), model=name, model_configuration=write(model.configuration))
-    path = tmp_path / f"{name}.safetensors"
-    save_preset(path, info, model)
-    source = ModelSource(load_preset(path))
-    initial = project(Pluck(0.4, 3.0).displacement(101), info.modes)[None]
-    frames, _ = source.advance(source.start(initial), 4)
-    displacement = (initial / info.scale_m).float()
-    with torch.inference_mode():
-        state = model.eval().encode(displacement, torch.zeros_like(displacement))
-        expected = model.advance(state, 4)[0] * info.scale_m
-    torch.testing.assert_close(frames, expected)
-
-
-def test_a_preset_that_needs_two_frames_says_so(preset_file: Path, tmp_path: Path) -> None:
-    model = build_model("koopman", {"input": "two_frames"})
-    model.initialise("paper", PHYSICS, torch.Generator())
-    info = replace(read_info(preset_file), model="koopman", model_configuration=write(model.configuration))
-    save_preset(tmp_path / "two.safetensors", info, model)
-    with pytest.raises(ValueError, match=r"two\.safetensors: its model needs the frame before"):
-        ModelSource(load_preset(tmp_path / "two.safetensors"))

@@ -10,7 +10,6 @@ import torch
 
 from engine.models.base import Physics, count_parameters
 from engine.models.dmd import DMD, DMDConfiguration
-from engine.models.inputs import InputKind
 from engine.resonators.sine_transform import listening_weights, to_grid, to_modes
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver
@@ -30,10 +29,10 @@ def trajectories(steps: int = 1000, tension_modulated: bool = False) -> torch.Te
 
 
 @cache
-def fitted(kind: InputKind = "displacement", tension_modulated: bool = False, **sizes: int) -> DMD:
+def fitted(tension_modulated: bool = False, **sizes: int) -> DMD:
     """As in the paper: fitted to a single sequence."""
     data = trajectories(tension_modulated=tension_modulated)[:1]
-    return DMD.fit(data, DMDConfiguration(input=kind, **sizes))
+    return DMD.fit(data, DMDConfiguration(**sizes))
 
 
 def eigenvalues(model: DMD) -> np.ndarray:
@@ -88,22 +87,7 @@ def test_finds_the_linear_strings_eigenvalues() -> None:
 def test_linear_motion_is_followed_as_in_the_papers_table() -> None:
     """Table 3 b: a relative MSE of 0.0000, on strings that were not fitted."""
     truth = trajectories()
-    at_rest = fitted()(truth[:, 0].float(), 1000)
-    assert relative_mse(at_rest, truth[:, 1:]) < 1e-9
-    two = fitted("two_frames")
-    moving, _ = two.advance(two.encode(truth[:, 100].float(), truth[:, 99].float()), 900)
-    assert relative_mse(moving, truth[:, 101:]) < 1e-9
-
-
-@torch.no_grad()
-def test_velocity_carries_on_the_motion() -> None:
-    flowing = ModalState.at_rest(to_modes(trajectories()[:, 0] * 1e-3, MODES))
-    _, state = SplittingSolver(STRING.resonator(MODES, tension_modulated=False), RATE_HZ).advance(flowing, 100)
-    truth = trajectories()[:, 101:]
-    model = fitted("displacement_velocity")
-    start, velocity = to_grid(state.amplitude, 101) * 1e3, to_grid(state.velocity, 101) * 1e3 / RATE_HZ
-    moving, _ = model.advance(model.encode(start.float(), velocity.float()), 900)
-    assert relative_mse(moving, truth) < 1e-9
+    assert relative_mse(fitted()(truth[:, 0].float(), 1000), truth[:, 1:]) < 1e-9
 
 
 @torch.no_grad()
@@ -150,18 +134,11 @@ def test_phases_stay_exact_after_a_million_steps() -> None:
 
 
 @torch.no_grad()
-@pytest.mark.parametrize("kind", ["displacement", "displacement_velocity", "two_frames"])
-def test_physics_initialisation_is_the_linear_string(kind: InputKind) -> None:
-    model = DMD(DMDConfiguration(rank=60, input=kind))
+def test_physics_initialisation_is_the_linear_string() -> None:
+    model = DMD(DMDConfiguration(rank=60))
     model.initialise("physics", Physics(STRING.resonator(MODES), RATE_HZ), torch.Generator())
     truth = trajectories()
-    start, previous = truth[:, 1].float(), truth[:, 0].float()
-    if kind == "two_frames":
-        found, wanted = model.advance(model.encode(start, previous), 999)[0], truth[:, 2:]
-    else:
-        second = None if kind == "displacement" else torch.zeros_like(previous)
-        found, wanted = model.advance(model.encode(previous, second), 1000)[0], truth[:, 1:]
-    assert relative_mse(found, wanted) < 1e-9
+    assert relative_mse(model(truth[:, 0].float(), 1000), truth[:, 1:]) < 1e-9
 
 
 def test_a_growing_mode_is_detected() -> None:
@@ -198,8 +175,6 @@ def test_impossible_sizes_are_named() -> None:
             DMDConfiguration(**{name: 0})
     with pytest.raises(ValueError, match="rank must be at most lags times grid_points, 20, not 50"):
         DMDConfiguration(grid_points=10)
-    with pytest.raises(ValueError, match="lags must be at least 2 for the input 'two_frames'"):
-        DMDConfiguration(lags=1, input="two_frames")
     with pytest.raises(ValueError, match="rank of at least 50, two a mode, not 20"):
         DMD(DMDConfiguration(rank=20)).initialise("physics", Physics(STRING.resonator(25), 16_000), torch.Generator())
 

@@ -198,25 +198,14 @@ def test_listening_is_the_grid_at_that_point(make: Make) -> None:
 
 @both
 def test_the_gradient_reaches_every_weight_through_the_steps(make: Make) -> None:
-    model = make(input="two_frames")
+    model = make()
     model.initialise("paper", Physics(StringParameters().resonator(5), 4_000), torch.Generator().manual_seed(0))
-    frames, _ = model.advance(model.encode(initial(2, 11), initial(2, 11)), 12)
+    frames, _ = model.advance(model.encode(initial(2, 11)), 12)
     frames.square().mean().backward()
     for name, parameter in model.named_parameters():
         assert parameter.grad is not None
         assert torch.isfinite(parameter.grad).all(), name
         assert parameter.grad.abs().max() > 0, name
-
-
-@both
-@torch.no_grad()
-def test_the_second_input_is_heard_and_asked_for(make: Make) -> None:
-    model = drawn(make(input="displacement_velocity"))
-    start = initial(1, 11)
-    at_rest, moving = (model.encode(start, velocity).hidden for velocity in (0 * start, start))
-    assert not torch.equal(at_rest, moving)
-    with pytest.raises(ValueError, match="needs the velocity"):
-        model.encode(start)
 
 
 @torch.no_grad()

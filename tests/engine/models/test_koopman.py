@@ -116,16 +116,6 @@ def test_listening_is_the_grid_at_that_point(decoder_widths: tuple[int, ...]) ->
     torch.testing.assert_close(heard, model(displacement(), 50) @ weights.float(), rtol=1e-4, atol=1e-5)
 
 
-@torch.no_grad()
-def test_the_second_input_is_heard() -> None:
-    model = small_model(input="displacement_velocity")
-    first, second = displacement(2)[:1], displacement(2)[1:]
-    still = model.advance(model.encode(first, 0 * second), 10)[0]
-    assert not torch.allclose(model.advance(model.encode(first, second), 10)[0], still)
-    with pytest.raises(ValueError, match="needs the velocity"):
-        model.encode(first)
-
-
 def test_initialisations_lie_where_they_should() -> None:
     radius = torch.exp(-small_model().nu_log.detach().exp())
     assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1

@@ -8,10 +8,9 @@ import torch
 
 from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters
 from engine.models.base import Physics
-from engine.models.inputs import InputKind
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
-from engine.truth import ModalState, SplittingSolver, solve_linear
+from engine.truth import ModalState, solve_linear
 
 REFERENCE = Path(__file__).parent / "references" / "koopman_var.npz"
 
@@ -88,25 +87,6 @@ def test_interpolated_multipliers_are_close_to_those_of_every_frame(how: str, re
     model.multiplier_tolerance = 1e-5
     model.train()  # training has no tolerance
     torch.testing.assert_close(model(initial, 5000, readout), exact, rtol=0, atol=0)
-
-
-@torch.no_grad()
-@pytest.mark.parametrize("kind", ["displacement_velocity", "two_frames"])
-def test_physics_initialisation_knows_how_the_string_moves(kind: InputKind) -> None:
-    """A start in the middle of the linear motion; the multiplier is held at 1."""
-    string, modes, rate_hz = StringParameters(), 10, 8_000
-    model = KoopmanVar(KoopmanVarConfiguration(101, 12, (4,), kind))
-    model.initialise("physics", Physics(string.resonator(modes), rate_hz), torch.Generator().manual_seed(0))
-    model.multiplier[-1].weight.zero_()
-    model.decoder.weight[:, modes:] = 0
-    amplitudes = torch.randn(1, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
-    solver = SplittingSolver(string.resonator(modes, tension_modulated=False), rate_hz)
-    frames, state = solver.advance(ModalState.at_rest(amplitudes), 30)
-    second = state.velocity / rate_hz if kind == "displacement_velocity" else frames[:, -2]
-    start = model.encode(to_grid(frames[:, -1], 101).float(), to_grid(second, 101).float())
-    truth = to_grid(solver.advance(state, 400)[0], 101).float()
-    found, _ = model.eval().advance(start, 400)
-    assert float((found - truth).norm() / truth.norm()) < 1e-5
 
 
 @torch.no_grad()

@@ -115,7 +115,19 @@ def test_paper_initialisation_is_hippo_in_blocks_with_steps_in_range() -> None:
         torch.testing.assert_close(seq.Lambda_im, rates.imag[:4].repeat(4).float())
         assert (seq.Lambda_re == -0.5).all()
         step = seq.log_step.exp()
-        assert 0.001 <= float(step.min()) < float(step.max()) <= 0.1
+        assert 0.0001 <= float(step.min()) < float(step.max()) <= 0.1
+
+
+@pytest.mark.parametrize(("how", "fan_in", "smallest"), [("paper", 128 * 101, 1e-4), ("physics", 128, 1e-3)])
+@torch.no_grad()
+def test_the_papers_code_counts_the_outputs_in_the_fan_in_and_begins_with_shorter_steps(
+    how: str, fan_in: int, smallest: float
+) -> None:
+    layer = S5Layer(64, 101, 101, 16)
+    layer.initialise(how, torch.Generator().manual_seed(0))
+    # real and imaginary parts of variance 1/fan_in each; half of V's columns keep it
+    assert float(layer.C.square().mean()) * fan_in == pytest.approx(1, rel=0.05)
+    assert float(layer.log_step.exp().min()) == pytest.approx(smallest, rel=0.5)
 
 
 @torch.no_grad()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+
 import pytest
 import torch
 
 from engine.models import LRU, S5, LRUConfiguration, S5Configuration
 from engine.models.base import Physics
-from engine.models.ssm import SSMString, evolve, recur
+from engine.models.ssm import Block, SSMString, evolve, recur
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, solve_linear
@@ -16,12 +18,12 @@ PHYSICS = Physics(StringParameters().resonator(10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")
 
 
-def small_model(name: str, seed: int = 0, how: str = "paper", kind: str = "displacement") -> SSMString:
+def small_model(name: str, seed: int = 0, how: str = "paper") -> SSMString:
     model: SSMString
     if name == "lru":
-        model = LRU(LRUConfiguration(21, kind, state_size=24, layers=3))  # type: ignore[arg-type]
+        model = LRU(LRUConfiguration(21, state_size=24, layers=3))
     else:
-        model = S5(S5Configuration(21, kind, state_size=32, hippo_blocks=4, layers=3))  # type: ignore[arg-type]
+        model = S5(S5Configuration(21, state_size=32, hippo_blocks=4, layers=3))
     model.initialise(how, PHYSICS, torch.Generator().manual_seed(seed))
     return model.eval()
 
@@ -128,7 +130,7 @@ def test_an_impulse_is_an_initial_condition(name: str) -> None:
     model = small_model(name).double()
     impulse = torch.zeros(2, 200, 21, dtype=torch.float64)
     impulse[:, 0] = initial().double()
-    driven, state = model.drive(model.rest(2), impulse)
+    driven, state = model.excite(model.initial_state(2), impulse)
     plucked, other = model.advance(model.encode(impulse[:, 0]), 200)
     torch.testing.assert_close(driven, plucked, rtol=0, atol=1e-11)
     for mine, theirs in zip(state.latents, other.latents, strict=True):
@@ -141,12 +143,12 @@ def test_an_excitation_adds_to_the_motion(name: str) -> None:
     """Silence advances; the first layer superposes; any splitting is the same motion."""
     model = small_model(name)
     state = model.encode(initial())
-    silent, _ = model.drive(state, torch.zeros(2, 70, 21))
+    silent, _ = model.excite(state, torch.zeros(2, 70, 21))
     torch.testing.assert_close(silent, model.advance(state, 70)[0], rtol=1e-4, atol=1e-5)
     excitation = torch.randn(2, 300, 21, generator=torch.Generator().manual_seed(4))
-    whole, last = model.drive(state, excitation)
-    first, state = model.drive(state, excitation[:, :77])
-    second, state = model.drive(state, excitation[:, 77:])
+    whole, last = model.excite(state, excitation)
+    first, state = model.excite(state, excitation[:, :77])
+    second, state = model.excite(state, excitation[:, 77:])
     torch.testing.assert_close(torch.cat([first, second], 1), whole, rtol=1e-4, atol=1e-4)
     superposed = model.encode(excitation[:, 0] + excitation[:, 1]).latents[0]
     torch.testing.assert_close(
@@ -156,24 +158,13 @@ def test_an_excitation_adds_to_the_motion(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("kind", ["displacement", "displacement_velocity", "two_frames"])
 @torch.no_grad()
-def test_physics_initialisation_is_the_linear_string(name: str, kind: str) -> None:
-    model = small_model(name, how="physics", kind=kind)
+def test_physics_initialisation_is_the_linear_string(name: str) -> None:
+    model = small_model(name, how="physics")
     amplitudes = torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
-    start = 0 if kind == "displacement" else 7  # later, the string has a velocity
-    times_s = (start + torch.arange(-1, 201, dtype=torch.float64)) / PHYSICS.rate_hz
-    moving = solve_linear(PHYSICS.resonator, ModalState.at_rest(amplitudes), times_s.clamp(min=0))
-    truth = to_grid(moving, 21).float()
-    second = None
-    if kind == "displacement_velocity":
-        near_s = (start + torch.tensor([-1e-3, 1e-3], dtype=torch.float64)) / PHYSICS.rate_hz
-        earlier, later = solve_linear(PHYSICS.resonator, ModalState.at_rest(amplitudes), near_s).unbind(1)
-        second = to_grid((later - earlier) / 2e-3, 21).float()
-    elif kind == "two_frames":
-        second = truth[:, 0]
-    found, _ = model.advance(model.encode(truth[:, 1], second), 200)
-    torch.testing.assert_close(found, truth[:, 2:], rtol=0, atol=2e-3 * float(truth.abs().max()))
+    times_s = torch.arange(201, dtype=torch.float64) / PHYSICS.rate_hz
+    truth = to_grid(solve_linear(PHYSICS.resonator, ModalState.at_rest(amplitudes), times_s), 21).float()
+    torch.testing.assert_close(model(truth[:, 0], 200), truth[:, 1:], rtol=0, atol=2e-3 * float(truth.abs().max()))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -197,3 +188,58 @@ def test_physics_initialisation_needs_a_state_for_each_mode(name: str) -> None:
         model.initialise("physics", Physics(StringParameters().resonator(30), 4_000), torch.Generator())
     with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
         model.initialise("guess", PHYSICS, torch.Generator())
+
+
+def changed_by(model: SSMString, how: str) -> None:
+    """Another weight, or another statistic of a batch norm."""
+    block = model.layers[1]
+    assert isinstance(block, Block)
+    if how == "in place":
+        with torch.no_grad():
+            block.seq.C.mul_(2.0)
+    elif how == "memory":
+        block.seq.D.data = block.seq.D.data * 2 + 1
+    elif how == "parameter":
+        block.seq.B = torch.nn.Parameter(2 * block.seq.B.detach())
+    elif how == "loaded":
+        model.load_state_dict({name: 1.5 * value for name, value in model.state_dict().items()})
+    elif how == "optimiser":
+        optimiser = torch.optim.AdamW(model.parameters(), lr=0.1)
+        model.train()(initial(), 8).square().mean().backward()
+        block.normalization.eval()
+        optimiser.step()
+    else:
+        model.train()(10 * initial(), 8)
+    model.eval()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("how", ["in place", "memory", "parameter", "loaded", "optimiser", "statistics"])
+def test_what_was_folded_for_rendering_follows_the_weights(name: str, how: str) -> None:
+    model = small_model(name)
+    with torch.no_grad():
+        before = model(initial(), 40)
+        assert torch.equal(model(initial(), 40), before)
+    changed_by(model, how)
+    with torch.no_grad():
+        rendered = model(initial(), 40)
+    assert not torch.allclose(rendered, before, rtol=1e-3)
+    with torch.enable_grad():
+        plain = model(initial(), 40).detach()  # by the definition: nothing is folded
+    torch.testing.assert_close(rendered, plain, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@torch.no_grad()
+def test_blocks_are_folded_once_and_a_copy_folds_its_own(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model, folds = small_model(name), []
+    fold = Block.fold
+    monkeypatch.setattr(Block, "fold", lambda block: folds.append(block) or fold(block))
+    first = model(initial(), 40)
+    assert len(folds) == len(model.layers)
+    state = model.encode(initial())
+    for _ in range(3):
+        _, state = model.advance(state, 7)
+    assert len(folds) == len(model.layers)
+    assert torch.equal(copy.deepcopy(model)(initial(), 40), first)
+    assert len(folds) == 2 * len(model.layers)

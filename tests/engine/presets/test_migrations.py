@@ -63,6 +63,13 @@ def test_version_1_is_told_what_its_start_knew(model: str, initialisation: str, 
     assert old["format_version"] == 1  # what is given stays as it is
 
 
+def test_the_input_of_version_3_is_what_every_model_sets_out_from() -> None:
+    old = {"format_version": 3, "model_configuration": {"state_size": 3, "input": "displacement"}}
+    assert migrated(old) == {"format_version": FORMAT_VERSION, "model_configuration": {"state_size": 3}}
+    with pytest.raises(UnknownVersion, match="input 'two_frames' is no longer read; train the model again"):
+        migrated({"format_version": 3, "model_configuration": {"input": "two_frames"}})
+
+
 @pytest.mark.parametrize("version", [None, 0, -1, "1", True, 1.0, FORMAT_VERSION + 1])
 def test_other_versions_are_refused(version: Any) -> None:
     remedy = "update the program" if version == FORMAT_VERSION + 1 else "get the preset again"
@@ -82,6 +89,7 @@ def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset: Path, t
         facts = json.loads(file.metadata()[METADATA_KEY])
     del facts["knows"]
     facts["format_version"] = 1
+    facts["model_configuration"]["input"] = "displacement"
     path = tmp_path / "old.safetensors"
     save_file(load_file(small_preset), path, metadata={METADATA_KEY: json.dumps(facts)})
     old, new = load_preset(path), load_preset(small_preset)

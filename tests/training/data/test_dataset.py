@@ -13,21 +13,16 @@ import torch
 from engine.truth import ModalState, SplittingSolver
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration
-from training.data.dataset import START_EVERY, Dataset, dataset_folder, draw_initial, load_dataset, split_rows
+from training.data.dataset import Dataset, dataset_folder, draw_initial, load_dataset, split_rows
 
 TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
 
 
-def test_amplitudes_and_velocities_are_the_solvers(small_dataset: Dataset) -> None:
+def test_amplitudes_are_the_solvers(small_dataset: Dataset) -> None:
     c = small_dataset.configuration
     solver = SplittingSolver(c.resonator, c.rate_hz)
     state = ModalState.at_rest(draw_initial(c))
     assert torch.equal(small_dataset.amplitudes, solver.solve(state, c.steps).float())
-    for start in range(small_dataset.velocities.shape[1]):
-        velocity = state.velocity if start == 0 else solver.advance(state, start * START_EVERY)[1].velocity
-        assert torch.equal(small_dataset.velocities[:, start], velocity.float())
-    assert small_dataset.velocities.shape == (20, 5, 5)
-    assert not small_dataset.velocities[:, 0].any()
 
 
 def test_a_draw_that_would_break_the_string_is_softened() -> None:
@@ -89,7 +84,6 @@ def test_a_stride_keeps_some_of_the_frames_and_all_of_the_motion(tmp_path: Path)
     every = load_dataset(replace(TINY, steps=450), tmp_path)
     some = load_dataset(replace(TINY, steps=450, stride=3), tmp_path)
     assert torch.equal(some.amplitudes, every.amplitudes[:, ::3])
-    assert torch.equal(some.velocities, every.velocities[:, [0, 3]])
     with pytest.raises(ValueError, match="steps must be a multiple of stride, 4, not 30"):
         replace(TINY, stride=4)
 
@@ -100,9 +94,9 @@ def damage(folder: Path, how: str) -> None:
         file = folder / "amplitudes.npy"
         file.write_bytes(file.read_bytes()[:-100])
     elif how == "missing":
-        (folder / "velocities.npy").unlink()
+        (folder / "amplitudes.npy").unlink()
     elif how == "type":
-        np.save(folder / "velocities.npy", np.zeros((10, 1, 4)))
+        np.save(folder / "amplitudes.npy", np.zeros((10, 31, 4)))
     elif how == "zeros":
         file = folder / "amplitudes.npy"
         whole = file.read_bytes()

@@ -227,15 +227,6 @@ def test_dmd_is_computed_at_once(small_dataset: Dataset, runs: Path) -> None:
     assert found.validation.rel_mae < 0.3  # 10 ms of a string that is nearly linear
 
 
-def test_a_model_that_is_told_velocities_learns_from_moving_strings(small_dataset: Dataset, runs: Path) -> None:
-    sizes = {**SMALL["koopman_integrated"], "input": "displacement_velocity"}
-    configuration = small("koopman_integrated", random_start=True)
-    found = fit(replace(configuration, model_configuration=sizes), small_dataset, runs)
-    assert found.validation.rel_mae < 0.1  # measured from rest
-    with pytest.raises(ValueError, match="random_start needs a model of the input 'displacement_velocity'"):
-        fit(configuration, small_dataset, runs / "other")
-
-
 def test_learning_rates_follow_the_recipe() -> None:
     cycle = Recipe(epochs=1, peak_learning_rate=1.0, start_share=0.1, warm_up=0.25)
     assert [learning_rate_at(cycle, share) for share in (0, 0.125, 0.25, 0.625, 1)] == pytest.approx(
@@ -261,7 +252,7 @@ class _Shifted(torch.nn.Module):
 
 
 def test_the_loss_of_a_model_without_latents_is_its_prediction_alone() -> None:
-    batch = Batch(torch.zeros(2, 3), None, torch.tensor([1, 4]), torch.full((2, 2, 3), 3.0))
+    batch = Batch(torch.zeros(2, 3), torch.tensor([1, 4]), torch.full((2, 2, 3), 3.0))
     model: Any = _Shifted()
     loss, error = training_loss(model, batch, Recipe(epochs=1, prediction_weight=2.0))
     assert (float(loss), float(error)) == (8.0, 4.0)
@@ -271,7 +262,7 @@ def test_the_loss_of_a_model_without_latents_is_its_prediction_alone() -> None:
 
 def test_a_relative_loss_counts_soft_strings_as_loud_ones() -> None:
     target = torch.stack([torch.full((2, 3), 4.0), torch.full((2, 3), 0.01)])
-    batch = Batch(torch.zeros(2, 3), None, torch.tensor([1, 4]), target)
+    batch = Batch(torch.zeros(2, 3), torch.tensor([1, 4]), target)
     model: Any = _Shifted()  # which says 1: beside 4 an error of 3/4, beside 0.01 of 99
     loss, error = training_loss(model, batch, Recipe(epochs=1, loss="relative_mse"))
     assert float(loss) == pytest.approx((0.75**2 + 99**2) / 2)

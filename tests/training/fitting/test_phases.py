@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import Koopman, KoopmanConfiguration, KoopmanIntegrated, build_model
+from engine.models import Koopman, KoopmanConfiguration, KoopmanIntegrated, StringModel, build_model
 from engine.models.integrated_phase import IntegratedPhaseConfiguration
+from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.fitting.fit import PHASES, fit, initialisation_of
-from training.fitting.modes import Modes
+from training.fitting.fit import fit
+from training.fitting.modes import Modes, found_modes
 from training.fitting.phases import _Motion, _upright, fit_phases, mean_motions, start_from_phases
+from training.knowledge import COUNT, PHASES, SYMMETRIES, initialisation_of, knowledge_of
 
 STEPS = 450
 
@@ -82,7 +84,7 @@ def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(
 ) -> None:
     """FGRU's frequencies follow the squares; FRNN is the linear string that is nearest."""
     cell = build_model(model)
-    start_from_phases(cell, small_dataset, 200, seed=0)
+    start_from_phases(cell, found_modes(small_dataset, 200), seed=0)
     error = evaluate_model(cell, small_dataset, "validation", 200).total()
     assert error.rel_mse < largest
 
@@ -92,7 +94,7 @@ def test_it_predicts_strings_that_the_fit_has_not_seen(
     small_dataset: Dataset, state_size: int, physical_units: bool
 ) -> None:
     model = integrated_phase(state_size, physical_units)
-    start_from_phases(model, small_dataset, STEPS, seed=0)
+    start_from_phases(model, found_modes(small_dataset, STEPS), seed=0)
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
     linear = small_dataset.configuration.string.resonator(5).eigenvalues() / small_dataset.configuration.rate_hz
     torch.testing.assert_close(model.theta_log[:5].exp(), linear.imag, rtol=2e-3, atol=0)
@@ -106,19 +108,96 @@ def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
     )
     assert initialisation_of(configuration) == PHASES
     untrained = integrated_phase()
-    start_from_phases(untrained, small_dataset, STEPS, recipe.seed)
+    start_from_phases(untrained, found_modes(small_dataset, STEPS), recipe.seed)
     expected = evaluate_model(untrained, small_dataset, "validation", STEPS).total()
     assert fit(configuration, small_dataset, runs).validation.rel_mae == pytest.approx(expected.rel_mae, rel=1e-2)
 
 
 def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
     with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
-        start_from_phases(integrated_phase(4), small_dataset, STEPS, seed=0)
+        start_from_phases(integrated_phase(4), found_modes(small_dataset, STEPS), seed=0)
     with pytest.raises(ValueError, match="needs one of the models koopman_integrated, fgru, frnn"):
-        start_from_phases(Koopman(KoopmanConfiguration()), small_dataset, STEPS, seed=0)
+        start_from_phases(Koopman(KoopmanConfiguration()), found_modes(small_dataset, STEPS), seed=0)
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
     with pytest.raises(ValueError, match="stride must be 1, not 2"):
-        start_from_phases(integrated_phase(), strided, STEPS, seed=0)
+        found_modes(strided, STEPS)
     data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
     with pytest.raises(ValueError, match="or one of koopman_integrated, fgru, frnn, not 's5'"):
         TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, blind=True))
+
+
+def test_latents_follow_the_modes_of_a_blind_integrated_phase_alone() -> None:
+    data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
+    with pytest.raises(ValueError, match="and the model 'koopman_integrated', not 'fgru'"):
+        TrainingConfiguration("A test", "fgru", data, Recipe(epochs=1, blind=True, latents_per_mode=1))
+    with pytest.raises(ValueError, match="latents_per_mode needs blind"):
+        TrainingConfiguration("A test", "koopman_integrated", data, Recipe(epochs=1, latents_per_mode=1))
+    recipe = Recipe(epochs=1, blind=True, latents_per_mode=2)
+    with pytest.raises(ValueError, match="state_size follows latents_per_mode"):
+        sizes = {"state_size": 10}
+        TrainingConfiguration("A test", "koopman_integrated", data, recipe, model_configuration=sizes)
+
+
+BLIND_CELLS = [
+    Cell(model, True, "gaussian", rate_hz, recipe="blind")
+    for model in ("koopman", "koopman_integrated")
+    for rate_hz in (4000, 16000)
+]
+
+
+@pytest.mark.parametrize("cell", BLIND_CELLS, ids=lambda cell: cell.name)
+def test_the_blind_recipe_is_given_nothing_of_the_string(cell: Cell) -> None:
+    configuration = configuration_of(cell)
+    assert knowledge_of(configuration) == ""
+    assert not configuration.recipe.flip
+    assert "state_size" not in configuration.model_configuration
+
+
+def test_hints_are_told() -> None:
+    koopman, phase = (
+        configuration_of(Cell(model, True, "gaussian", 4000, recipe="hinted"))
+        for model in ("koopman", "koopman_integrated")
+    )
+    assert knowledge_of(koopman) == SYMMETRIES
+    assert knowledge_of(phase) == f"{SYMMETRIES}, and {COUNT}"
+
+
+def blind_weights(cell: Cell, dataset: Dataset, runs: Path) -> StringModel:
+    """Of the committed recipe, cut short."""
+    c = dataset.configuration
+    data = {"modes": c.modes, "steps": c.steps, "count": c.count}
+    recipe = {"epochs": 4, "batch_size": 8, "validate_every": 2}
+    if cell.model == "koopman":
+        recipe |= {"latent_epochs": 3, "latent_polish": 1}
+    configuration = configuration_of(replace(cell, horizon=STEPS), data, recipe)
+    return fit(replace(configuration, data=c), dataset, runs).model
+
+
+@pytest.mark.parametrize("model", ["koopman", "koopman_integrated"])
+def test_the_same_displacement_of_another_claimed_string_gives_the_same_weights(
+    small_dataset: Dataset, runs: Path, model: str
+) -> None:
+    cell = Cell(model, True, "gaussian", 4000, recipe="blind")
+    c = small_dataset.configuration
+    string = replace(c.string, length_m=1.3, tension_n=20.0, density_kg_m3=7850.0, damping_d3_kg_m_s=0.0)
+    claimed = replace(
+        small_dataset, configuration=replace(c, string=string, tension_modulated=False, initial="noise")
+    )
+    own, other = (
+        blind_weights(cell, each, runs / name) for name, each in (("own", small_dataset), ("other", claimed))
+    )
+    for name, weights in own.state_dict().items():
+        assert torch.equal(weights, other.state_dict()[name]), name
+
+
+def test_the_number_of_modes_is_found_and_no_claim_of_more_changes_it(small_dataset: Dataset, runs: Path) -> None:
+    cell = Cell("koopman_integrated", True, "gaussian", 4000, recipe="blind")
+    amplitudes = torch.nn.functional.pad(small_dataset.amplitudes, (0, 2))  # two more that never move
+    c = replace(small_dataset.configuration, modes=7)
+    claimed = replace(small_dataset, configuration=c, amplitudes=amplitudes)
+    own, other = (
+        blind_weights(cell, each, runs / name) for name, each in (("own", small_dataset), ("other", claimed))
+    )
+    assert own.configuration.state_size == other.configuration.state_size == 5
+    error, again = (evaluate_model(each, small_dataset, "validation", STEPS).total() for each in (own, other))
+    assert again.rel_mae == pytest.approx(error.rel_mae, rel=0.05)  # sums of seven products are rounded otherwise

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from training.cell import Cell, configuration_of
+from training.knowledge import PHASES
 from training.results import Row
 from training.tables.markdown import as_markdown
 from training.tables.paper import COLUMNS, Column, Figure
@@ -109,11 +110,19 @@ def test_the_test_split_stands_below_with_words_of_its_own() -> None:
     assert "… test split" not in as_markdown([row()])  # where nothing was measured
 
 
-def test_blind_runs_that_were_told_of_the_string_are_marked() -> None:
-    cell = Cell("koopman_integrated", True, "gaussian", 4000, recipe="blind")
-    told, pure = (row(cell, initialisation=how) for how in ("phases of the displacement", "phases"))
-    assert line(table(as_markdown([told]), "Non-linear", 4000), "integrated phase", "blind recipe §")
-    assert line(table(as_markdown([pure]), "Non-linear", 4000), "integrated phase", "blind recipe")
+def test_black_boxes_with_a_hint_are_marked() -> None:
+    rows = [
+        row(Cell(model, True, "gaussian", 4000, horizon, recipe), initialisation=PHASES)
+        for model, horizon, recipe in (
+            ("koopman_integrated", 4000, "hinted"),
+            ("koopman_integrated", 4000, "blind"),
+            ("fgru", 400, "ours"),
+        )
+    ]
+    cells = table(as_markdown(rows), "Non-linear", 4000)
+    assert line(cells, "integrated phase", "hinted recipe §")
+    assert line(cells, "integrated phase", "blind recipe")
+    assert line(table(as_markdown(rows), "Non-linear", 400), "FGRU", "our recipe §")
 
 
 def test_what_was_not_run_is_said_to_be_so() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from app.analysis.abx.sound import END_S, make_stimuli
 from app.analysis.abx.trials import Identity
-from engine.kernels.mixer import CEILING
+from engine.kernels.limiter import CEILING
 
 RATE_HZ = 8000
 IDENTITIES: tuple[Identity, Identity] = ("A", "B")

@@ -1,0 +1,66 @@
+"""The safety limiter: its gain falls before the peak that it is for, so smoothly that nothing clicks.
+
+What is given waits for `AHEAD` frames. The gain that a frame needs is held for as long (the highest of the last
+`AHEAD` + 1 frames, or what is left of an earlier peak by an exponential release) and then averaged over as many
+frames: of the gains averaged each has held what the delayed frame needs, so that their mean is low enough for it.
+The average is two moving averages, one of the other: a triangle of weights, so that the gain has no corners. It
+changes by `STEEPEST` a frame at most. The form is well known: peak hold, release, stacked moving averages and delay,
+as in G. Luff, "Designing a straightforward limiter", Signalsmith Audio, 2022.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import layout as at
+from engine.kernels.compiled import COMPILED
+
+CEILING = 10 ** (-0.3 / 20)
+BELIEVED = 100.0  # +40 dBFS: the level that is believed at most, so that one wild sample is soon forgotten
+AHEAD, QUANTUM = at.AHEAD, at.QUANTUM
+_SIDE = AHEAD // 2 + 1  # frames of either average
+STEEPEST = 1 / _SIDE  # of the gain a frame, were it to fall to nothing
+
+
+@njit(**COMPILED)
+def limit(mixer: np.ndarray) -> None:
+    """Takes the mix, (QUANTUM, 2), and leaves there what is `AHEAD` frames older, within ±`CEILING`.
+
+    Where nothing within reach exceeds the ceiling, samples stay as they are.
+    """
+    mix = mixer[at.M_MIX : at.M_MIX + 2 * QUANTUM].reshape(QUANTUM, 2)
+    waiting = mixer[at.M_WAITING : at.M_WAITING + 2 * (AHEAD + QUANTUM)].reshape(AHEAD + QUANTUM, 2)
+    peaks = mixer[at.M_PEAKS : at.M_PEAKS + AHEAD + QUANTUM]
+    gains = mixer[at.M_GAINS : at.M_GAINS + AHEAD + QUANTUM]
+    for frame in range(QUANTUM):
+        left, right = mix[frame, 0], mix[frame, 1]
+        waiting[AHEAD + frame, 0], waiting[AHEAD + frame, 1] = left, right
+        peaks[AHEAD + frame] = min(max(abs(left), abs(right)), BELIEVED)
+    if mixer[at.M_LIMITER] > CEILING or peaks.max() > CEILING or gains[:AHEAD].min() < 1.0:
+        _reduce(mixer, mix, waiting, peaks, gains)
+    else:
+        gains[AHEAD:] = 1.0
+        mix[:] = waiting[:QUANTUM]
+    for frame in range(AHEAD):
+        waiting[frame, 0], waiting[frame, 1] = waiting[QUANTUM + frame, 0], waiting[QUANTUM + frame, 1]
+        peaks[frame], gains[frame] = peaks[QUANTUM + frame], gains[QUANTUM + frame]
+
+
+@njit(**COMPILED)
+def _reduce(mixer: np.ndarray, mix: np.ndarray, waiting: np.ndarray, peaks: np.ndarray, gains: np.ndarray) -> None:
+    level, release, reduction = mixer[at.M_LIMITER], mixer[at.M_RELEASE], mixer[at.M_REDUCTION]
+    for frame in range(AHEAD, AHEAD + QUANTUM):
+        level *= release
+        for before in range(AHEAD + 1):
+            level = max(level, peaks[frame - before])
+        gains[frame] = min(1.0, CEILING / level)
+    for frame in range(QUANTUM):
+        total = 0.0
+        for after in range(AHEAD + 1):  # the weights are whole numbers: a gain of 1 throughout remains exactly that
+            total += (min(after, AHEAD - after) + 1) * gains[frame + after]
+        gain = total / _SIDE**2
+        reduction = min(reduction, gain)
+        for side in range(2):
+            mix[frame, side] = min(max(waiting[frame, side] * gain, -CEILING), CEILING)
+    mixer[at.M_LIMITER], mixer[at.M_REDUCTION] = level, reduction

@@ -1,0 +1,78 @@
+"""Axes are painted when they change, and not with every curve: that is most of what a painting takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pyqtgraph as pg
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.views.plots.spectrum_view import SpectrumView, analyser_at
+from app.views.plots.waveform_view import WaveformView
+
+RATE_HZ = 16_000
+
+
+@pytest.fixture
+def painted(monkeypatch: pytest.MonkeyPatch) -> list[pg.AxisItem]:
+    """Axes that have been painted, each time."""
+    found: list[pg.AxisItem] = []
+    paint = pg.AxisItem.paint
+
+    def watched(self: pg.AxisItem, *arguments: object) -> None:
+        found.append(self)
+        paint(self, *arguments)
+
+    monkeypatch.setattr(pg.AxisItem, "paint", watched)
+    return found
+
+
+def draw_waveform(view: WaveformView, turn: int) -> None:
+    view.set_scale(1.0, "displacement", "mm")
+    view.show_signal("model", np.sin(np.arange(100 * (turn + 1)) / 9).astype(np.float32), RATE_HZ)
+
+
+def draw_spectrum(view: SpectrumView, turn: int) -> None:
+    view.show_signal("model", np.sin(np.arange(4096) / (9 + turn)).astype(np.float32), analyser_at(RATE_HZ))
+
+
+@pytest.mark.parametrize(
+    ("make", "draw"), [(WaveformView, draw_waveform), (SpectrumView, draw_spectrum)], ids=["waveform", "spectrum"]
+)
+def test_axes_stay_while_curves_move(
+    qtbot: QtBot, painted: list[pg.AxisItem], make: Callable[[], pg.QtWidgets.QWidget], draw: Callable[..., None]
+) -> None:
+    view = make()
+    qtbot.addWidget(view)
+    view.resize(500, 300)
+    view.show()
+    qtbot.waitExposed(view)
+    draw(view, 0)
+    qtbot.wait(100)
+    assert painted  # once
+    painted.clear()
+    for turn in range(1, 6):
+        draw(view, turn)
+        qtbot.wait(30)
+    assert painted == []
+
+
+def test_what_is_kept_follows_the_view(qtbot: QtBot, painted: list[pg.AxisItem]) -> None:
+    view = WaveformView()
+    qtbot.addWidget(view)
+    view.resize(500, 300)
+    view.set_take(2.0, 1.0)
+    view.show()
+    qtbot.waitExposed(view)
+    qtbot.wait(100)
+    item = view.getPlotItem()
+    for change, side in (
+        (lambda: view.zoom(0.5), "bottom"),
+        (lambda: view.set_scale(3.0, "velocity", "m/s"), "left"),
+    ):
+        painted.clear()
+        change()
+        qtbot.wait(50)
+        assert item.getAxis(side) in painted
