@@ -13,6 +13,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from engine.models.base import AnyFrameModel
 from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
@@ -40,10 +41,15 @@ class SourceState:
 
 
 class StringSource(ABC):
-    """Frames of displacement in m after an initial displacement at rest."""
+    """Frames of displacement in m after an initial displacement at rest.
+
+    Attributes:
+        any_frame: whether frames that `sample` leaves out are not computed; otherwise it takes as long as `advance`.
+    """
 
     rate_hz: int
     grid_points: int
+    any_frame: bool
 
     @abstractmethod
     def start(self, displacement_m: Tensor) -> SourceState:
@@ -52,6 +58,17 @@ class StringSource(ABC):
     @abstractmethod
     def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
         """The next frames, (batch, steps, grid_points), or (…, points) where `readout` (grid_points, points) says.
+
+        Raises:
+            Runaway: see there.
+        """
+
+    @abstractmethod
+    def sample(self, state: SourceState, frames: Tensor, steps: int) -> tuple[Tensor, SourceState]:
+        """As `advance` on the whole grid, of which only some frames are kept, (batch, frames, grid_points).
+
+        Args:
+            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
 
         Raises:
             Runaway: see there.
@@ -66,6 +83,7 @@ class ModelSource(StringSource):
         self._scale_m = preset.info.scale_m
         self.rate_hz = preset.info.rate_hz
         self.grid_points = preset.info.grid_points
+        self.any_frame = isinstance(self._model, AnyFrameModel)
 
     @torch.inference_mode()
     def start(self, displacement_m: Tensor) -> SourceState:
@@ -77,12 +95,29 @@ class ModelSource(StringSource):
     @torch.inference_mode()
     def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
         frames, inner = self._model.advance(state.inner, steps, readout)
-        frames = frames * self._scale_m
-        believable = frames.abs() <= state.limit_m  # False for a NaN
+        return self._believed(frames, torch.arange(1, steps + 1), state), self._after(state, inner, steps)
+
+    @torch.inference_mode()
+    def sample(self, state: SourceState, frames: Tensor, steps: int) -> tuple[Tensor, SourceState]:
+        if isinstance(self._model, AnyFrameModel) and len(frames) < steps:
+            found, inner = self._model.sample(state.inner, frames, steps)
+        else:
+            found, inner = self._model.advance(state.inner, steps)
+            found = found if len(frames) == steps else found[:, frames - 1]
+        return self._believed(found, frames, state), self._after(state, inner, steps)
+
+    def _believed(self, found: Tensor, frames: Tensor, state: SourceState) -> Tensor:
+        """In m. Raises Runaway."""
+        found = found * self._scale_m
+        believable = found.abs() <= state.limit_m  # False for a NaN
         if not bool(believable.all()):
             first = int((~believable).any(dim=2).any(dim=0).nonzero()[0])
-            raise Runaway((state.frame + 1 + first) / self.rate_hz)
-        return frames, SourceState(inner, state.frame + steps, state.limit_m)
+            raise Runaway((state.frame + int(frames[first])) / self.rate_hz)
+        return found
+
+    @staticmethod
+    def _after(state: SourceState, inner: Any, steps: int) -> SourceState:
+        return SourceState(inner, state.frame + steps, state.limit_m)
 
 
 class TruthSource(StringSource):
@@ -95,6 +130,7 @@ class TruthSource(StringSource):
     def __init__(self, info: PresetInfo, substeps: int | None = None) -> None:
         self.rate_hz = info.rate_hz
         self.grid_points = info.grid_points
+        self.any_frame = True  # it steps through all of them, which is little beside their shapes
         self._resonator = info.resonator
         self._solver = SplittingSolver(self._resonator, info.rate_hz, substeps=substeps, silence=SILENCE)
 
@@ -107,6 +143,10 @@ class TruthSource(StringSource):
         shapes = self._resonator.shapes
         to_points = shapes if readout is None else shapes @ readout.double()
         return amplitudes @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
+
+    def sample(self, state: SourceState, frames: Tensor, steps: int) -> tuple[Tensor, SourceState]:
+        amplitudes, inner = self._solver.sample(state.inner, frames, steps)
+        return amplitudes @ self._resonator.shapes, SourceState(inner, state.frame + steps, state.limit_m)
 
 
 def project(displacement_m: Tensor, modes: int) -> Tensor:

@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 from engine.models import KoopmanVar, KoopmanVarConfiguration
 from engine.models.base import Physics
 from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
 from engine.schema import write
+from engine.voices.derivative import REACH_FRAMES, differentiator_taps
+
+Derivative = Callable[[NDArray[np.floating], int], NDArray[np.float64]]
+
+
+@pytest.fixture(scope="session")
+def derivative() -> Derivative:
+    """Velocity of all of a displacement (frames, points): at rest before it, and turned about its last frame."""
+
+    def of(signal: NDArray[np.floating], rate_hz: int) -> NDArray[np.float64]:
+        before, behind = signal[REACH_FRAMES:0:-1], 2 * signal[-1:] - signal[-2 : -REACH_FRAMES - 2 : -1]
+        whole = np.concatenate([before, signal, behind]).astype(np.float64)
+        taps = differentiator_taps(rate_hz)[::-1]  # `np.convolve` turns them again
+        return np.stack([np.convolve(column, taps, "valid") for column in whole.T], axis=1)
+
+    return of
 
 
 @pytest.fixture(scope="session")

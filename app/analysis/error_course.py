@@ -30,10 +30,10 @@ class ErrorCourse:
 
     def __init__(self, take: Take) -> None:
         self.take = take
-        self.window_frames = max(round(WINDOW_PERIODS * take.info.rate_hz / take.fundamental_hz), 1)
+        self.window_frames = max(round(WINDOW_PERIODS * take.picture_hz / take.fundamental_hz), 1)
         self.ready = 0
         self.windows = (take.frames - 1) // self.window_frames
-        self.middle_s = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s + 1 / take.info.rate_hz
+        self.middle_s = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s + 1 / take.picture_hz
         self.curves = {name: np.empty(self.windows) for name in CURVES}
 
     @property
@@ -42,7 +42,7 @@ class ErrorCourse:
 
     @property
     def window_s(self) -> float:
-        return self.window_frames / self.take.info.rate_hz
+        return self.window_frames / self.take.picture_hz
 
     def advance(self) -> bool:
         length = self.window_frames

@@ -1,6 +1,6 @@
 """Displacement over time and place as a picture, at any zoom without aliasing.
 
-Where a pixel's column is less than a frame, every frame is drawn. Where it is many, but a small part of a period,
+Where a pixel's column is less than a picture, every picture is drawn. Where it is many, but a small part of a period,
 each place shows its extreme in the column. Where it is more, signs would be moiré: each place shows its largest
 magnitude, from envelopes that were computed once.
 """
@@ -28,7 +28,7 @@ class Picture:
     """Displacement in m, float32 (places, columns), of the times start_s … stop_s.
 
     Attributes:
-        detail: what a column is: a frame, the extreme of its frames, or the largest magnitude of its frames.
+        detail: what a column is: a picture, the extreme of its pictures, or their largest magnitude.
     """
 
     displacement_m: NDArray[np.float32]
@@ -51,7 +51,7 @@ class Picture:
 
 
 def motion_of(take: Take, quantity: str, first: int, last: int) -> NDArray[np.float32]:
-    """Frames first … last (frames, places) of "model", "truth" or "error": model − truth, in m."""
+    """Pictures first … last (pictures, places) of "model", "truth" or "error": model − truth, in m."""
     if quantity == "error":
         return take.motion_m("model")[first:last] - take.motion_m("truth")[first:last]
     return take.motion_m(quantity)[first:last]
@@ -62,7 +62,7 @@ class Envelopes:
 
     def __init__(self, take: Take) -> None:
         self.take = take
-        self.stride = max(round(STRIDE_S * take.info.rate_hz), 1)  # frames
+        self.stride = max(round(STRIDE_S * take.picture_hz), 1)  # pictures
         self.ready = 0
         columns = take.frames // self.stride  # what is left at the end is less than a pixel
         self._largest_m = {name: np.empty((columns, take.info.grid_points), np.float32) for name in QUANTITIES}
@@ -93,7 +93,7 @@ class Envelopes:
 
     def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
         """Half as much again as the median over these times of the string's peak, as far as it is ready."""
-        column_s = self.stride / self.take.info.rate_hz
+        column_s = self.stride / self.take.picture_hz
         first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
         peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]
         return 1.5 * float(np.median(peaks_m)) if len(peaks_m) else 0.0
@@ -102,7 +102,7 @@ class Envelopes:
 def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], columns: int) -> Picture | None:
     """What there is so far of the times in view, in about `columns` columns; None where there is nothing yet."""
     take = envelopes.take
-    rate_hz = take.info.rate_hz
+    rate_hz = take.picture_hz
     detail = detail_for(take, times_s, columns)
     stride = envelopes.stride if detail == "envelope" else 1
     ready = envelopes.ready if detail == "envelope" else take.ready_frames
@@ -125,7 +125,7 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
 def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail:
     """What a column can show of `times_s`."""
     column_s = (times_s[1] - times_s[0]) / columns
-    if column_s * take.info.rate_hz <= 1:
+    if column_s * take.picture_hz <= 1:
         return "frames"
     return "extremes" if column_s * take.fundamental_hz <= LARGEST_SHARE else "envelope"
 

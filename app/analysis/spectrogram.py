@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from app.analysis.heard import HeardMotion, HeardSignal
+from app.analysis.heard import HeardSignal
 from app.rendering import SOURCES, Take
-from engine.voices import Ear
+from app.rendering.take import Listened
 
 FLOOR_DB = -150.0
 WINDOW_PERIODS = 7.0  # of the fundamental: the fewest that tell partials apart with a Hann window, and some more
@@ -28,16 +28,16 @@ class Spectrogram:
         levels_db: (columns, bins) each, for "model", "truth" and "error": model − truth, of the signals.
     """
 
-    def __init__(self, take: Take, listening: Ear) -> None:
-        self.take, self.listening = take, listening
-        self._heard = {name: HeardSignal(HeardMotion(take, name), listening) for name in SOURCES}
+    def __init__(self, take: Take, listened: Listened) -> None:
+        self.take, self.listened = take, listened
+        self._heard = {name: HeardSignal(listened, name) for name in SOURCES}
         rate_hz = take.info.rate_hz
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP
         self.ready = 0
         self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
-        self._window *= np.float32(2 / self._window.sum() / listening.full_scale)
-        self.columns = self._columns_of(take.frames)
+        self._window *= np.float32(2 / self._window.sum() / listened.ear.full_scale)
+        self.columns = self._columns_of(self._heard["truth"].frames)
         shape = (self.columns, self.window_frames // 2 + 1)
         self.levels_db = {name: np.empty(shape, np.float32) for name in ("model", "truth", "error")}
 
@@ -81,7 +81,7 @@ class Spectrogram:
         signal = heard.read(max(first, 0), last)
         if first < 0:
             mirror = heard.read(1, 1 - first)[::-1]
-            if self.listening.pickup == "velocity":
+            if self.listened.ear.pickup == "velocity":
                 mirror = -mirror
             signal = np.concatenate([mirror, signal])
         windows = np.lib.stride_tricks.sliding_window_view(signal, self.window_frames)[:: self.hop]

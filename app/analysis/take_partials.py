@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from engine.partials import (
     track_partials,
 )
 from engine.pluck import Pluck
-from engine.resonators.sine_transform import to_modes
+from engine.resonators.sine_transform import analysis_matrix, to_modes
 from engine.sources import project
 from engine.true_partials import true_phasors
 
@@ -50,15 +51,15 @@ class PartialRow:
 def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     """Rows by window (`WINDOWS`); a window of which the take has too little is left out.
 
-    The truth is simulated again, more densely: its phasors need what lies between the take's frames.
+    Both are rendered again, mode by mode, for a take holds pictures alone; the truth more densely than a frame, for
+    its phasors need what lies between.
     """
     info = take.info
-    last = take.frames - 1 if take.model_ends_s is None else round(take.model_ends_s * info.rate_hz)
+    last = round((take.seconds if take.model_ends_s is None else take.model_ends_s) * info.rate_hz)
     modes_hz = info.resonator.eigenvalues().imag.numpy() / (2 * math.pi)
     length = segment_frames(info.rate_hz, modes_hz[0])
     if last < length:
         return {}
-    model = torch.from_numpy(take.motion_m("model"))
     block = max(1, FRAMES_AT_ONCE // length) * length
     tracks, first = [], 0
     true = true_phasors(
@@ -68,9 +69,8 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
         last,
         block,
     )
-    for truth in true:
-        frames = model[None, first + 1 : first + 1 + truth.shape[1]].double()
-        tracks.append(track_partials(to_modes(frames, info.modes), truth, length))
+    for truth, model in zip(true, _model_modes(take, last, block), strict=True):
+        tracks.append(track_partials(model, truth, length))
         first += truth.shape[1]
         job.report(first / last)
     track = PartialTrack.join(tracks)
@@ -86,6 +86,22 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
             for mode in range(info.modes)
         ]
     return rows
+
+
+def _model_modes(take: Take, steps: int, block: int) -> Iterator[torch.Tensor]:
+    """The model's modal amplitudes in m, (1, up to `block`, modes), of frames 1 … steps."""
+    info, source = take.info, take.model
+    if source is None or not source.any_frame:  # every frame of it is kept
+        motion = take.motion("model")
+        for first in range(1, steps + 1, block):
+            frames = torch.from_numpy(motion.read(first, min(first + block, steps + 1)))
+            yield to_modes(frames[None].double(), info.modes)
+        return
+    analysis = analysis_matrix(info.grid_points, info.modes)
+    state = source.start(project(take.pluck.displacement(info.grid_points), info.modes)[None])
+    for first in range(0, steps, block):
+        amplitudes, state = source.advance(state, min(block, steps - first), analysis)
+        yield amplitudes.double()
 
 
 def _row(mode: int, errors: PartialErrors, window: int, note: str) -> PartialRow:

@@ -1,4 +1,4 @@
-"""bench solver, render, voices, train, app, play, soak: what the program costs here."""
+"""bench solver, render, voices, take, train, app, play, soak: what the program costs here."""
 
 from __future__ import annotations
 
@@ -131,6 +131,21 @@ def voices(json: Json = False) -> None:
         f"targets: {bench.MODEL_VOICES} model voices at {bench.MODEL_SHARE:.0%} of a core,"
         f" {bench.TRUTH_VOICES} truth voices at {bench.TRUTH_SHARE:.0%} and an error of {bench.TRUTH_ERROR:g} at most"
     )
+
+
+@bench.command()
+def take(json: Json = False) -> None:
+    """What the pictures and signals of a pluck of ten seconds cost: time, memory, a listening point that moves."""
+    from app.commands.benchmarks.take import measure
+
+    with progress("bench take") as report:
+        found = measure(report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    columns = ("preset", "s", "pictures Hz", "rendered, processor s", "MB a source", "moved, processor s", "moved, s")
+    print_table(columns, [tuple(asdict(cost).values()) for cost in found.takes])
 
 
 @bench.command()

@@ -68,7 +68,16 @@ def evaluate(
     """Errors on strings that no training has seen, inside the family and beyond it."""
     import torch
 
-    from training.family.errors import Player, averaging, by_rise, linear_string, measure, player, untrained
+    from training.family.errors import (
+        Player,
+        averaged_flow,
+        averaging,
+        by_rise,
+        linear_string,
+        measure,
+        player,
+        untrained,
+    )
     from training.family.strings import COLUMNS
 
     torch.set_num_threads(1)
@@ -80,6 +89,7 @@ def evaluate(
         players |= {
             "kicks without corrections": untrained("kicks"),
             "backward error analysis (1/12)": untrained("series"),
+            "slow flow, third order": averaged_flow,
             "averaging": averaging,
             "linear string": linear_string,
         }

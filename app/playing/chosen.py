@@ -30,9 +30,8 @@ def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
 
 def render_request(choices: Choices, preset: Path, library: Library) -> RenderRequest:
     """What the worker is asked for, other presets in the slots among it."""
-    return RenderRequest(
-        preset, choices.pluck, choices.seconds, tuple(dict.fromkeys(_others(choices, library).values()))
-    )
+    others = tuple(dict.fromkeys(_others(choices, library).values()))
+    return RenderRequest(preset, choices.pluck, choices.seconds, heard_ear(choices), choices.speed, others)
 
 
 def _others(choices: Choices, library: Library) -> dict[str, Path]:

@@ -1,28 +1,27 @@
-"""One pluck in the worker's hands: the motion of its sources, made block by block."""
+"""One pluck in the worker's hands: the motions and signals of its sources, made block by block."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from app.rendering.line import Line
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
-from app.rendering.take import SOURCES, Motion, Take
+from app.rendering.strobe import Strobe
+from app.rendering.take import SOURCES, Listened, Motion, Take, picture_stride
 from app.shared.vocabulary import OTHER
 from engine.metrics import ErrorSums
 from engine.presets import PresetError
+from engine.sources import ModelSource
+from engine.voices import Ear
 
-Block = NDArray[np.float32]
-
-FIRST_FRAMES = 256  # small, so that a pluck is seen at once
-BLOCK_FRAMES = 2048  # each block is twice as long as the last, up to this: another pluck waits for no more
+FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
+BLOCK_FRAMES = 2048  # pictures; each block is twice as long as the last, up to this: another pluck waits for no more
 
 
 class Job:
@@ -31,6 +30,9 @@ class Job:
     Args:
         load: a preset's model and truth.
         helper: another thread, so that two sources are rendered at the same time.
+
+    Attributes:
+        take: what it makes; None before the first block.
     """
 
     def __init__(
@@ -39,13 +41,16 @@ class Job:
         self.request = request
         self._load, self._listener, self._helper = load, listener, helper
         self._lines: dict[str, Line] = {}
-        self._take: Take | None = None
+        self.take: Take | None = None
+        self._strobe: Strobe | None = None
+        self._coming: Listened | None = None  # what is heard elsewhere, until all of it is there
         self._errors = ErrorSums(0)
+        self._measured = 1  # pictures; the first is no prediction
         self._finished = False  # and told
         self._begun_s = time.monotonic()
 
     def ask_again(self, request: RenderRequest) -> None:
-        """The same motion, beside other presets."""
+        """The same motion, beside other presets, heard elsewhere, or slower."""
         self.request = request
 
     @property
@@ -55,12 +60,20 @@ class Job:
 
     @property
     def rendered_s(self) -> float:
-        return 0.0 if self._take is None else self._take.ready_frames / self._take.info.rate_hz
+        return 0.0 if self.take is None else self.take.ready_frames / self.take.picture_hz
 
     @property
     def idle(self) -> bool:
         """Whether there is nothing left to do."""
-        return self._finished and all(name in self._lines and self._lines[name].complete for name in self._wanted())
+        take = self.take
+        return (
+            self._finished
+            and take is not None
+            and self._coming is None
+            and take.listened.ear == self.request.ear
+            and self._strobe == self._wanted_strobe(take)
+            and all(name in self._lines and self._lines[name].complete for name in self._wanted())
+        )
 
     def advance(self) -> None:
         """Does a block.
@@ -68,24 +81,32 @@ class Job:
         Raises:
             PresetError: the preset cannot be used.
         """
-        begins = self._take is None
-        take = self._take = self._take or self._begin()
+        begins = self.take is None
+        take = self.take = self.take or self._begin()
         self._find_others(take)
-        self._advance_motions(take)
+        self._show(take)
+        self._listen(take)
+        self._advance_lines(take)
+        self._measure(take)
         if begins:
             self._listener.take_started(take)
-        if take.complete and not self._finished:
+        if take.complete and take.listened.complete and not self._finished:
             self._finished = True
             self._listener.take_finished(take, self._errors)
 
     def _begin(self) -> Take:
-        pluck, seconds = self.request.pluck, self.request.seconds
-        loaded = self._load(self.request.preset)
-        info = loaded.preset.info
-        self._lines["model"] = Line(loaded.model, info, pluck, seconds)
-        self._lines["truth"] = Line(loaded.truth, info, pluck, seconds)
-        self._errors = ErrorSums(self._lines["truth"].frames - 1)
-        return Take(loaded.preset.name, info, pluck, seconds)
+        request, loaded = self.request, self._load(self.request.preset)
+        info, stride = loaded.preset.info, _stride(loaded.model)
+        take = Take(loaded.preset.name, info, request.pluck, request.seconds, request.ear, stride, model=loaded.model)
+        for name, source, program in (
+            ("model", loaded.model, loaded.model_program),
+            ("truth", loaded.truth, loaded.truth_program),
+        ):
+            motion = take.motion(name)
+            self._lines[name] = Line(source, program, info, request.pluck, motion, request.seconds, stride)
+        self._errors = ErrorSums(take.frames - 1)
+        take.listened = self._listened(request.ear)
+        return take
 
     def _find_others(self, take: Take) -> None:
         """Begins the models of other presets that are asked for now and have not been yet."""
@@ -93,42 +114,79 @@ class Job:
             name = OTHER + path.stem
             if name in self._lines:
                 continue
+            info, stride, source, program = take.info, take.stride, None, None
             try:
                 loaded = self._load(path)
-                line = Line(loaded.model, loaded.preset.info, take.pluck, take.seconds)
+                source, program = loaded.model, loaded.model_program
+                info, stride = loaded.preset.info, _stride(source)
             except (PresetError, ValueError) as error:
-                line = Line(None, take.info, take.pluck, take.seconds)
                 self._listener.other_failed(path.stem, str(error))
-            self._lines[name] = line
-            take.others[name] = Motion(line.rate_hz, line.grid_points, take.seconds)
+            motion = Motion(info.rate_hz / stride, info.grid_points, take.seconds)
+            line = self._lines[name] = Line(source, program, info, take.pluck, motion, take.seconds, stride)
+            if self._strobe is not None:
+                line.show(self._strobe)
+            listened = self._coming or take.listened
+            listened.signals[name] = line.listen(listened.ear)
+            take.others[name] = motion
 
-    def _advance_motions(self, take: Take) -> None:
-        """Renders a block of both sources, and of others up to there."""
+    def _show(self, take: Take) -> None:
+        """Begins the flashes anew, where the slow motion is another; those on their way are finished first."""
+        behind = any(self._lines[name].behind for name in self._wanted() if name in self._lines)
+        if self._strobe != (strobe := self._wanted_strobe(take)) and not behind:
+            self._strobe = strobe
+            for line in self._lines.values():
+                line.show(strobe)
+
+    def _listen(self, take: Take) -> None:
+        """Listens elsewhere, where that is asked for.
+
+        What is whole stays until the other is: a point that is dragged is drawn as often as all of it is rendered.
+        """
+        ear = self.request.ear
+        if self._coming is not None and self._is_whole(self._coming):
+            take.listened, self._coming = self._coming, None
+        if self._coming is None and take.listened.ear != ear:
+            if self._is_whole(take.listened):
+                self._coming = self._listened(ear)
+            elif not take.complete:
+                take.listened = self._listened(ear)
+
+    def _listened(self, ear: Ear) -> Listened:
+        return Listened(ear, {name: line.listen(ear) for name, line in self._lines.items()})
+
+    def _is_whole(self, listened: Listened) -> bool:
+        return all(listened.signals[name].complete for name in self._wanted() if name in listened.signals)
+
+    def _wanted_strobe(self, take: Take) -> Strobe:
+        return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
+
+    def _advance_lines(self, take: Take) -> None:
+        """Renders a block of both sources, and of others up to there; the first here, the helper does the others."""
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
-        frames = min(min(2 * first, BLOCK_FRAMES) if first else 1 + FIRST_FRAMES, take.frames - first)
-        end_s = (first + frames) / truth.rate_hz if first + frames < take.frames else take.seconds + 1.0
-        others = {name: self._lines[name] for name in self._wanted()[len(SOURCES) :]}
-        behind = {name: min(BLOCK_FRAMES, line.until(end_s)) for name, line in others.items()}
-        blocks = self._advance_lines({**dict.fromkeys(SOURCES, frames), **behind})
-        for name in others:
-            take.others[name].append(blocks[name])
-        if frames:
-            take.append(blocks["model"], blocks["truth"])
-            take.model_ends_s = model.ends_s
-            self._measure(first, blocks)
+        most = BLOCK_FRAMES * truth.stride
+        frames = min(min(2 * first, most) if first else 1 + FIRST_FRAMES, truth.frames - first)
+        end_s = (first + frames) / truth.rate_hz if first + frames < truth.frames else take.seconds + 1.0
+        others = [self._lines[name] for name in self._wanted()[len(SOURCES) :]]
+        behind = {line: min(BLOCK_FRAMES * line.stride, line.until(end_s)) for line in others}
+        pending = [self._helper.submit(line.advance, count) for line, count in ({truth: frames} | behind).items()]
+        model.advance(frames)
+        for each in pending:
+            each.result()
+        take.model_ends_s = model.ends_s
 
     def _wanted(self) -> list[str]:
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
-    def _advance_lines(self, frames: Mapping[str, int]) -> dict[str, Block]:
-        """The next frames of each source; the first here, the helper does the others."""
-        own, *others = frames
-        pending = {name: self._helper.submit(self._lines[name].advance, frames[name]) for name in others}
-        return {own: self._lines[own].advance(frames[own])} | {name: each.result() for name, each in pending.items()}
+    def _measure(self, take: Take) -> None:
+        """Adds the error of new pictures."""
+        first, stop = self._measured, take.ready_frames
+        if stop > first:
+            model, truth = (torch.from_numpy(take.motion(name).read(first, stop)[None]) for name in SOURCES)
+            self._errors.add(model, truth, first - 1, row=0)
+            self._measured = stop
 
-    def _measure(self, first: int, blocks: Mapping[str, Block]) -> None:
-        """Adds the error of new frames, the earliest of which is `first`; frame 0 is no prediction."""
-        skipped = int(first == 0)
-        model, truth = (torch.from_numpy(blocks[name][None, skipped:]) for name in SOURCES)
-        self._errors.add(model, truth, first + skipped - 1, row=0)
+
+def _stride(model: ModelSource) -> int:
+    """Samples between pictures: of a model that must step through every frame each is kept, at no more work."""
+    return picture_stride(model.rate_hz) if model.any_frame else 1

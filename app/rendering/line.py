@@ -1,8 +1,7 @@
-"""One source of a take on its way: rendered onwards by blocks, silent from where it runs away."""
+"""One source of a take on its way: its pictures, its flashes and its signal, each rendered onwards by blocks."""
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
 import numpy as np
@@ -10,61 +9,148 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from app.rendering.listening import Listening
+from app.rendering.strobe import Flashes, Strobe
+from app.rendering.take import Motion, Signal
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
-from engine.sources import Runaway, StringSource, project
+from engine.sources import Runaway, SourceState, StringSource, project
+from engine.voices import Ear, Program
 
 
 class Line:
-    """Frames of a source for a pluck, the initial displacement first.
+    """Renders a source into its motion and its signal.
 
     Args:
         source: None is a string at rest.
+        program: of its voice, at the preset's rate.
+        stride: samples between two pictures.
 
     Attributes:
-        frames: how many there are in all.
-        done: frames rendered so far.
-        ends_s: the time of the last believable frame, where the source ran away; it is at rest from there on.
+        frames: samples in all, the initial displacement first.
+        done: samples whose pictures have been rendered.
     """
 
-    def __init__(self, source: StringSource | None, info: PresetInfo, pluck: Pluck, seconds: float) -> None:
-        self.rate_hz = info.rate_hz
-        self.grid_points = info.grid_points
-        self.frames = round(seconds * info.rate_hz) + 1
-        self.done = 0
-        self.ends_s: float | None = None
-        self._source = source
-        initial = _initial_m(pluck, info.grid_points, info.modes)
-        self._initial = initial if source is not None else torch.zeros_like(initial)
-        self._state = None if source is None else source.start(initial)
+    def __init__(
+        self,
+        source: StringSource | None,
+        program: Program | None,
+        info: PresetInfo,
+        pluck: Pluck,
+        motion: Motion,
+        seconds: float,
+        stride: int,
+    ) -> None:
+        self.rate_hz, self.stride, self.motion = info.rate_hz, stride, motion
+        self.frames = int(seconds * info.rate_hz + 1e-6) + 1
+        self._seconds, self._source, self._program = seconds, source, program
+        self._initial = _initial_m(pluck, info.grid_points, info.modes)
+        self._pictures = _Frames(source, self._initial)
+        self._flashes: Flashes | None = None
+        self._shown: _Frames | None = None  # what shows them, where they are behind the pictures
+        self._listening: Listening | None = None  # until its signal is whole
+
+    @property
+    def done(self) -> int:
+        return self._pictures.done
 
     @property
     def complete(self) -> bool:
-        return self.done == self.frames
+        return self.done == self.frames and self._shown is None and self._listening is None
+
+    @property
+    def behind(self) -> bool:
+        """Whether flashes that were asked for later than the pictures are on their way."""
+        return self._shown is not None
+
+    @property
+    def ends_s(self) -> float | None:
+        """The time of the last believable picture, where the source ran away; it is at rest from there on."""
+        ends = self._pictures.ends
+        return None if ends is None else ends / self.rate_hz
 
     def until(self, time_s: float) -> int:
-        """How many more frames there are before a time."""
-        return max(0, min(self.frames, math.ceil(time_s * self.rate_hz)) - self.done)
+        """How many more samples there are before a time."""
+        return max(0, min(self.frames, int(np.ceil(time_s * self.rate_hz))) - self.done)
 
-    def advance(self, frames: int) -> NDArray[np.float32]:
-        """The next `frames` in m, (frames, grid_points)."""
-        blocks = [torch.zeros(0, self.grid_points)]
-        first = self.done == 0 and frames > 0
-        if first:
-            blocks.append(self._initial.float())
-        if frames > first:
-            blocks.append(self._steps(frames - first).float())
-        self.done += frames
-        return torch.cat(blocks).numpy()
+    def show(self, strobe: Strobe) -> None:
+        """Shows the flashes of another strobe, when all that there can be are there."""
+        flashes = self._flashes = Flashes(strobe, self.rate_hz, self.frames, self._initial.shape[1])
+        if self.stride > 1 and self.done:
+            self._shown = _Frames(self._source, self._initial)
+            return
+        numbers = flashes.needed(0, self.done)  # all frames are kept
+        flashes.take(self.done, numbers, self.motion.read()[numbers])
+        self.motion.flashes = flashes
 
-    def _steps(self, steps: int) -> Tensor:
-        if self._source is not None and self._state is not None and self.ends_s is None:
+    def listen(self, ear: Ear) -> Signal:
+        """Listens from elsewhere."""
+        signal = Signal(self.rate_hz, len(ear.points), self._seconds)
+        if self._source is None or self._program is None:
+            signal.end_in_silence()
+            self._listening = None
+        else:
+            frames = None if self._source.any_frame else self.motion
+            self._listening = Listening(signal, self._source, self._program, self._initial, ear, frames)
+        return signal
+
+    def advance(self, samples: int) -> None:
+        """Renders pictures and flashes of the next samples, what flashes are behind, and a block of the signal."""
+        first, stop, flashes = self.done, self.done + samples, self._flashes
+        if samples:
+            numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
+            wanted, joint = numbers, flashes is not None and self._shown is None
+            if flashes is not None and joint:
+                wanted = np.union1d(numbers, flashes.needed(first, stop))
+            frames = self._pictures.take(wanted, stop)
+            if flashes is not None and joint:
+                flashes.take(stop, wanted, frames)
+            self.motion.append(frames if len(wanted) == len(numbers) else frames[np.searchsorted(wanted, numbers)])
+        if self._shown is not None and flashes is not None:
+            self._catch_up(self._shown, flashes, max(samples, 2048 * self.stride))
+        if self._listening is not None:
+            self._listening.advance()
+            if self._listening.signal.complete:
+                self._listening = None
+
+    def _catch_up(self, shown: _Frames, flashes: Flashes, most: int) -> None:
+        stop = min(shown.done + most, self.done)
+        numbers = flashes.needed(shown.done, stop)
+        flashes.take(stop, numbers, shown.take(numbers, stop))
+        if stop == self.done:
+            self._shown, self.motion.flashes = None, flashes
+
+
+class _Frames:
+    """Some frames of a source one after the other, at rest from where it runs away.
+
+    Attributes:
+        done: frames so far, whether they were wanted or not.
+        ends: the last believable one before those among which it ran away.
+    """
+
+    def __init__(self, source: StringSource | None, initial_m: Tensor) -> None:
+        self._source, self._initial = source, initial_m
+        self._state: SourceState | None = None if source is None else source.start(initial_m)
+        self.done = 0
+        self.ends: int | None = None
+
+    def take(self, numbers: NDArray[np.int64], stop: int) -> NDArray[np.float32]:
+        """Those of the frames `done` … stop - 1 with these ascending numbers, (frames, grid_points) in m."""
+        out = torch.zeros(len(numbers), self._initial.shape[1])
+        following = int(len(numbers) > 0 and numbers[0] == 0)
+        if self._source is not None:
+            out[:following] = self._initial.float()
+        if self._state is not None and len(numbers) > following:
+            assert self._source is not None
+            ahead = torch.from_numpy(numbers[following:] - self._state.frame)
             try:
-                block, self._state = self._source.advance(self._state, steps)
-                return block[0]
+                found, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
+                out[following:] = found[0].float()
             except Runaway:  # at rest from here on: it must never reach a loudspeaker
-                self.ends_s = max(self.done - 1, 0) / self.rate_hz
-        return torch.zeros(steps, self.grid_points)
+                self._state, self.ends = None, max(self.done - 1, 0)
+        self.done = stop
+        return out.numpy()
 
 
 @lru_cache(maxsize=8)  # every source of a take begins with the same

@@ -6,10 +6,13 @@ from functools import cached_property
 
 from engine.presets import Preset
 from engine.sources import ModelSource, TruthSource
+from engine.voices import Program, model_program, truth_program
+
+COARSER = 4  # sub-steps of the truth that is drawn against its default's: 1e-6 off
 
 
 class Loaded:
-    """Sources are made when they are first wanted."""
+    """Sources are made when they are first wanted, and the programs of their voices at the preset's own rate."""
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset
@@ -22,3 +25,11 @@ class Loaded:
     @cached_property
     def truth(self) -> TruthSource:
         return TruthSource(self.preset.info)
+
+    @cached_property
+    def model_program(self) -> Program:
+        return model_program(self.preset.model, self.preset.info, self.preset.info.rate_hz)
+
+    @cached_property
+    def truth_program(self) -> Program:
+        return truth_program(self.preset.info, self.preset.info.rate_hz, COARSER)

@@ -9,23 +9,28 @@ from typing import Protocol
 from app.rendering.take import Take
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
+from engine.voices import Ear
 
 
 @dataclass(frozen=True)
 class RenderRequest:
-    """The motion of a pluck.
+    """The pictures and signals of a pluck.
 
     Attributes:
+        ear: where and how it is heard.
+        speed: of slow motion, 1 being real time.
         others: further presets whose models are rendered for the same pluck, each the source `OTHER` + its name.
     """
 
     preset: Path
     pluck: Pluck
     seconds: float
+    ear: Ear
+    speed: float = 1.0
     others: tuple[Path, ...] = ()
 
     def same_motion(self, other: RenderRequest | None) -> bool:
-        """Whether only what is beside it differs."""
+        """Whether only what is beside it, where it is heard, or the slow motion differs."""
         return other is not None and (self.preset, self.pluck, self.seconds) == (
             other.preset,
             other.pluck,

@@ -1,36 +1,58 @@
-"""A take: one pluck with the motion of model and truth, growing while it is rendered."""
+"""A take: one pluck as it is seen and as it is drawn, growing while it is rendered.
+
+Of each source there is a *motion*, the string as a series of pictures, and a *signal*, what is heard of it at the
+present listening points, sample by sample. One thread appends and any thread reads: values are written first, then
+the count of what is ready is raised; what lies below it never changes.
+"""
 
 from __future__ import annotations
 
-from functools import lru_cache
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
+from app.rendering.strobe import Flashes, Strobe
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
-from engine.resonators.sine_transform import listening_weights
+from engine.sources import StringSource
+from engine.voices import Ear
 
 SOURCES = ("model", "truth")
+PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures a period of a B at 247 Hz
+_TINY = 1e-6  # of a frame
+
+
+def picture_stride(rate_hz: int) -> int:
+    """Samples between two pictures."""
+    return math.ceil(rate_hz / PICTURE_HZ)
 
 
 class Motion:
-    """Displacement of one source on its grid, (frames, grid_points) in m, growing at its end."""
+    """Displacement of one source on its grid, (frames, grid_points) in m, growing at its end.
 
-    def __init__(self, rate_hz: int, grid_points: int, seconds: float) -> None:
+    Attributes:
+        rate_hz: pictures a second; the first is the initial displacement.
+        frames: pictures when complete.
+        flashes: the string at the moments that slow motion shows; None: there are none.
+    """
+
+    def __init__(self, rate_hz: float, grid_points: int, seconds: float) -> None:
         self.rate_hz = rate_hz
-        self.frames = round(seconds * rate_hz) + 1
+        self.frames = int(seconds * rate_hz + _TINY) + 1
         self.ready_frames = 0
-        self._m = np.zeros((self.frames, grid_points), np.float32)
+        self.flashes: Flashes | None = None
+        self._m = np.empty((self.frames, grid_points), np.float32)
 
     @property
     def complete(self) -> bool:
         return self.ready_frames == self.frames
 
     @property
-    def ready_bytes(self) -> int:
-        return self.ready_frames * self._m.shape[1] * self._m.itemsize
+    def bytes(self) -> int:
+        """Of memory, when it is complete."""
+        return self._m.nbytes + (self.flashes.bytes if self.flashes is not None else 0)
 
     def append(self, frames_m: NDArray[np.float32]) -> None:
         start, stop = self.ready_frames, self.ready_frames + len(frames_m)
@@ -42,78 +64,147 @@ class Motion:
         ready = self.ready_frames
         return self._m[min(start, ready) : ready if stop is None else min(stop, ready)]
 
+    def shape_m(self, position_s: float) -> NDArray[np.float32]:
+        """The string (grid_points,) that the strobe shows; where its flash is not there yet, the nearest picture."""
+        shown = self.flash_m(position_s)
+        if shown is None:
+            nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
+            shown = self.read(nearest, nearest + 1)[0]
+        return shown
 
-class Take:
-    """Displacement of both sources on the grid at the preset's rate, and of other presets' models beside them.
+    def strobe_at(self, position_s: float) -> Strobe | None:
+        """Whose flash `shape_m` is; None: a picture."""
+        flashes = self.flashes
+        return None if flashes is None or self.flash_m(position_s) is None else flashes.strobe
 
-    One thread appends and any thread reads: frames are written first, then `ready_frames` is raised; what lies
-    below it never changes.
+    def flash_m(self, position_s: float) -> NDArray[np.float32] | None:
+        """As `shape_m`; None where its flash is not there yet."""
+        flashes = self.flashes
+        return None if flashes is None else flashes.shape_m(flashes.strobe.flash(position_s))
 
-    Attributes:
-        frames: number of frames when complete, the initial displacement among them.
-        model_ends_s: when the model's output ran away, the time of its last believable frame; it is at rest then.
-        others: motions of other presets' models for the same pluck, by source, each at its own rate and on its
-            own grid.
-        fundamental_hz: of the string at rest.
-    """
 
-    def __init__(self, preset_name: str, info: PresetInfo, pluck: Pluck, seconds: float) -> None:
-        self.preset_name = preset_name
-        self.info = info
-        self.pluck = pluck
-        self.model_ends_s: float | None = None
-        self._motions = {name: Motion(info.rate_hz, info.grid_points, seconds) for name in SOURCES}
-        self.frames = self._motions["truth"].frames
-        self.others: dict[str, Motion] = {}
-        self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
+class Signal:
+    """What is heard of one source, (frames, points) in m or m/s at the source's own rate, growing at its end."""
 
-    @property
-    def ready_frames(self) -> int:
-        return self._motions["truth"].ready_frames
+    def __init__(self, rate_hz: int, points: int, seconds: float) -> None:
+        self.rate_hz = rate_hz
+        self.frames = int(seconds * rate_hz + _TINY) + 1
+        self.ready_frames = 0
+        self._samples = np.empty((self.frames, points), np.float32)
 
     @property
     def complete(self) -> bool:
         return self.ready_frames == self.frames
 
     @property
-    def seconds(self) -> float:
-        return (self.frames - 1) / self.info.rate_hz
+    def bytes(self) -> int:
+        """Of memory, when it is complete."""
+        return self._samples.nbytes
+
+    def append(self, samples: NDArray[np.float32]) -> None:
+        start, stop = self.ready_frames, self.ready_frames + len(samples)
+        self._samples[start:stop] = samples
+        self.ready_frames = stop
+
+    def end_in_silence(self) -> None:
+        self._samples[self.ready_frames :] = 0.0
+        self.ready_frames = self.frames
+
+    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
+        """What is ready of frames start … stop."""
+        ready = self.ready_frames
+        return self._samples[min(start, ready) : ready if stop is None else min(stop, ready)]
+
+
+@dataclass(frozen=True, eq=False)
+class Listened:
+    """The signals of a take's sources at one pair of listening points."""
+
+    ear: Ear
+    signals: dict[str, Signal] = field(default_factory=dict)
 
     @property
-    def ready_bytes(self) -> int:
-        """Memory that its frames take so far, those of `others` among them."""
-        return sum(motion.ready_bytes for motion in (*self._motions.values(), *self.others.values()))
+    def complete(self) -> bool:
+        """Of model and truth."""
+        return all(name in self.signals and self.signals[name].complete for name in SOURCES)
+
+
+class Take:
+    """Motions and signals of model and truth for a pluck, and of other presets' models beside them.
+
+    Attributes:
+        stride: samples between two pictures of model and truth.
+        model: what renders the model, where more of it is wanted; it keeps nothing.
+        model_ends_s: when the model's output ran away, the time of its last believable picture; it is at rest then.
+        others: motions of other presets' models for the same pluck, by source, each at its own rate and on its
+            own grid.
+        listened: what is heard of them all; replaced as a whole when the listening points are others.
+        fundamental_hz: of the string at rest.
+    """
+
+    def __init__(
+        self,
+        preset_name: str,
+        info: PresetInfo,
+        pluck: Pluck,
+        seconds: float,
+        ear: Ear,
+        stride: int = 1,
+        model: StringSource | None = None,
+    ) -> None:
+        self.preset_name = preset_name
+        self.info = info
+        self.pluck = pluck
+        self.seconds = seconds
+        self.stride = stride
+        self.model = model
+        self.model_ends_s: float | None = None
+        self._motions = {name: Motion(info.rate_hz / stride, info.grid_points, seconds) for name in SOURCES}
+        self.frames = self._motions["truth"].frames
+        self.others: dict[str, Motion] = {}
+        self.listened = Listened(ear, {name: Signal(info.rate_hz, len(ear.points), seconds) for name in SOURCES})
+        self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
+
+    @property
+    def picture_hz(self) -> float:
+        """Pictures of model and truth a second."""
+        return self.info.rate_hz / self.stride
+
+    @property
+    def ready_frames(self) -> int:
+        """Pictures of both so far."""
+        return min(motion.ready_frames for motion in self._motions.values())
+
+    @property
+    def complete(self) -> bool:
+        """Whether all pictures are there."""
+        return self.ready_frames == self.frames
+
+    @property
+    def progress(self) -> tuple[object, ...]:
+        """What there is of it: another value when there is more, or another signal."""
+        motions, signals = [*self._motions.values(), *self.others.values()], list(self.listened.signals.values())
+        flashes = [motion.flashes for motion in motions if motion.flashes is not None]
+        return (
+            self.listened,
+            *(motion.ready_frames for motion in motions),
+            *(signal.ready_frames for signal in signals),
+            *((each, each.ready) for each in flashes),
+        )
+
+    def bytes(self, source: str) -> int:
+        """Memory that a source takes when it is complete."""
+        return self.motion(source).bytes + self.listened.signals[source].bytes
 
     def motion(self, source: str) -> Motion:
         """The growing motion of a source, of "model", "truth" or one of `others`."""
         return self._motions[source] if source in self._motions else self.others[source]
 
     def append(self, model_m: NDArray[np.float32], truth_m: NDArray[np.float32]) -> None:
-        """Adds frames (frames, grid_points) of both sources."""
+        """Adds pictures (frames, grid_points) of both sources."""
         self._motions["model"].append(model_m)
         self._motions["truth"].append(truth_m)
 
     def motion_m(self, source: str) -> NDArray[np.float32]:
-        """The frames so far, (ready_frames, grid_points), in m."""
+        """The pictures so far, (ready_frames, grid_points), in m."""
         return self.motion(source).read(0, self.ready_frames if source in SOURCES else None)
-
-    def shape_m(self, source: str, time_s: float) -> NDArray[np.float32]:
-        """The string (grid_points,) at any time, between two frames by linear interpolation, in m."""
-        motion = self.motion_m(source)
-        if len(motion) == 0:
-            return np.zeros(self.info.grid_points, np.float32)
-        place = min(max(time_s * self.info.rate_hz, 0.0), len(motion) - 1.0)
-        before = int(place)
-        after = min(before + 1, len(motion) - 1)
-        share = np.float32(place - before)
-        return motion[before] * (1 - share) + motion[after] * share
-
-    def signal_m(self, source: str, listen: float, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
-        """Displacement at the listening point for frames start … stop so far, in m."""
-        return self.motion_m(source)[start:stop] @ _weights(listen, self.info.grid_points)
-
-
-@lru_cache(maxsize=8)  # asked for many times a second
-def _weights(listen: float, grid_points: int) -> NDArray[np.float32]:
-    """(grid_points,): displacement @ weights is that at the listening point."""
-    return listening_weights(torch.tensor([listen]), grid_points)[:, 0].float().numpy()

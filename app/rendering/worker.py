@@ -1,6 +1,6 @@
-"""The render worker: the one thread that renders motions for pictures. It does the latest request alone.
+"""The render worker: the one thread that renders what is seen and drawn. It does the latest request alone.
 
-A request that differs only in the presets beside it keeps the motion.
+A request that differs only in the presets beside it, in where it is heard or in the slow motion keeps its pictures.
 """
 
 from __future__ import annotations

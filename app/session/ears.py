@@ -7,11 +7,6 @@ from engine.voices import Ear
 
 
 def heard_ear(choices: Choices) -> Ear:
-    """How a string is listened to."""
+    """How a string is listened to; the first point is the one that is drawn, in stereo the left."""
     points = (choices.listen, choices.listen_right) if choices.stereo else (choices.listen,)
     return Ear(points, choices.pickup, choices.solo)
-
-
-def drawn_ear(choices: Choices) -> Ear:
-    """The listening point that is drawn: in stereo the left one."""
-    return Ear((choices.listen,), choices.pickup, choices.solo)

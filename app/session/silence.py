@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import SOURCES, Take
 from app.session.choices import VOLUME_RANGE_DB, Choices
 from app.session.ears import heard_ear
 from app.session.slots import other_preset
@@ -47,13 +47,12 @@ def why_ran_away(take: Take) -> str:
 
 
 def why_difference_silent(choices: Choices, take: Take) -> str:
-    """The reason that model and truth of a take have no audible difference, or nothing."""
-    ear = heard_ear(choices)
-    weights = ear.weights(take.info.grid_points).float().numpy()
-    signal = (take.motion_m("model") - take.motion_m("truth")) @ weights
-    if ear.pickup == "velocity":
-        signal = np.diff(signal, axis=0) * take.info.rate_hz
-    peak = float(np.abs(signal).max(initial=0.0)) / ear.full_scale
+    """The reason that model and truth of a take have no audible difference, or nothing: also while it is unknown."""
+    ear, listened = heard_ear(choices), take.listened
+    if listened.ear != ear or not listened.complete:
+        return ""
+    model, truth = (listened.signals[name].read() for name in SOURCES)
+    peak = float(np.abs(model - truth).max(initial=0.0)) / ear.full_scale
     if peak == 0:
         return "silent: model and truth do not differ here"
     peak_db = 20 * math.log10(peak) + choices.difference_gain_db

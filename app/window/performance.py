@@ -32,7 +32,7 @@ from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 
-MotionKey = tuple[str, Pluck, int]  # the preset's name, the pluck, the number of frames
+MotionKey = tuple[str, Pluck, float]  # the preset's name, the pluck, how long it is
 LOOP_AHEAD_S = 0.5  # the next turn of a loop is handed over so long before it begins
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
 KEY_FIELDS = {"preset", "amplitude_mm", "shape", "width"}  # what the keys' plucks depend on beside their places
@@ -41,7 +41,7 @@ MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
 def motion_key(take: Take) -> MotionKey:
     """What tells the motion of a take from others."""
-    return take.preset_name, take.pluck, take.frames
+    return take.preset_name, take.pluck, take.seconds
 
 
 @dataclass
@@ -122,8 +122,8 @@ class Performance(QObject):
 
     @property
     def settled(self) -> bool:
-        """Whether the motion that is shown is whole, so that views may rest."""
-        return self.take is None or self.take.complete
+        """Whether what is shown is whole, so that views may rest."""
+        return self.take is None or (self.take.complete and self.take.listened.complete)
 
     @property
     def match(self) -> Mapping[str, float] | None:
@@ -283,9 +283,7 @@ class Performance(QObject):
             panel.take_finished(take, errors)
         if reason := why_ran_away(take):
             self._window.notices.tell(reason)
-        windows = errors.windows(
-            take.info.rate_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s))
-        )
+        windows = errors.windows(take.picture_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s)))
         parts = [
             f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, ("as trained", "past it"), strict=False)
         ]
@@ -320,4 +318,4 @@ class Performance(QObject):
         entry = self._library.find(choices.preset)
         if entry is None:
             return None
-        return entry.name, choices.pluck, round(choices.seconds * entry.info.rate_hz) + 1
+        return entry.name, choices.pluck, choices.seconds

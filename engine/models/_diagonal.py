@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
-from engine.models.base import Physics, StringModel
+from engine.models.base import AnyFrameModel, Physics
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
 SEGMENT = 64  # frames of the fine table of powers
@@ -28,7 +28,7 @@ class KoopmanState:
     step: int
 
 
-class DiagonalModel(StringModel[KoopmanState]):
+class DiagonalModel(AnyFrameModel[KoopmanState]):
     """Advances by powers of the eigenvalues; a subclass encodes, decodes and says what its eigenvalues are."""
 
     @abstractmethod
@@ -50,6 +50,12 @@ class DiagonalModel(StringModel[KoopmanState]):
             for done in range(0, steps, most)
         ]
         return torch.cat(blocks, dim=1), KoopmanState(state.origin, state.step + steps)
+
+    def sample(
+        self, state: KoopmanState, frames: Tensor, steps: int, readout: Tensor | None = None
+    ) -> tuple[Tensor, KoopmanState]:
+        found = self.decode(self.latents(state.origin, state.step + frames), readout)
+        return found, KoopmanState(state.origin, state.step + steps)
 
     def _frames_at_once(self, batch: int) -> int:
         """Frames in a block of a long advance."""

@@ -115,6 +115,24 @@ class StringModel(nn.Module, ABC, Generic[State]):
         return self.advance(self.release(displacement), steps, readout)[0]
 
 
+class AnyFrameModel(StringModel[State]):
+    """A model of which some frames can be had for little more than their own cost.
+
+    Any can be had without those before it, or it is the frames' shapes that cost, not the way to them.
+    """
+
+    @abstractmethod
+    def sample(self, state: State, frames: Tensor, steps: int, readout: Tensor | None = None) -> tuple[Tensor, State]:
+        """As `advance`, of which only some frames are computed.
+
+        Args:
+            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
+
+        Returns:
+            displacement (batch, frames, points or grid_points), and the state after all `steps`.
+        """
+
+
 def check_initialisation(model: StringModel[State], how: str) -> None:
     """Raises ValueError, naming what there is, where a model does not know `how`."""
     if how not in model.initialisations:

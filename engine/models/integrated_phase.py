@@ -65,7 +65,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
 from engine.models.string_modes import StartsFromModes, StringModes
 
@@ -172,7 +172,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(StringModel[IntegratedPhaseState], StartsFromModes):
+class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -248,6 +248,21 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState], StartsFromModes):
             done += block.shape[1]
         return torch.cat(blocks, dim=1), state
 
+    def sample(
+        self, state: IntegratedPhaseState, frames: Tensor, steps: int, readout: Tensor | None = None
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        """See the contract. Segments are as long as in `_listen`: here too their ends are what costs."""
+        rates, spacing = self._rates(), self.configuration.node_spacing
+        early = min(steps, max(0, math.ceil(SETTLED * spacing - state.time)))
+        blocks, done = [], 0
+        for count, samples in ((early, SEGMENT), (steps - early, spacing)):
+            if count:
+                here = frames[(frames > done) & (frames <= done + count)] - done
+                block, state = self._pick(state, rates, here, count, samples, readout)
+                blocks.append(block)
+                done += count
+        return torch.cat(blocks, dim=1), state
+
     def at(self, state: IntegratedPhaseState, times: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (batch, times, points) at `times` (times,), in samples from the state's own time.
 
@@ -293,9 +308,7 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState], StartsFromModes):
         """
         length = self._segment_length(SEGMENT, step)
         segments, later = self._segments(state, rates, count, step, length)
-        alive = segments.alive
-        if self.multiplier is not None or self.decoder_residual is not None:
-            alive = torch.arange(len(rates.sigma), device=alive.device)  # their networks take every latent
+        alive = self._decoded(segments)
         ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
@@ -303,6 +316,33 @@ class KoopmanIntegrated(StringModel[IntegratedPhaseState], StartsFromModes):
         frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
         frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
         return frames[:, segments.begin : segments.begin + count], later
+
+    def _pick(
+        self,
+        state: IntegratedPhaseState,
+        rates: _Rates,
+        frames: Tensor,
+        count: int,
+        samples: int,
+        readout: Tensor | None,
+    ) -> tuple[Tensor, IntegratedPhaseState]:
+        """Some of the next `count` frames, from segments of at most `samples`, and the state after all of them."""
+        step = Fraction(1)
+        length = self._segment_length(samples, step)
+        segments, later = self._segments(state, rates, count, step, length)
+        alive = self._decoded(segments)
+        number, offset = (segments.begin + frames - 1) // length, (segments.begin + frames - 1) % length
+        basis = hermite(length, segments.ends)[offset]
+        log_radius, phase = torch.einsum("fk,kpbfn->pbfn", basis, segments.ends[..., alive][:, :, :, number])
+        dtype = self.decoder.weight.dtype
+        radius, phase = torch.exp(log_radius.to(dtype)), torch.remainder(phase, 2 * math.pi).to(dtype)
+        return self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive), later
+
+    def _decoded(self, segments: _Segments) -> Tensor:
+        """The latents that a decoder is given: those that count, or all where networks take them."""
+        if self.multiplier is None and self.decoder_residual is None:
+            return segments.alive
+        return torch.arange(self.configuration.state_size, device=segments.alive.device)
 
     def _can_listen(self, state: IntegratedPhaseState, readout: Tensor) -> bool:
         """Whether `_listen` applies: a linear decoder at a few points, on a processor, and no gradients asked for."""

@@ -40,7 +40,7 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor, nn
 
-from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
 
 SERIES = 1 / 12  # r and p of small hω
 SPARE = 1.5  # of the energy at the start: more is not believed
@@ -114,7 +114,7 @@ class Step(NamedTuple):
         return torch.stack(self[2:])
 
 
-class KoopmanTension(StringModel[KoopmanTensionState]):
+class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
     """See the module. The resonator is a buffer: `tuned` gives the same model of another."""
 
     initialisations: ClassVar = {
@@ -188,9 +188,20 @@ class KoopmanTension(StringModel[KoopmanTensionState]):
         Raises:
             ValueError: a step size that is not above 0, or another than the state's.
         """
-        size = Fraction(step_size)
+        return self._advance(state, None, steps, readout, Fraction(step_size))
+
+    def sample(
+        self, state: KoopmanTensionState, frames: Tensor, steps: int, readout: Tensor | None = None
+    ) -> tuple[Tensor, KoopmanTensionState]:
+        """See the contract. It steps through all frames, which costs little beside their shapes."""
+        return self._advance(state, frames, steps, readout, Fraction(1))
+
+    def _advance(
+        self, state: KoopmanTensionState, frames: Tensor | None, steps: int, readout: Tensor | None, size: Fraction
+    ) -> tuple[Tensor, KoopmanTensionState]:
+        """The next `steps` frames, or those of them with these numbers."""
         if not size > 0 or state.step_size not in (None, size):
-            raise ValueError(f"step_size must be above 0 and stay the same, not {step_size} after {state.step_size}")
+            raise ValueError(f"step_size must be above 0 and stay the same, not {size} after {state.step_size}")
         step = self.step(size)
         if state.step_size is None:
             state = self._let_go(state, step, size)
@@ -201,6 +212,8 @@ class KoopmanTension(StringModel[KoopmanTensionState]):
             count = min(FRAMES_AT_ONCE, steps - done)
             compiled = state.x.device.type == "cpu" and not torch.is_grad_enabled()
             amplitudes, state = (self._compiled if compiled else self._plain)(state, step, count)
+            if frames is not None:
+                amplitudes = amplitudes[:, frames[(frames > done) & (frames <= done + count)] - done - 1]
             blocks.append(amplitudes.to(to_points.dtype) @ to_points)
             done += count
         return torch.cat(blocks, dim=1), state

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 def advance(
     q: Array,
     v: Array,
+    steps: int,
+    frames: NDArray[np.int64],
     out: Array,
     flows: Array,
     kicks: Array,
@@ -29,17 +31,20 @@ def advance(
     inverse_omega_squared: Array,
     silence: float,
 ) -> None:
-    """Advances amplitudes q and velocities v (batch, modes) in place; writes out (batch, steps, modes).
+    """Advances amplitudes q and velocities v (batch, modes) in place by `steps` samples.
 
+    Writes out (batch, frames, modes), the amplitudes after as many samples as `frames` (frames,) say, ascending.
     flows (levels, stages, 4, modes): exact rotations; kicks (levels, stages - 1): lengths in s of the kicks between
     them; substeps (levels,) per sample. As long as the lowest n modes move, all is done at levels[n - 1]. Before each
     sample the highest that moves is laid to rest where its amplitude is below `silence` of that of all together.
     """
-    batch, steps, modes = out.shape
+    batch, modes = q.shape
+    kept = len(frames)
     stages = flows.shape[1]
     for b in range(batch):
         qb, vb = q[b], v[b]
         moving = modes
+        written = 0
         for step in range(steps):
             if silence > 0:
                 total = 0.0
@@ -67,4 +72,6 @@ def advance(
                         qb[n] = rotated
                         vb[n] = vq[n] * amplitude + vv[n] * velocity
                         stretch += eta_squared[n] * rotated * rotated
-            out[b, step] = qb
+            if written < kept and frames[written] == step + 1:
+                out[b, written] = qb
+                written += 1

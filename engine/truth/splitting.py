@@ -101,48 +101,58 @@ class SplittingSolver:
 
     def advance(self, state: ModalState, steps: int) -> tuple[Tensor, ModalState]:
         """Modal amplitudes after 1 … steps samples, float64 (batch, steps, modes), and the last state."""
+        return self.sample(state, torch.arange(1, steps + 1), steps)
+
+    def sample(self, state: ModalState, frames: Tensor, steps: int) -> tuple[Tensor, ModalState]:
+        """As `advance`, of which only some frames are kept: (batch, frames, modes).
+
+        Args:
+            frames: their numbers, ascending, of 1 … steps; int64 (frames,).
+        """
         if state.modes != self.modes:
             raise ValueError(f"the solver holds {self.modes} modes, the state {state.modes}")
         if self._rows:
-            return self._advance_rows(state, steps)
+            return self._sample_rows(state, frames, steps)
         q = state.amplitude.to(self.device, torch.float64).clone().contiguous()
         v = state.velocity.to(self.device, torch.float64).clone().contiguous()
-        out = q.new_empty(q.shape[0], steps, self.modes)
         if self.device.type == "cpu":
-            self._advance_compiled(q, v, out)
-        else:
-            self._advance_tensors(q, v, out)
-        return out, ModalState(q, v)
+            out = q.new_empty(q.shape[0], len(frames), self.modes)
+            self._advance_compiled(q, v, steps, frames, out)
+            return out, ModalState(q, v)
+        every = q.new_empty(q.shape[0], steps, self.modes)
+        self._advance_tensors(q, v, every)
+        return every if len(frames) == steps else every[:, frames - 1], ModalState(q, v)
 
-    def _advance_rows(self, state: ModalState, steps: int) -> tuple[Tensor, ModalState]:
+    def _sample_rows(self, state: ModalState, frames: Tensor, steps: int) -> tuple[Tensor, ModalState]:
         """Each row by its own solver."""
         if len(state.amplitude) != len(self._rows):
             raise ValueError(f"the solver holds {len(self._rows)} resonators, the state {len(state.amplitude)} rows")
 
         def run(row: int) -> tuple[Tensor, ModalState]:
             own = ModalState(state.amplitude[row : row + 1], state.velocity[row : row + 1])
-            return self._rows[row].advance(own, steps)
+            return self._rows[row].sample(own, frames, steps)
 
         workers = min(torch.get_num_threads(), os.cpu_count() or 1, len(self._rows))
         with ThreadPoolExecutor(workers) as pool:
             done = list(pool.map(run, range(len(self._rows))))
         ends = [end for _, end in done]
         end = ModalState(torch.cat([e.amplitude for e in ends]), torch.cat([e.velocity for e in ends]))
-        return torch.cat([frames for frames, _ in done]), end
+        return torch.cat([kept for kept, _ in done]), end
 
     def solve(self, state: ModalState, steps: int) -> Tensor:
         """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes)."""
         frames, _ = self.advance(state, steps)
         return torch.cat([state.amplitude.to(frames)[:, None], frames], dim=1)
 
-    def _advance_compiled(self, q: Tensor, v: Tensor, out: Tensor) -> None:
+    def _advance_compiled(self, q: Tensor, v: Tensor, steps: int, frames: Tensor, out: Tensor) -> None:
         # compiles, or loads what it compiled earlier: only when it is needed
         from engine.truth._splitting_kernel import advance
 
-        constants = [t.numpy() for t in self.constants]
+        constants, numbers = [t.numpy() for t in self.constants], frames.numpy()
 
         def run(rows: slice) -> None:
-            advance(q[rows].numpy(), v[rows].numpy(), out[rows].numpy(), *constants, self._silence)
+            of_rows = q[rows].numpy(), v[rows].numpy()
+            advance(*of_rows, steps, numbers, out[rows].numpy(), *constants, self._silence)
 
         workers = min(torch.get_num_threads(), os.cpu_count() or 1, q.shape[0])
         if workers <= 1:

@@ -10,7 +10,7 @@ offline    a voice for a file
 
 from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
-from engine.voices.offline import render_voice
+from engine.voices.offline import OfflineVoice, render_voice
 from engine.voices.programs import (
     Program,
     bank_program,
@@ -25,6 +25,7 @@ __all__ = [
     "Ear",
     "Gap",
     "Mixer",
+    "OfflineVoice",
     "Program",
     "Voice",
     "bank_program",

@@ -23,6 +23,34 @@ AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # at a time of samples that are rendered 
 FILLING = 0.9  # share of the work that these samples are
 
 
+class OfflineVoice:
+    """A voice that is read block by block, at its full gain and without a limiter.
+
+    Args:
+        seconds: of one whose samples are rendered: how many of them there will be.
+        source_rate_hz: their rate.
+    """
+
+    def __init__(
+        self, program: Program, initial_m: Tensor, ear: Ear, seconds: float = 0.0, source_rate_hz: int = 0
+    ) -> None:
+        self.voice = Voice(program, initial_m, ear, 1.0, seconds, source_rate_hz)
+        self.voice.never_ends()
+        self._mixer = Mixer(program.rate_hz, limited=False)
+        self._mixer.add(self.voice)
+
+    def read(self, frames: int) -> NDArray[np.float32]:
+        """The next frames, (frames, points), ±1 being full scale.
+
+        Raises:
+            Runaway: the output stopped being a string's.
+        """
+        block = self._mixer.render(frames)
+        if self.voice.ran_away:
+            raise Runaway(self.voice.seconds)
+        return block[:, : len(self.voice.ear.points)]
+
+
 def render_voice(
     program: Program,
     source: ModelSource | None,
@@ -44,25 +72,21 @@ def render_voice(
         Runaway: the output stopped being a string's.
     """
     initial_m = project(pluck.displacement(info.grid_points), info.modes)
-    voice = Voice(program, initial_m, ear, 1.0, seconds + 0.1 if program.rendered else 0.0, info.rate_hz)
+    offline = OfflineVoice(program, initial_m, ear, seconds + 0.1 if program.rendered else 0.0, info.rate_hz)
     if program.rendered:
         assert source is not None
-        _fill(voice, source, initial_m, ear, advanced)
-    voice.never_ends()
-    mixer = Mixer(program.rate_hz, limited=False)
-    mixer.add(voice)
+        _fill(offline.voice, source, initial_m, ear, advanced)
     frames = max(1, round(seconds * program.rate_hz))
     out = np.zeros((frames, len(ear.points)), np.float32)
     loudest_db = -math.inf
     for first in range(0, frames, BLOCK_FRAMES):
-        block = mixer.render(min(BLOCK_FRAMES, frames - first))
-        if voice.ran_away:
-            raise Runaway(voice.seconds)
-        out[first : first + len(block)] = block[:, : len(ear.points)]
+        block = offline.read(min(BLOCK_FRAMES, frames - first))
+        out[first : first + len(block)] = block
         share = (first + len(block)) / frames
         advanced(FILLING + (1 - FILLING) * share if program.rendered else share)
-        loudest_db = max(loudest_db, voice.level_db)
-        if until_db is not None and voice.level_db < loudest_db - until_db:
+        level_db = offline.voice.level_db
+        loudest_db = max(loudest_db, level_db)
+        if until_db is not None and level_db < loudest_db - until_db:
             return out[: first + len(block) + round(SILENCE_S * program.rate_hz)]
     return out
 

@@ -81,7 +81,7 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
         return _dmd_program(model, info, rate_hz)
     if isinstance(model, KoopmanIntegrated) and _is_bank(model):
         return _integrated_program(model, info, rate_hz)
-    if isinstance(model, KoopmanTension) and model.configuration.input == "displacement":
+    if isinstance(model, KoopmanTension):
         return _tension_program(model, info, rate_hz)
     return None
 

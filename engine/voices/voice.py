@@ -197,6 +197,10 @@ class Voice:
         """A rendered voice of the device's own rate begins anew after its last sample."""
         self._counts[at.LOOPED] = 1
 
+    def begin_at_once(self) -> None:
+        """Before it is handed over: without the fade-in, as the string moves."""
+        self._counts[at.ATTACK] = 0
+
     def never_ends(self) -> None:
         """It goes on when it has become silent: whoever renders it knows how long."""
         self.memory[at.SILENT] = -math.inf

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
@@ -15,12 +16,36 @@ from app.audio.devices import AudioDevice
 from app.audio.output import ClockOutput
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.sound import Sound
-from engine.voices import Mixer
+from app.rendering import SOURCES, Take
+from app.rendering.take import Listened, Signal
+from engine.voices import Ear, Mixer
 
 OWN_THREADS = (
     *("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
     *("eigenvalues", "partials", "error-map", "compare"),
 )
+
+
+Hear = Callable[[Take, Ear], None]
+
+
+@pytest.fixture
+def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
+    """Listens to a take of which every frame is a picture, as far as it is rendered."""
+
+    def heard(take: Take, ear: Ear) -> None:
+        listened = Listened(ear)
+        for name in (*SOURCES, *take.others):
+            motion = take.motion(name)
+            frames_m, rate_hz = motion.read(), round(motion.rate_hz)
+            signal = listened.signals[name] = Signal(rate_hz, len(ear.points), take.seconds)
+            samples = frames_m @ ear.weights(frames_m.shape[1]).float().numpy()
+            if ear.pickup == "velocity":
+                samples = derivative(samples, rate_hz).astype(np.float32)
+            signal.append(samples)
+        take.listened = listened
+
+    return heard
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second

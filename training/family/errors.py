@@ -12,6 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from engine.averaging import slow_flow
 from engine.models import KoopmanIntegrated, StringModel, build_model
 from engine.models.base import Physics
 from training.family.motions import solve, true_motion
@@ -126,6 +127,11 @@ def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
     physics = Physics(plucked.resonator, rate_hz, SCALE_M)
     model.initialise("averaging", physics, torch.Generator().manual_seed(0))
     return _played(model.eval(), plucked, steps)
+
+
+def averaged_flow(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
+    """`engine.averaging.slow_flow`: averaging to third order, in which modes trade energy."""
+    return slow_flow(plucked.resonator, plucked.amplitudes_m, rate_hz, steps)
 
 
 def untrained(how: str) -> Player:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import torch
 
+from engine.excitation import PLUCK_PEAK_RANGE_M
 from engine.models import KoopmanTension, build_model
 from engine.models.base import Physics
 from engine.presets import PresetInfo, TrainedRange, save_preset
@@ -22,7 +23,6 @@ from training.family.strings import FAMILY, GRID_POINTS, draw_string
 
 CONFIGURATION = Path(__file__).parent / "studio_any_string.toml"
 SCALE_M = 1e-3
-LARGEST_PEAK_M = 0.02
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def train_preset(
         trained_range=TrainedRange(
             family.position,
             (family.half_width[0], 2 * family.half_width[1]),
-            (0.0, LARGEST_PEAK_M),
+            PLUCK_PEAK_RANGE_M,
             family.tension_rise[1],
         ),
         initialisation=c.initialisation,

@@ -167,7 +167,7 @@ class _Map(pg.PlotWidget):
             self._outline.setData([], [])
             return
         left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
-        low, high = (math.log10(mm) for mm in amplitude_mm)
+        low, high = (math.log10(min(max(mm, AMPLITUDES_MM[0] / 10), 10 * AMPLITUDES_MM[-1])) for mm in amplitude_mm)
         self._trained = ((left, right), amplitude_mm)
         self._outline.setData([left, right, right, left, left], [low, low, high, high, low])
 

@@ -37,7 +37,7 @@ class Moment:
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
         """What a picture of the take depends on; as long as it is the same and nothing plays, so is the picture."""
-        return self.take, self.take.ready_bytes if self.take is not None else 0, self.position_s, choices
+        return self.take, self.take.progress if self.take is not None else (), self.position_s, choices
 
 
 class Panel(QObject):

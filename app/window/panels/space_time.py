@@ -89,7 +89,7 @@ class SpaceTimePanel(Panel):
 def _caption(made: Picture) -> str:
     column_ms = 1000 * (made.stop_s - made.start_s) / made.displacement_m.shape[1]
     return {
-        "frames": "every frame",
+        "frames": "every picture",
         "extremes": f"extremes of {column_ms:.2g} ms",
         "envelope": f"peaks of {column_ms:.2g} ms, without sign; zoom in for motion",
     }[made.detail]

@@ -8,7 +8,6 @@ from app.analysis.spectrogram import FrequencyRows, Spectrogram
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.session.ears import drawn_ear
 from app.session.shown import full_scale_words
 from app.views.plots.spectrogram_view import SpectrogramView
 from app.window.panels.base import Moment, Panel
@@ -55,9 +54,9 @@ class SpectrogramPanel(Panel):
         self._moments += 1
         if moment.take is None or self._moments % EVERY:
             return
-        listening = drawn_ear(self.session.choices)
-        if self._spectrogram is None or self._spectrogram.listening != listening:
-            self._spectrogram = Spectrogram(moment.take, listening)
+        listened = moment.take.listened
+        if self._spectrogram is None or self._spectrogram.listened is not listened:
+            self._spectrogram = Spectrogram(moment.take, listened)
             self._follower.follow(self._spectrogram)
         self._draw(self._spectrogram)
 

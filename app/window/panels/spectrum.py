@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from app.analysis.heard import HeardMotion, HeardSignal
+from app.analysis.heard import HeardSignal
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.session.ears import drawn_ear
 from app.session.shown import LEGEND_FIELDS, full_scale_words, part_words, shown_sources
 from app.views.plots.spectrum_view import SpectrumView, analyser_at
 from app.window.panels.base import Moment, Panel
@@ -59,28 +58,28 @@ class SpectrumPanel(Panel):
         if standing == self._standing:
             return
         self._standing = standing
-        motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
-        there = [motion for motion in motions if motion.there]
-        ready = tuple(-1 if motion.ready == motion.frames else motion.ready for motion in there)
-        shown = (take, ready, moment.position_s, drawn_ear(choices))
+        signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        there = [signal for signal in signals if signal.there]
+        ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in there)
+        shown = (take.listened, ready, moment.position_s)
         if shown == self._shown:
             return
         self._shown = shown
-        self.view.set_rate(max((motion.rate_hz for motion in there), default=take.info.rate_hz))
-        for motion in motions:
-            if motion in there:
-                self._draw(HeardSignal(motion, drawn_ear(choices)), moment.position_s)
+        self.view.set_rate(max((signal.rate_hz for signal in there), default=take.info.rate_hz))
+        for signal in signals:
+            if signal in there:
+                self._draw(signal, moment.position_s)
             else:
-                self.view.clear_signal(motion.source)
+                self.view.clear_signal(signal.source)
         if math.isfinite(self._hovered_hz):
             self._tell()
 
     def _draw(self, heard: HeardSignal, position_s: float) -> None:
-        analyser = analyser_at(heard.motion.rate_hz)
+        analyser = analyser_at(heard.rate_hz)
         last_window = heard.ready - analyser.window_frames  # at the end of what there is it stays
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / heard.listening.full_scale
-        self.view.show_signal(heard.motion.source, signal, analyser)
+        signal = heard.read(first, first + analyser.window_frames) / heard.listened.ear.full_scale
+        self.view.show_signal(heard.source, signal, analyser)
 
     def _hover(self, frequency_hz: float) -> None:
         self._hovered_hz = frequency_hz

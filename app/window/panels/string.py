@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
-from app.analysis.strobe import Envelope, Strobe, frame_at
+from app.analysis.moment import Envelope, frame_at
 from app.presets.library import Library
 from app.presets.words import shape_word
 from app.rendering import Take
+from app.rendering.take import Listened
 from app.session.choices import Choices, Session
 from app.session.shown import LEGEND_FIELDS, shown_sources
 from app.session.silence import why_difference_silent, why_silent
@@ -51,11 +52,11 @@ class StringPanel(Panel):
         self.view.listening_point_reset.connect(self._reset_listening_point)
         self.view.motion_toggled.connect(lambda on: session.update(motion=on))
         self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
-        self._strobe = Strobe()
         self._envelope: Envelope | None = None
         self._standing: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
         self._take: Take | None = None  # the complete one of this pluck
+        self._judged: Listened | None = None  # what of it was last found silent or not
 
     @property
     def drawing(self) -> bool:
@@ -75,16 +76,15 @@ class StringPanel(Panel):
             self.view.set_shown(choices.motion, choices.envelope)
 
     def take_started(self, take: Take) -> None:
-        self._strobe.restart()
         self._envelope = Envelope()
         self._standing = ()
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self._take = take
-        self.view.set_warning(self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
         take, position_s, choices = moment.take, moment.position_s, self.session.choices
+        self._judge()
         standing = moment.standing(choices)
         if not moment.playing and standing == self._standing:
             return
@@ -97,17 +97,23 @@ class StringPanel(Panel):
         there = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motion, and one motion ahead of another: all are of one moment
         position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
-        shown = (take, position_s, len(there), choices.speed, choices.envelope, choices.solo)
+        strobes = [motion.strobes(position_s) for motion in there]
+        shown = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
         if not moment.playing and shown == self._shown:
             return
         self._shown = shown
-        self._strobe.advance(moment.elapsed_s if moment.playing else 0.0, choices.speed, take.fundamental_hz)
-        shown_s = self._strobe.time_s(position_s, take.fundamental_hz)
         envelope = self._envelope if choices.envelope else None
-        frame = frame_at(take, motions, position_s, shown_s, choices.speed, envelope)
+        frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:
             frame = replace(frame, caption=f"all modes, though mode {choices.solo} is heard alone   {frame.caption}")
         self.view.show_frame(frame)
+
+    def _judge(self) -> None:
+        """Whether the difference can be heard is known when all of it is there, at these listening points."""
+        take = self._take
+        if take is not None and take.listened is not self._judged and take.listened.complete:
+            self._judged = take.listened
+            self.view.set_warning(self._pluck_warning())
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view

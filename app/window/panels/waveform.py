@@ -7,17 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from app.analysis.heard import HeardMotion, HeardSignal
+from app.analysis.heard import HeardSignal
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.session.ears import drawn_ear
 from app.session.shown import LEGEND_FIELDS, part_words, readable_unit, shown_sources
 from app.views.plots.waveform_view import WaveformView
 from app.window.panels.base import Moment, Panel
 
 EVERY = 2  # moments
-MOST_FRAMES = 32_768  # at a time: what is new after the listening point has moved comes in a few steps
+MOST_FRAMES = 262_144  # at a time: a millisecond
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
 
@@ -32,7 +31,7 @@ class _Drawn:
     peak: float = 0.0
 
     def __post_init__(self) -> None:
-        self.signal = np.empty(self.heard.motion.frames, np.float32)
+        self.signal = np.empty(self.heard.frames, np.float32)
 
     def catch_up(self) -> bool:
         """Whether there was something to read."""
@@ -82,11 +81,11 @@ class WaveformPanel(Panel):
         if take is None or self._moments % EVERY:
             return
         choices = self.session.choices
-        there = take.ready_bytes, choices
+        there = take.progress, choices
         if there != self._caught_up:
             self._caught_up = () if self._follow(take) else there
         ready = {name: drawn.ready for name, drawn in self._drawn.items()}
-        shown = (take, ready, drawn_ear(choices), self.view.times_s, self.view.columns)
+        shown = (take.listened, ready, self.view.times_s, self.view.columns)
         if shown != self._shown:
             self._shown = shown
             self._draw()
@@ -99,10 +98,9 @@ class WaveformPanel(Panel):
         choices, moved = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
-            motion = HeardMotion(take, source.source, source.gain)
-            if not motion.there:
+            heard, known = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
+            if not heard.there:
                 continue  # another preset's model is still on its way
-            heard, known = HeardSignal(motion, drawn_ear(choices)), before.get(source.source)
             drawn = known if known is not None and known.heard == heard else _Drawn(heard)
             moved |= drawn.catch_up()
             self._drawn[source.source] = drawn
@@ -112,16 +110,16 @@ class WaveformPanel(Panel):
 
     def _draw(self) -> None:
         choices, view = self.session.choices, self.view
+        assert self._take is not None
+        pickup = self._take.listened.ear.pickup
         peak = max((drawn.peak for drawn in self._drawn.values()), default=0.0)
         if peak > self._full or self._full == 0.0:
             self._full = max(AIR * peak, FLAT)
-        factor, unit = readable_unit(self._full, choices.pickup)
-        view.set_scale(factor * self._full, choices.pickup, unit)
+        factor, unit = readable_unit(self._full, pickup)
+        view.set_scale(factor * self._full, pickup, unit)
         for source in shown_sources(choices, self.library):
             if source.source in self._drawn:
                 drawn = self._drawn[source.source]
-                view.show_signal(
-                    source.source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.motion.rate_hz
-                )
+                view.show_signal(source.source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.rate_hz)
             else:
                 view.clear_signal(source.source)

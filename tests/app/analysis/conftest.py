@@ -13,6 +13,7 @@ from app.analysis.job import Cancelled
 from app.rendering import Take
 from engine.pluck import Pluck
 from engine.presets import read_info
+from engine.voices import Ear
 
 MakeTake = Callable[..., Take]
 
@@ -23,7 +24,8 @@ def make_take(small_preset: Path) -> MakeTake:
 
     def make(model_m: NDArray[np.float32], truth_m: NDArray[np.float32], ready: int | None = None) -> Take:
         info = read_info(small_preset)
-        take = Take("small", info, Pluck(0.35, 4.0, "gaussian", 0.06), (len(truth_m) - 1) / info.rate_hz)
+        seconds = (len(truth_m) - 1) / info.rate_hz
+        take = Take("small", info, Pluck(0.35, 4.0, "gaussian", 0.06), seconds, Ear((0.5,)))
         take.append(model_m[:ready], truth_m[:ready])
         return take
 

@@ -1,14 +1,15 @@
-"""What is read off a take as it is heard, against the whole signal taken at once."""
+"""What is read off a take as it is seen and heard."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from app.analysis.heard import HeardMotion, HeardSignal
 from app.rendering import Take
-from app.rendering.take import Motion
-from app.rendering.velocity import Differentiator
+from app.rendering.take import Motion, Signal
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
@@ -21,60 +22,47 @@ PLACES = np.linspace(0, 1, 101)
 
 
 @pytest.fixture
-def take() -> Take:
+def take(hear: Callable[[Take, Ear], None]) -> Take:
     """Two modes of the truth, of 1 mm and 0.1 mm at 200 and 440 Hz; the model's second is a tenth too loud."""
-    made = Take("t", INFO, Pluck(), 0.5)
+    made = Take("t", INFO, Pluck(), 0.5, Ear((0.5,)))
     time_s = np.arange(made.frames)[:, None] / INFO.rate_hz
     first = 1e-3 * np.cos(2 * np.pi * 200 * time_s) * np.sin(np.pi * PLACES)
     second = 1e-4 * np.cos(2 * np.pi * 440 * time_s) * np.sin(2 * np.pi * PLACES)
     made.append((first + 1.1 * second).astype(np.float32), (first + second).astype(np.float32))
+    hear(made, Ear((0.37, 0.6)))
     return made
 
 
-def test_displacement_is_the_takes_own_signal(take: Take) -> None:
-    heard = HeardSignal(HeardMotion(take, "truth"), Ear((0.37,)))
-    assert heard.ready == take.frames
-    assert heard.read(100, 300) == pytest.approx(take.signal_m("truth", 0.37, 100, 300), abs=1e-9)
+def test_a_signal_is_the_takes_own_at_the_first_point(take: Take) -> None:
+    heard = HeardSignal(take.listened, "truth")
+    assert heard.there
+    assert (heard.ready, heard.frames, heard.rate_hz) == (2_001, 2_001, 4_000)
+    assert heard.read(100, 300) == pytest.approx(take.motion_m("truth")[100:300, 37], abs=1e-9)
+    assert heard.read_points(100, 300)[:, 1] == pytest.approx(take.motion_m("truth")[100:300, 60], abs=1e-9)
     assert len(heard.read(take.frames - 3, take.frames + 50)) == 3
     assert len(heard.read(take.frames + 1, take.frames + 2)) == 0
 
 
-@pytest.mark.parametrize("split", [1, 31, 64, 777])
-def test_any_part_of_a_velocity_is_a_part_of_the_whole(take: Take, split: int) -> None:
-    heard = HeardSignal(HeardMotion(take, "truth"), Ear((0.37,), "velocity"))
-    whole = Differentiator(INFO.rate_hz).feed(take.signal_m("truth", 0.37)[:, None], last=True)[:, 0]
-    parts = [heard.read(first, first + split) for first in range(0, take.frames, split)]
-    assert np.concatenate(parts) == pytest.approx(whole, abs=1e-5)
-    assert np.abs(whole).max() == pytest.approx(2 * np.pi * (200e-3 * np.sin(0.37 * np.pi)), rel=0.2)
-
-
-def test_a_velocity_waits_for_what_follows(take: Take) -> None:
-    """What is told early is what is told at the end."""
-    growing = Take("t", INFO, Pluck(), 0.5)
-    motion = take.motion_m("truth")
-    growing.append(motion[:200], motion[:200])
-    ears = Ear((0.37,), "velocity")
-    early = HeardSignal(HeardMotion(growing, "truth"), ears)
-    assert 100 < early.ready < 200
-    whole = HeardSignal(HeardMotion(take, "truth"), ears)
-    assert early.read(0, 200) == pytest.approx(whole.read(0, early.ready), abs=1e-6)
-
-
-def test_the_difference_has_its_gain_and_solo_is_one_mode(take: Take) -> None:
-    at = 0.25  # where the second mode is largest
-    difference = HeardSignal(HeardMotion(take, DIFFERENCE, 10.0), Ear((at,))).read(0, 9_999)
-    alone = HeardSignal(HeardMotion(take, "truth"), Ear((at,), solo=2)).read(0, 9_999)
+def test_the_difference_has_its_gain(take: Take, hear: Callable[[Take, Ear], None]) -> None:
+    hear(take, Ear((0.25,)))  # where the second mode is largest
+    difference = HeardSignal(take.listened, DIFFERENCE, 10.0).read(0, 9_999)
+    hear(take, Ear((0.25,), solo=2))
+    alone = HeardSignal(take.listened, "truth").read(0, 9_999)
     assert np.abs(alone).max() == pytest.approx(1e-4, rel=1e-3)
     assert difference == pytest.approx(alone, abs=1e-7)  # a tenth, ten times as loud
-    assert not HeardSignal(HeardMotion(take, "truth"), Ear((at,), solo=200)).read(0, 9).any()
 
 
 def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Take) -> None:
-    other = HeardMotion(take, "preset:other")
-    assert not other.there
+    motion, signal = HeardMotion(take, "preset:other"), HeardSignal(take.listened, "preset:other")
+    assert not motion.there
+    assert not signal.there
     take.others["preset:other"] = Motion(1_000, 11, 0.5)
-    assert not other.there
+    take.listened.signals["preset:other"] = Signal(16_000, 1, 0.5)
+    assert not motion.there
+    assert not signal.there
     take.others["preset:other"].append(np.ones((40, 11), np.float32))
-    assert other.there
-    assert (other.rate_hz, other.frames, other.ready, other.grid_points) == (1_000, 501, 40, 11)
-    assert len(HeardSignal(other, Ear((0.5,))).read(0, 501)) == 40
+    take.listened.signals["preset:other"].append(np.ones((50, 1), np.float32))
+    assert motion.there
+    assert signal.there
+    assert (motion.rate_hz, motion.frames, motion.ready, motion.grid_points) == (1_000, 501, 40, 11)
+    assert (signal.rate_hz, signal.frames, len(signal.read(0, 501))) == (16_000, 8_001, 50)

@@ -13,6 +13,9 @@ from app.rendering import Take
 from engine.voices import Ear
 
 RATE_HZ = 4000
+MIDDLE = Ear((0.5,))
+Hear = Callable[[Take, Ear], None]
+Grown = Callable[..., Spectrogram]
 
 
 def tone(frequency_hz: float, amplitude_m: float) -> NDArray[np.float32]:
@@ -22,14 +25,21 @@ def tone(frequency_hz: float, amplitude_m: float) -> NDArray[np.float32]:
     return (amplitude_m * np.cos(2 * np.pi * frequency_hz * time_s)[:, None] * shape).astype(np.float32)
 
 
-def grown(take: Take, listen: float = 0.5) -> Spectrogram:
-    made = Spectrogram(take, Ear((listen,)))
-    while made.advance():
-        pass
-    return made
+@pytest.fixture
+def grown(hear: Hear) -> Callable[..., Spectrogram]:
+    def of(take: Take, ear: Ear = MIDDLE) -> Spectrogram:
+        hear(take, ear)
+        made = Spectrogram(take, take.listened)
+        while made.advance():
+            pass
+        return made
+
+    return of
 
 
-def test_a_sine_has_its_level_at_its_frequency_from_the_first_column(make_take: Callable[..., Take]) -> None:
+def test_a_sine_has_its_level_at_its_frequency_from_the_first_column(
+    make_take: Callable[..., Take], grown: Grown
+) -> None:
     made = grown(make_take(tone(750, 1e-3), tone(750, 1e-2)))
     assert made.complete
     for name, level_db in (("model", -20.0), ("truth", 0.0), ("error", 20 * np.log10(0.9))):
@@ -38,35 +48,35 @@ def test_a_sine_has_its_level_at_its_frequency_from_the_first_column(make_take: 
         assert (levels_db.argmax(axis=1) * made.bin_hz) == pytest.approx(np.full(made.columns, 750), abs=10)
 
 
-def test_a_velocity_is_louder_by_its_frequency_from_the_first_column(make_take: Callable[..., Take]) -> None:
+def test_a_velocity_is_louder_by_its_frequency_from_the_first_column(
+    make_take: Callable[..., Take], grown: Grown
+) -> None:
     take = make_take(tone(750, 1e-3), tone(750, 2e-3))
-    made = Spectrogram(take, Ear((0.5,), "velocity"))
-    while made.advance():
-        pass
+    made = grown(take, Ear((0.5,), "velocity"))
     assert made.complete
     full_db = 20 * np.log10(2e-3 * 2 * np.pi * 750 / 30)
     assert made.levels_db["truth"].max(axis=1) == pytest.approx(np.full(made.columns, full_db), abs=0.3)
-    alone = Spectrogram(take, Ear((0.5,), solo=2))
-    while alone.advance():
-        pass
+    alone = grown(take, Ear((0.5,), solo=2))
     assert alone.levels_db["truth"].max() < -120  # there is the first mode alone
 
 
-def test_it_is_heard_at_the_listening_point(make_take: Callable[..., Take]) -> None:
+def test_it_is_heard_at_the_listening_point(make_take: Callable[..., Take], grown: Grown) -> None:
     take = make_take(tone(750, 1e-3), tone(750, 1e-3))
-    here, there = (grown(take, listen).levels_db["truth"].max() for listen in (0.5, 1 / 6))
+    here, there = (grown(take, Ear((listen,))).levels_db["truth"].max() for listen in (0.5, 1 / 6))
     assert there - here == pytest.approx(20 * np.log10(0.5), abs=0.01)
-    assert grown(take, 0.0).levels_db["truth"].max() == pytest.approx(FLOOR_DB)
+    assert grown(take, Ear((0.0,))).levels_db["truth"].max() == pytest.approx(FLOOR_DB)
 
 
-def test_growing_in_pieces_is_the_same(make_take: Callable[..., Take]) -> None:
+def test_growing_in_pieces_is_the_same(make_take: Callable[..., Take], grown: Grown) -> None:
     motion = np.random.default_rng(2).standard_normal((2001, 101)).astype(np.float32)
     whole = grown(make_take(motion, motion[::-1].copy()))
     take = make_take(motion, motion[::-1].copy(), 30)
-    made = Spectrogram(take, Ear((0.5,)))
+    made = Spectrogram(take, take.listened)
     counts = []
     for stop in (31, 130, 131, 777, 2001):
-        take.append(motion[take.ready_frames : stop], motion[::-1][take.ready_frames : stop])
+        for name, frames in (("model", motion), ("truth", motion[::-1])):
+            signal = take.listened.signals[name]
+            signal.append(frames[signal.ready_frames : stop, 50:51])
         while made.advance():
             pass
         counts.append(made.ready)

@@ -13,9 +13,10 @@ from app.analysis.job import Cancelled, Job
 from app.analysis.take_partials import take_partials
 from app.rendering import Take
 from engine.pluck import Pluck
-from engine.presets import PresetInfo, read_info
+from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
 from engine.resonators.sine_transform import to_grid, to_modes
-from engine.sources import TruthSource, project
+from engine.sources import ModelSource, TruthSource, project
+from engine.voices import Ear
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def take_of(
     info: PresetInfo, pluck: Pluck, gains: list[float], sharp_cents: float = 0.0, seconds: float = 0.5
 ) -> Take:
     """A linear string, and beside it one with modes of other levels and, where asked, a higher tension."""
-    take = Take("take", info, pluck, seconds)
+    take = Take("take", info, pluck, seconds, Ear((0.5,)))
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
     tighter = replace(info.string, tension_n=info.string.tension_n * 2 ** (2 * sharp_cents / 1200))
     motions = []
@@ -89,3 +90,23 @@ def test_it_gives_up_when_nobody_waits(info: PresetInfo) -> None:
 
     with pytest.raises(Cancelled):
         take_partials(take_of(info, Pluck(), list(np.ones(10))), Over())
+
+
+def test_a_take_of_pictures_has_the_partials_of_every_sample(job: Job) -> None:
+    """The model is rendered again for them."""
+    preset = load_preset(SHIPPED / "studio_nylon_b3.safetensors")
+    info, pluck, source = preset.info, Pluck(0.3, 4.0), ModelSource(preset)
+    frames = round(0.2 * info.rate_hz)
+    initial = project(pluck.displacement(info.grid_points), info.modes)[None]
+    following, _ = source.advance(source.start(initial), frames)
+    every = torch.cat([initial[:, None], following], dim=1)[0].float().numpy()
+    whole = Take("whole", info, pluck, 0.2, Ear((0.5,)))
+    whole.append(every, every)
+    pictures = Take("pictures", info, pluck, 0.2, Ear((0.5,)), stride=8, model=source)
+    pictures.append(every[::8], every[::8])
+    expected, found = take_partials(whole, job), take_partials(pictures, job)
+    assert set(found) == set(expected) == {"trained", "all"}
+    for one, other in zip(found["all"][:20], expected["all"][:20], strict=True):
+        assert one.truth_hz == other.truth_hz
+        assert one.cents == pytest.approx(other.cents, abs=0.01)
+        assert one.level_db == pytest.approx(other.level_db, abs=1e-3)

@@ -33,6 +33,17 @@ def test_bench_render_measures_every_model(run, monkeypatch: pytest.MonkeyPatch)
     assert "first block ms" in run("bench", "render").out
 
 
+def test_bench_take_measures_the_studio_strings(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.commands.benchmarks.take.SECONDS", 0.1)
+    monkeypatch.setattr("app.commands.benchmarks.take.PRESETS", ("studio_nylon_b3",))
+    (found,) = json.loads(run("bench", "take", "--json").out)["takes"]
+    assert (found["preset"], found["picture_hz"]) == ("studio_nylon_b3", 6000)
+    # 601 pictures, 13 flashes of 101 points and 4,801 samples of one point, four bytes each
+    assert found["megabytes"] == pytest.approx(4 * (614 * 101 + 4_801) / 1e6)
+    assert found["rendered_s"] > found["moved_s"] > 0
+    assert "MB a source" in run("bench", "take").out
+
+
 def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.commands.benchmarks.train.BATCH", 2)
     monkeypatch.setattr("app.commands.benchmarks.train.FRAMES", 5)

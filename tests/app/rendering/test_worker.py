@@ -22,8 +22,10 @@ from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
 from engine.pluck import Pluck
 from engine.sources import StringSource, project
+from engine.voices import Ear
 
 DEADLINE_S = 30.0
+EAR = Ear((0.37,))
 
 
 class Heard:
@@ -75,7 +77,7 @@ def worker(heard: Heard, sources: Sources) -> Iterator[RenderWorker]:
 
 
 def request_of(preset: Path, **changes: object) -> RenderRequest:
-    return replace(RenderRequest(preset, Pluck(0.4, 3.0), 1.0), **changes)  # type: ignore[arg-type]
+    return replace(RenderRequest(preset, Pluck(0.4, 3.0), 1.0, EAR, 0.004), **changes)  # type: ignore[arg-type]
 
 
 def expected_m(source: StringSource, pluck: Pluck, modes: int, frames: int) -> np.ndarray:
@@ -170,6 +172,9 @@ def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
     assert not take.motion_m("model")[300:].any()
     assert np.abs(take.motion_m("truth")[1_000:]).max() > 1e-4
     assert np.isfinite(take.motion_m("model")).all()
+    heard_m = take.listened.signals["model"].read()
+    assert np.isfinite(heard_m).all()
+    assert not heard_m[3_000:].any()
 
 
 def test_the_error_that_is_told_is_that_of_the_take(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
@@ -195,10 +200,13 @@ def test_another_presets_model_moves_beside_it(
     (take,) = heard.started
     wait_until(lambda: take.others["preset:other"].complete)
     np.testing.assert_array_equal(take.others["preset:other"].read(), take.motion_m("model"))
+    wait_until(lambda: take.listened.signals["preset:other"].complete)
+    np.testing.assert_array_equal(take.listened.signals["preset:other"].read(), take.listened.signals["model"].read())
     worker.submit(request_of(small_preset, others=(other, broken)))
     wait_until(lambda: "preset:broken" in take.others and take.others["preset:broken"].complete)
     assert "broken.safetensors" in heard.others_failed[0]
     assert not take.others["preset:broken"].read().any()
+    assert not take.listened.signals["preset:broken"].read().any()
     assert heard.started == [take]
     assert len(heard.finished) == 1
 
@@ -208,9 +216,9 @@ def test_another_pluck_does_not_wait_for_the_one_before(
 ) -> None:
     advance = Line.advance
 
-    def slow(line: Line, frames: int) -> np.ndarray:
-        time.sleep(2 * frames / line.rate_hz)
-        return advance(line, frames)
+    def slow(line: Line, samples: int) -> None:
+        time.sleep(2 * samples / line.rate_hz)
+        advance(line, samples)
 
     monkeypatch.setattr(Line, "advance", slow)
     worker.submit(request_of(small_preset, seconds=30.0))

@@ -9,7 +9,6 @@ import pytest
 
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
-from app.session.ears import drawn_ear
 from app.session.shown import DEFAULT_SOURCES, full_scale_words, part_words, readable_unit, shown_sources
 from engine.presets import read_info
 
@@ -39,9 +38,8 @@ def test_what_both_slots_hold_is_shown_once(library: Library) -> None:
 
 def test_the_axis_says_what_is_picked_up() -> None:
     assert part_words(Choices()) == ""
-    choices = Choices(pickup="velocity", solo=3, stereo=True, listen=0.2)
+    choices = Choices(pickup="velocity", solo=3, stereo=True)
     assert part_words(choices) == "mode 3, left"
-    assert (drawn_ear(choices).points, drawn_ear(choices).pickup, drawn_ear(choices).solo) == ((0.2,), "velocity", 3)
     assert (full_scale_words(Choices()), full_scale_words(choices)) == ("10 mm", "30 m/s")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 from app.presets.library import Library, list_presets
 from app.rendering import Take
 from app.session.choices import Choices
+from app.session.ears import heard_ear
 from app.session.silence import why_difference_silent, why_ran_away, why_silent
 from engine.pluck import Pluck
 from engine.presets import read_info
+from engine.voices import Ear
 
 
 @pytest.fixture
@@ -46,21 +49,28 @@ def test_the_reason_is_named(library: Library, changes: dict[str, object], words
     assert bool(found) == bool(words)
 
 
-def test_a_difference_of_nothing_or_too_little_is_named(small_preset: Path) -> None:
-    take = Take("small", read_info(small_preset), Pluck(), 0.5)
+def test_a_difference_of_nothing_or_too_little_is_named(
+    small_preset: Path, hear: Callable[[Take, Ear], None]
+) -> None:
+    choices = Choices()
+    take = Take("small", read_info(small_preset), Pluck(), 0.5, heard_ear(choices))
     rest = np.zeros((take.frames, take.info.grid_points), np.float32)
+    assert why_difference_silent(choices, take) == ""  # nothing is known yet
     take.append(rest, rest)
-    assert "do not differ" in why_difference_silent(Choices(), take)
+    hear(take, heard_ear(choices))
+    assert "do not differ" in why_difference_silent(choices, take)
+    assert why_difference_silent(choices.model_copy(update={"listen": 0.2}), take) == ""  # of there nothing is known
     for off_m, gain_db, words in ((1e-7, 20, "raise its gain"), (1e-7, 60, ""), (1e-3, 0, "")):
-        take = Take("small", take.info, Pluck(), 0.5)
+        take = Take("small", take.info, Pluck(), 0.5, heard_ear(choices))
         take.append(rest + np.float32(off_m), rest)
+        hear(take, heard_ear(choices))
         found = why_difference_silent(Choices(difference_gain_db=gain_db), take)
         assert words in found
         assert bool(found) == bool(words)
 
 
 def test_a_model_that_runs_away_is_told_with_the_reason(small_preset: Path) -> None:
-    take = Take("small", read_info(small_preset), Pluck(amplitude_mm=20.0), 0.5)
+    take = Take("small", read_info(small_preset), Pluck(amplitude_mm=20.0), 0.5, Ear((0.5,)))
     assert why_ran_away(take) == ""
     take.model_ends_s = 0.0
     at_once = why_ran_away(take)

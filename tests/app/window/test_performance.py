@@ -17,6 +17,7 @@ from app.audio.output import Output
 from app.audio.sound import Sound
 from app.playing.notes import Note
 from app.session.choices import Choices
+from app.session.ears import heard_ear
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.performance import Performance
@@ -225,6 +226,32 @@ def test_the_picture_follows_the_latest_note(qtbot: QtBot, window: Controller, p
     third = pluck(qtbot, performance)  # the same again: its motion is there
     assert performance._shown.note is third
     assert ringing(performance) == [first, second, third]
+
+
+def test_another_listening_point_and_speed_are_of_the_same_take(
+    qtbot: QtBot, window: Controller, performance: Performance
+) -> None:
+    """Nothing that is seen of it is rendered again; signals and slow motion follow."""
+    session, take = window.session, performance.take
+    assert take is not None
+    pictures = take.motion_m("truth").copy()
+    for choices in ({"listen": 0.8}, {"pickup": "velocity", "stereo": True}, {"solo": 2}, {"speed": 0.1}):
+        session.update(**choices)
+        qtbot.waitUntil(lambda: take.listened.ear == heard_ear(session.choices) and take.listened.complete)
+    qtbot.waitUntil(lambda: take.motion("model").flashes.strobe.speed == 0.1)
+    performance.seek(0.3)
+    string = next(panel.view for panel in window.panels if panel.key == "string")
+    shape_m = take.motion("model").shape_m(0.3)
+    qtbot.waitUntil(
+        lambda: string._frame is not None and abs(string._frame.shapes["model"] / 1000 - shape_m).max() < 1e-9
+    )
+    session.update(speed=0.37)
+    qtbot.waitUntil(lambda: take.motion("model").flashes.strobe.speed == 0.37)
+    other_m = take.motion("model").shape_m(0.3)
+    assert abs(other_m - shape_m).max() > 1e-5
+    qtbot.waitUntil(lambda: abs(string._frame.shapes["model"] / 1000 - other_m).max() < 1e-9)
+    assert performance.take is take
+    assert (take.motion_m("truth") == pictures).all()
 
 
 def test_a_note_of_an_instrument_is_in_the_mixer_before_the_window_knows(

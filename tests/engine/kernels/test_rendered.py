@@ -11,7 +11,6 @@ import soxr
 import torch
 from numpy.typing import NDArray
 
-from app.rendering.velocity import Differentiator
 from engine.kernels.layout import QUANTUM
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
@@ -134,9 +133,9 @@ def test_a_loop_goes_round_without_a_seam(rung: Rung) -> None:
     np.testing.assert_array_equal(rung(3500, voice, attack=False), np.tile(samples, (4, 1))[:3500])
 
 
-def test_velocity_is_that_of_the_samples(rung: Rung) -> None:
+def test_velocity_is_that_of_the_samples(rung: Rung, derivative: Callable[..., NDArray[np.float64]]) -> None:
     voice = waiting(plain_program(RATE_HZ), 0.2, RATE_HZ, Ear((0.5,), "velocity"))
     voice.append(band_limited(RATE_HZ, 0.2))
     found = rung(4096, voice, attack=False)[:, :1]
-    fed = Differentiator(RATE_HZ).feed(band_limited(RATE_HZ, 0.2) * FULL_SCALE_M, last=True)
+    fed = derivative(band_limited(RATE_HZ, 0.2) * FULL_SCALE_M, RATE_HZ)
     np.testing.assert_allclose(found, fed[:4096] / FULL_SCALE_M_S, rtol=1e-5, atol=1e-6)

@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 from torch import Tensor
 
-from app.rendering.velocity import REACH_FRAMES, Differentiator
 from engine.kernels import layout as at
 from engine.kernels.voice import MOVE_QUANTA
 from engine.models import KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.presets import Preset, PresetInfo
 from engine.voices import Ear, Mixer, Voice, bank_program, plain_program, truth_program
+from engine.voices.derivative import REACH_FRAMES
 from engine.voices.voice import FADE_S
 
 RATE_HZ = 48_000
@@ -72,11 +72,13 @@ def test_any_splitting_into_blocks_is_the_same(kind: str, pickup: str, struck: S
 
 @KINDS
 @pytest.mark.parametrize("solo", [0, 3])
-def test_velocity_is_the_derivative_of_displacement(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
+def test_velocity_is_the_derivative_of_displacement(
+    kind: str, solo: int, struck: Strike, rung: Rung, derivative: Callable[..., Signal]
+) -> None:
     points = (0.3, 0.6)
     displacement = rung(9600, struck(kind, Ear(points, solo=solo)), attack=False)
     found = rung(9600, struck(kind, Ear(points, "velocity", solo)), attack=False)
-    expected = Differentiator(RATE_HZ).feed(displacement * FULL_SCALE_M, last=True) / FULL_SCALE_M_S
+    expected = derivative(displacement * FULL_SCALE_M, RATE_HZ) / FULL_SCALE_M_S
     inner = slice(0, 9600 - REACH_FRAMES)
     np.testing.assert_allclose(found[inner], expected[inner], atol=3e-5 * np.abs(expected).max())
 

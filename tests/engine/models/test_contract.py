@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from engine.models import MODELS, StringModel, build_model, count_parameters
-from engine.models.base import Physics
+from engine.models.base import AnyFrameModel, Physics
 from engine.pluck import Pluck
 from engine.presets import load_preset, read_info, save_preset
 from engine.resonators.sine_transform import listening_weights
@@ -56,6 +56,27 @@ def test_any_splitting_into_blocks_is_the_same_motion(named_model: tuple[str, St
         part, state = model.advance(state, steps)
         parts.append(part)
     torch.testing.assert_close(torch.cat(parts, 1), whole, rtol=0, atol=1e-5 * float(whole.abs().max()))
+
+
+@torch.inference_mode()
+def test_some_frames_are_those_of_all(named_model: tuple[str, StringModel[Any]]) -> None:
+    """From any state, of any of the next frames, none among them, and the state after them goes on the same."""
+    _, model = named_model
+    if not isinstance(model, AnyFrameModel):
+        pytest.skip("it steps through every frame")
+    initial = (Pluck().displacement(101) / 1e-3).float()[None]
+    weights = listening_weights(torch.tensor([0.37, 0.61], dtype=torch.float64), 101).float()
+    whole = model(initial, 1900)
+    near = 1e-5 * float(whole.abs().max())
+    state, done = model.encode(initial), 0
+    for steps, frames in ((1, [1]), (300, [1, 2, 12, 299]), (650, []), (900, [7, 500, 900]), (49, [48])):
+        numbers = torch.tensor(frames, dtype=torch.int64)
+        heard, _ = model.sample(state, numbers, steps, weights)
+        some, state = model.sample(state, numbers, steps)
+        expected = whole[:, done + numbers - 1]
+        torch.testing.assert_close(some, expected, rtol=0, atol=near)
+        torch.testing.assert_close(heard, expected @ weights, rtol=0, atol=2 * near)
+        done += steps
 
 
 @torch.inference_mode()

@@ -112,6 +112,7 @@ def test_players_are_as_good_as_they_should_be() -> None:
     players = {
         "series": family_errors.untrained("series"),
         "kicks": family_errors.untrained("kicks"),
+        "slow flow": family_errors.averaged_flow,
         "averaging": family_errors.averaging,
         "linear": family_errors.linear_string,
     }

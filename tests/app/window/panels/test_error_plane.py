@@ -80,6 +80,13 @@ def test_beyond_the_training_is_told(shown: Any) -> None:
     assert "outside the trained range" in shown.words
 
 
+def test_any_range_of_amplitudes_is_drawn(shown: Any) -> None:
+    """A preset may tell that it was trained from no amplitude on, or beyond the map."""
+    for trained_mm in ((0.0, 20.0), (1e-9, 1e9), (0.0, 0.0)):
+        shown.set_trained((0.1, 0.9), trained_mm)
+    assert not shown.map.is_trained(0.5, 3.0)
+
+
 def test_another_shape_is_another_map_and_returning_computes_nothing(
     qtbot: QtBot, controller: Controller, shown: Any, asked: list[Pluck]
 ) -> None:

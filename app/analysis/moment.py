@@ -1,8 +1,4 @@
-"""Which moment of the motion a picture shows: slow motion by stroboscope, and the blur of real time.
-
-The sound is never slowed, and there is one playhead. A stroboscope keeps both: each flash shows the string near
-the playhead, at a phase of its period that moves on slowly.
-"""
+"""The picture of a moment: the string as a stroboscope shows it, and the blur and the range of real time."""
 
 from __future__ import annotations
 
@@ -13,35 +9,12 @@ import numpy as np
 
 from app.analysis.heard import HeardMotion
 from app.analysis.string_frame import Band, StringFrame
-from app.rendering.take import Take
+from app.rendering import Take
 
 BLUR_S = 1 / 60  # an eye's or a picture's exposure
 ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
 ENVELOPE_BLOCK_S = 0.1
 MM = np.float32(1000)
-
-
-class Strobe:
-    """The phase at which the string is seen, in periods of its fundamental."""
-
-    def __init__(self) -> None:
-        self._periods = 0.0
-        self._real_time = False
-
-    def restart(self) -> None:
-        self._periods = 0.0
-
-    def advance(self, elapsed_s: float, speed: float, fundamental_hz: float) -> None:
-        """Moves the phase on by `speed` (1 is real time) over `elapsed_s` of the watcher's time."""
-        self._real_time = speed >= 1
-        self._periods = (self._periods + elapsed_s * speed * fundamental_hz) % 1.0
-
-    def time_s(self, position_s: float, fundamental_hz: float) -> float:
-        """The moment to show: within one period before the playhead; in real time the playhead itself."""
-        if self._real_time:
-            return position_s
-        whole = math.floor(position_s * fundamental_hz)
-        return (whole + self._periods) / fundamental_hz
 
 
 class Envelope:
@@ -104,17 +77,16 @@ def frame_at(
     take: Take,
     motions: Iterable[HeardMotion],
     position_s: float,
-    shown_s: float,
     speed: float,
     envelope: Envelope | None = None,
 ) -> StringFrame:
-    """The picture of a take: the motions' shapes at `shown_s`, blurred over the exposure before the playhead."""
+    """The picture of a take: the motions' shapes in slow motion, blurred over the exposure before the playhead."""
     there = [motion for motion in motions if motion.there]
     shapes, lowest, highest = {}, {}, {}
     for motion in there:
         last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
         frames = motion.read(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
-        shapes[motion.source] = motion.shape(shown_s) * MM
+        shapes[motion.source] = motion.shape(position_s) * MM
         lowest[motion.source] = frames.min(axis=0) * MM
         highest[motion.source] = frames.max(axis=0) * MM
     caption = f"{position_s:.3f} s" + ("" if speed >= 1 else f"   slow motion × {speed:.3f}")

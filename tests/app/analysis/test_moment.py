@@ -1,17 +1,18 @@
-"""The stroboscope, and the picture of a moment."""
+"""The picture of a moment."""
 
 import numpy as np
 import pytest
 import torch
 
 from app.analysis.heard import HeardMotion
-from app.analysis.strobe import Envelope, Strobe, frame_at
+from app.analysis.moment import Envelope, frame_at
 from app.rendering import Take
 from app.rendering.take import Motion
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.string import StringParameters
+from engine.voices import Ear
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,
                   TrainedRange(None, None, (1e-3, 1e-2)), "paper", 0)  # fmt: skip
@@ -19,7 +20,7 @@ INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 
 
 def sine_take(seconds: float = 1.0) -> Take:
     """Both sources swing as one sine in time of the fundamental; the model at half the amplitude."""
-    take = Take("t", INFO, Pluck(), seconds)
+    take = Take("t", INFO, Pluck(), seconds, Ear((0.5,)))
     time_s = np.arange(take.frames) / INFO.rate_hz
     shape = np.sin(np.pi * np.linspace(0, 1, 101))
     truth = (1e-3 * np.cos(2 * np.pi * take.fundamental_hz * time_s)[:, None] * shape).astype(np.float32)
@@ -31,38 +32,19 @@ def both(take: Take) -> list[HeardMotion]:
     return [HeardMotion(take, name) for name in ("model", "truth")]
 
 
-def test_slow_motion_stays_within_a_period_of_the_playhead_and_moves_slowly() -> None:
-    strobe, hz = Strobe(), 247.0
-    shown = []
-    for tick in range(240):
-        strobe.advance(1 / 60, 0.004, hz)
-        position_s = 0.5 + tick / 60
-        time_s = strobe.time_s(position_s, hz)
-        assert abs(time_s - position_s) <= 1 / hz
-        shown.append((time_s * hz) % 1.0)
-    turns = np.diff(np.unwrap(2 * np.pi * np.array(shown))) / (2 * np.pi)
-    assert turns == pytest.approx(np.full(239, 0.004 * hz / 60), abs=1e-6)
-
-
-def test_real_time_shows_the_playhead_itself() -> None:
-    strobe = Strobe()
-    strobe.advance(1 / 60, 1.0, 247.0)
-    assert strobe.time_s(0.1234, 247.0) == 0.1234
-
-
 def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
     take = sine_take()
-    frame = frame_at(take, both(take), 0.5, 0.5, 1.0)
+    frame = frame_at(take, both(take), 0.5, 1.0)
     expected = 1.0 * np.cos(2 * np.pi * take.fundamental_hz * 0.5)
     assert frame.shapes["truth"][50] == pytest.approx(expected, abs=0.02)
     assert frame.highest["truth"][50] == pytest.approx(1.0, abs=0.02)
     assert frame.lowest["model"][50] == pytest.approx(-0.5, abs=0.02)
     assert frame.past_horizon
-    assert not frame_at(take, both(take), 0.05, 0.05, 1.0).past_horizon
+    assert not frame_at(take, both(take), 0.05, 1.0).past_horizon
 
 
 def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None:
-    take = Take("t", INFO, Pluck(), 3.0)
+    take = Take("t", INFO, Pluck(), 3.0, Ear((0.5,)))
     loud, soft = np.full((4_000, 101), 1e-3, np.float32), np.full((8_001, 101), -1e-4, np.float32)
     take.append(loud, loud)
     envelope, motions = Envelope(), both(take)
@@ -72,8 +54,8 @@ def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None
         low, high = envelope.before(position_s, motions)["model"]
         assert (low[50], high[50]) == (pytest.approx(lowest), pytest.approx(highest))
     assert envelope.before(2.5, motions)["truth"][0][50] == pytest.approx(-0.05)
-    assert frame_at(take, both(take), 1.5, 1.5, 1.0, envelope).envelopes["model"][1][50] == pytest.approx(1.0)
-    assert frame_at(take, both(take), 1.5, 1.5, 1.0).envelopes == {}
+    assert frame_at(take, both(take), 1.5, 1.0, envelope).envelopes["model"][1][50] == pytest.approx(1.0)
+    assert frame_at(take, both(take), 1.5, 1.0).envelopes == {}
 
 
 def test_the_difference_and_another_preset_move_too() -> None:
@@ -81,32 +63,21 @@ def test_the_difference_and_another_preset_move_too() -> None:
     take = sine_take()
     take.others["preset:other"] = Motion(1_000, 11, 1.0)
     motions = [HeardMotion(take, DIFFERENCE, 10.0), HeardMotion(take, "preset:other")]
-    assert set(frame_at(take, motions, 0.5, 0.5, 1.0).shapes) == {DIFFERENCE}
+    assert set(frame_at(take, motions, 0.5, 1.0).shapes) == {DIFFERENCE}
     take.others["preset:other"].append(
         np.linspace(0, 1e-3, 1_001, dtype=np.float32)[:, None] * np.ones(11, np.float32)
     )
     envelope = Envelope()
-    frame = frame_at(take, motions, 0.5, 0.5005, 1.0, envelope)
+    frame = frame_at(take, motions, 0.5, 1.0, envelope)
     assert frame.lowest[DIFFERENCE][50] == pytest.approx(-5.0, abs=0.1)
-    assert frame.shapes["preset:other"] == pytest.approx(np.full(11, 0.5005), abs=1e-5)
+    assert frame.shapes["preset:other"] == pytest.approx(np.full(11, 0.5), abs=1e-5)
     assert frame.highest["preset:other"][0] == pytest.approx(0.499, abs=1e-4)
     assert frame.envelopes["preset:other"][1][0] == pytest.approx(0.499, abs=1e-4)
     assert frame.envelopes[DIFFERENCE][1][50] == pytest.approx(5.0, abs=0.1)
-    assert frame_at(take, [motions[1]], 9.0, 9.0, 1.0).shapes["preset:other"][0] == pytest.approx(1.0)
-
-
-def test_a_moment_between_frames_is_between_their_shapes() -> None:
-    take = sine_take()
-    half = take.shape_m("truth", 10.5 / INFO.rate_hz)
-    assert half == pytest.approx((take.motion_m("truth")[10] + take.motion_m("truth")[11]) / 2)
-
-
-def test_listening_at_a_grid_point_hears_that_point() -> None:
-    take = sine_take(0.01)
-    assert take.signal_m("model", 0.37) == pytest.approx(take.motion_m("model")[:, 37], abs=1e-9)
+    assert frame_at(take, [motions[1]], 9.0, 1.0).shapes["preset:other"][0] == pytest.approx(1.0)
 
 
 def test_an_empty_take_has_a_picture() -> None:
-    take = Take("t", INFO, Pluck(), 1.0)
+    take = Take("t", INFO, Pluck(), 1.0, Ear((0.5,)))
     take.append(np.zeros((1, 101), np.float32), np.zeros((1, 101), np.float32))
-    assert torch.tensor(frame_at(take, both(take), 0.0, 0.0, 1.0).shapes["model"]).eq(0).all()
+    assert torch.tensor(frame_at(take, both(take), 0.0, 1.0).shapes["model"]).eq(0).all()

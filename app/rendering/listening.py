@@ -1,0 +1,88 @@
+"""What is heard of a source at the present listening points, sample by sample: its voice, read into a signal.
+
+A compiled voice sounds by itself. Where the model is no compiled voice its samples are rendered for it: at the
+listening points alone where any frame can be had, and read off the motion where every frame of it is kept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from app.rendering.take import Motion, Signal
+from engine.kernels.layout import QUANTUM, REACH
+from engine.pluck import FULL_SCALE_M
+from engine.sources import Runaway, SourceState, StringSource
+from engine.voices import Ear, OfflineVoice, Program
+
+FIRST_FRAMES = 2_048  # of a compiled voice; each block is twice as long as the last, up to the next
+BLOCK_FRAMES = 32_768
+RENDERED_FRAMES = 2_048
+BEHIND = 4 * QUANTUM  # a voice whose samples are rendered reads so far ahead at most
+MIRRORED = 2 * REACH + 2 * QUANTUM  # samples behind the end, for the slope there
+
+
+class Listening:
+    """Reads the voice of a source into `signal`.
+
+    Args:
+        motion: with every frame of the source, where it cannot be rendered at its listening points alone.
+    """
+
+    def __init__(
+        self,
+        signal: Signal,
+        source: StringSource,
+        program: Program,
+        initial_m: Tensor,
+        ear: Ear,
+        motion: Motion | None,
+    ) -> None:
+        self.signal = signal
+        self._source, self._program, self._initial, self._ear, self._motion = source, program, initial_m, ear, motion
+        seconds = (signal.frames + MIRRORED) / signal.rate_hz if program.rendered else 0.0
+        self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
+        self._offline.voice.begin_at_once()
+        self._weights = ear.weights(initial_m.shape[1])
+        self._given = 0  # samples, to a voice that needs them
+        self._last = np.zeros((0, len(ear.points)), np.float32)  # of them
+        self._state: SourceState | None = None
+
+    def advance(self) -> None:
+        """A block of it, or what there is."""
+        signal = self.signal
+        readable = signal.ready_frames + min(max(FIRST_FRAMES, signal.ready_frames), BLOCK_FRAMES)
+        try:
+            if self._program.rendered:
+                self._give(self._more())
+                readable = signal.frames if self._given == signal.frames else self._given - BEHIND
+            count = min(readable, signal.frames) - signal.ready_frames
+            if count > 0:
+                signal.append(self._offline.read(count) * np.float32(self._ear.full_scale))
+        except Runaway:
+            signal.end_in_silence()
+
+    def _more(self) -> NDArray[np.float32]:
+        """The next samples in m, (frames, points)."""
+        stop = min(self._given + RENDERED_FRAMES, self.signal.frames)
+        if self._motion is not None:
+            return np.asarray(self._motion.read(self._given, stop) @ self._weights.float().numpy())
+        if self._state is None:
+            self._state = self._source.start(self._initial)
+            return (self._initial.double() @ self._weights).float().numpy()
+        if stop == self._given:
+            return self._last[:0]
+        frames, self._state = self._source.advance(self._state, stop - self._given, self._weights)
+        return frames[0].float().numpy()
+
+    def _give(self, samples_m: NDArray[np.float32]) -> None:
+        voice = self._offline.voice
+        if len(samples_m):
+            voice.append(samples_m / np.float32(FULL_SCALE_M))
+            self._given += len(samples_m)
+            self._last = np.concatenate([self._last, samples_m])[-MIRRORED - 1 :]
+            if self._given == self.signal.frames:  # turned about its end the signal keeps its slope there
+                turned = 2 * self._last[-1:] - self._last[-2::-1]
+                voice.append(turned / np.float32(FULL_SCALE_M))
+                voice.end_here()

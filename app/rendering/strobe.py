@@ -1,0 +1,86 @@
+"""Slow motion: the moments that a stroboscope shows of a motion, and the string at them.
+
+The sound is never slowed, and there is one playhead. A stroboscope keeps both: each flash shows the string near the
+playhead, at a phase of its period that moves on slowly. Its moments are known beforehand, so that the string at them
+is rendered with the motion: exactly, for a string moves too far between two pictures to tell where it was between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+FLASH_HZ = 120  # twice a screen's rate, so that it matters little which one a picture comes upon
+
+
+@dataclass(frozen=True)
+class Strobe:
+    """The flashes of a motion: one each 1/`FLASH_HZ` of the playhead's way.
+
+    Attributes:
+        speed: periods that the phase moves on in one of the string's; from 1 on each flash shows the playhead itself.
+        fundamental_hz: of the string at rest.
+        seconds: of the motion.
+    """
+
+    speed: float
+    fundamental_hz: float
+    seconds: float
+
+    @cached_property
+    def times_s(self) -> NDArray[np.float64]:
+        """What each flash shows, (flashes,): within one period of its place."""
+        places = np.arange(int(self.seconds * FLASH_HZ) + 1) / FLASH_HZ
+        if self.speed < 1:
+            periods = places * self.fundamental_hz
+            places = (np.floor(periods) + self.speed * periods % 1.0) / self.fundamental_hz
+        return np.minimum(places, self.seconds)
+
+    def flash(self, position_s: float) -> int:
+        """The last one up to the playhead."""
+        return min(max(int(position_s * FLASH_HZ), 0), len(self.times_s) - 1)
+
+
+class Flashes:
+    """The string at a strobe's flashes, between two frames by linear interpolation. Grows as a motion does.
+
+    Attributes:
+        ready: flashes so far.
+    """
+
+    def __init__(self, strobe: Strobe, rate_hz: int, frames: int, grid_points: int) -> None:
+        self.strobe = strobe
+        places = np.minimum(strobe.times_s * rate_hz, frames - 1.0)
+        before = np.minimum(places.astype(np.int64), max(frames - 2, 0))
+        after = np.minimum(before + 1, frames - 1)
+        share = places - before
+        self._parts = [(before, 1 - share), (after, share)]
+        self._needed = np.unique(np.concatenate([before, after]))
+        self._last = after
+        self._shapes_m = np.zeros((len(places), grid_points), np.float32)
+        self.ready = 0
+
+    @property
+    def bytes(self) -> int:
+        return self._shapes_m.nbytes
+
+    def needed(self, first: int, stop: int) -> NDArray[np.int64]:
+        """The frames first … stop - 1 that flashes show, ascending."""
+        return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]
+
+    def take(self, stop: int, numbers: NDArray[np.int64], frames_m: NDArray[np.float32]) -> None:
+        """Frames of these ascending numbers, (frames, grid_points), among them all that are needed before `stop`."""
+        for wanted, shares in self._parts:
+            places = np.searchsorted(numbers, wanted)
+            here = np.flatnonzero(places < len(numbers))
+            here = here[numbers[places[here]] == wanted[here]]
+            self._shapes_m[here] += shares[here, None].astype(np.float32) * frames_m[places[here]]
+        late = self._last >= stop
+        self.ready = int(late.argmax()) if late.any() else len(late)
+
+    def shape_m(self, index: int) -> NDArray[np.float32] | None:
+        """The string (grid_points,) at a flash; None before it is there."""
+        return self._shapes_m[index] if index < self.ready else None
