@@ -83,7 +83,7 @@ class Recipe:
     warm_up: float = 0.1  # share of the run until the peak; then a cosine down to zero
     eigenvalue_rate: float = 0.2  # learning rate of the eigenvalues' parameters, as a share
     coupling_rate: float = 1.0  # learning rate of an integrated phase's K, as a share
-    weight_decay: float = 0.01  # AdamW's
+    weight_decay: float = 0.01  # decoupled, AdamW's
     eigenvalue_decay: bool = False  # whether it decays the eigenvalues' parameters too
     clip_norm: float = 1.0
     loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
@@ -105,6 +105,7 @@ class Recipe:
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
     batch_statistics_until: float = 1.0  # share of the run in which batch norm takes a batch's own; then those stored
     average_decay: float = 0.0  # of a running mean of the weights, an iteration; above 0 that mean is the result
+    optimiser: Literal["adamw", "soap"] = "adamw"  # soap: Adam in the eigenbasis of the gradients' covariances
 
     def __post_init__(self) -> None:
         for name in ("epochs", "batch_size", "first_horizon", "validate_every"):

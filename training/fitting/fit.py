@@ -33,6 +33,7 @@ from training.fitting.losses import training_loss
 from training.fitting.modes import found_modes
 from training.fitting.phases import start_from_phases
 from training.fitting.pursuit import LatentFit, pursue
+from training.fitting.soap import SOAP
 from training.knowledge import own_start
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
@@ -397,7 +398,8 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
             "weight_decay": recipe.weight_decay if recipe.eigenvalue_decay else 0.0,
         },
     ]
-    return torch.optim.AdamW(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
+    kind = SOAP if recipe.optimiser == "soap" else torch.optim.AdamW
+    return kind(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
 
 
 def _keep_statistics(model: torch.nn.Module) -> None:

@@ -80,8 +80,9 @@ def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs:
         {"average_decay": 0.9},
         {"schedule": "constant", "patience": 100},
         {"loss": "log10_mse"},
+        {"optimiser": "soap", "batch_size": 3},  # so many steps that its eigenvectors are refreshed, too
     ],
-    ids=["plain", "average", "constant", "log10"],
+    ids=["plain", "average", "constant", "log10", "soap"],
 )
 @pytest.mark.parametrize("model", ["koopman_var", "lru"])
 def test_a_run_that_is_cut_anywhere_is_the_whole_run(
