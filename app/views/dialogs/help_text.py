@@ -84,10 +84,10 @@ MODELS = (
     ),
     (
         "Shared tension",
-        "One model for every string. Each latent is a mode of the linear string; many times a period, the tension that "
-        "all of them add turns them together. Three learned curves mend what such steps get wrong, the same for all modes "
-        "of all strings: pitch, stiffness, damping and tension are inputs. Bounded and decaying for any weights, at any "
-        "sample rate.",
+        "One model for every string. Each latent is a mode of the linear string; many times a period, the "
+        "tension that all of them add turns them together. Three learned curves mend what such steps get wrong, "
+        "the same for all modes of all strings: pitch, stiffness, damping and tension are inputs. Bounded and "
+        "decaying for any weights, at any sample rate.",
     ),
     (
         "LRU",
