@@ -36,7 +36,13 @@ MODEL_NAMES = {
     "frnn": "FRNN",
 }
 
-TITLE_WORDS = {"koopman_var": "Koopman, variable"}  # where a musician would not know the tables' name
+TITLE_WORDS = {  # where a musician would not know the tables' name
+    "koopman_var": "Koopman, variable",
+    "koopman_integrated": "Integrated phase",
+    "koopman_tension": "Shared tension",
+    "fgru": "Fourier GRU",
+    "frnn": "Fourier RNN",
+}
 
 OF_MANY_STRINGS = frozenset({"koopman_tension"})  # learned by `family train`, no model of one cell
 
@@ -88,6 +94,20 @@ class Cell:
         if self.seed:
             parts.append(f"seed{self.seed}")
         return "_".join(parts)
+
+    @property
+    def title(self) -> str:
+        """For a list of presets: string, training data and rate, then model and what is unusual in its training."""
+        string = "Nylon B3" if self.tension_modulated else "Nylon B3, linear"
+        start = "plucks" if self.initial == "gaussian" else "random shapes"
+        details = [TITLE_WORDS.get(self.model, MODEL_NAMES[self.model])]
+        if self.recipe != RECIPE:
+            details.append("blind" if self.recipe == "blind" else f"{self.recipe} recipe")
+        if self.horizon != HORIZON:
+            details.append(f"trained on {1000 * self.horizon / self.rate_hz:g} ms")
+        if self.seed:
+            details.append(f"seed {self.seed}")
+        return f"{string}, {start}, {self.rate_hz // 1000} kHz — {', '.join(details)}"
 
     @classmethod
     def parse(cls, name: str) -> Cell | None:
@@ -181,7 +201,7 @@ def configuration_of(
     fitted = read(Recipe, {**settings, "seed": cell.seed, **(recipe or {})}, str(path))
     try:
         return TrainingConfiguration(
-            title=_title(cell),
+            title=cell.title,
             model=cell.model,
             data=dataset,
             recipe=fitted,
@@ -191,20 +211,6 @@ def configuration_of(
         )
     except ValueError as error:
         raise SchemaError(f"{cell.name}: {error}") from error
-
-
-def _title(cell: Cell) -> str:
-    details = [TITLE_WORDS.get(cell.model, MODEL_NAMES[cell.model])]
-    if not cell.tension_modulated:
-        details.append("linear")
-    if cell.horizon != HORIZON:
-        details.append(f"{cell.horizon} frames")
-    if cell.recipe != RECIPE:
-        details.append(f"{cell.recipe} recipe")
-    if cell.seed:
-        details.append(f"seed {cell.seed}")
-    start = "plucked" if cell.initial == "gaussian" else "noise"
-    return f"Nylon B3, {start}, {cell.rate_hz // 1000} kHz ({', '.join(details)})"
 
 
 def _description(cell: Cell) -> str:

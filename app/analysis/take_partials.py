@@ -112,7 +112,7 @@ def _row(mode: int, errors: PartialErrors, window: int, note: str) -> PartialRow
     if truth_hz is None and not note:
         note = "not heard: 60 dB below the loudest"
     elif level_db is not None and level_db < -60:
-        note = note or "the model has next to none of it"
+        note = note or "the model hardly excites it"
     model_hz = truth_hz * 2 ** (cents / 1200) if truth_hz is not None and cents is not None else None
     model_t60_s = t60_s * (1 + t60_error_percent / 100) if t60_s and t60_error_percent is not None else None
     return PartialRow(mode, truth_hz, model_hz, cents, t60_s, model_t60_s, t60_error_percent, level_db, note)

@@ -57,7 +57,7 @@ def portaudio_missing(detail: str) -> AudioUnavailable:
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.PORTAUDIO_MISSING,
-            "There is no sound, because the PortAudio library was not found.",
+            "No sound: the PortAudio library was not found.",
             "Install it (Debian and Ubuntu: apt-get install libportaudio2) and start the app again.",
             detail,
         )
@@ -79,7 +79,7 @@ def no_device(detail: str = "") -> AudioUnavailable:
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.NO_DEVICE,
-            "This computer shows no sound output.",
+            "No audio output was found.",
             "Connect loudspeakers or headphones and choose them in the audio settings.",
             detail,
         )
@@ -89,8 +89,8 @@ def no_device(detail: str = "") -> AudioUnavailable:
 def stalled(device_name: str) -> AudioProblem:
     return AudioProblem(
         ProblemKind.STALLED,
-        f"The sound output “{device_name}” takes no sound at the moment.",
-        "The app keeps trying; if it goes on, choose another one in the audio settings.",
+        f"The sound output “{device_name}” is not responding.",
+        "The app keeps trying; if it does not recover, choose another output in the audio settings.",
     )
 
 
@@ -98,7 +98,7 @@ def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.VANISHED,
-            f"The sound output “{device_name}” is no longer there.",
+            f"The sound output “{device_name}” has been disconnected.",
             "Connect it again, or choose another one in the audio settings.",
             detail,
         )

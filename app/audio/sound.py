@@ -185,8 +185,8 @@ class Sound:
             self._report(
                 AudioProblem(
                     ProblemKind.OTHER,
-                    "Playback has stopped because of a fault in this program.",
-                    "Start the app again, and please report the details.",
+                    "Playback has stopped because of an internal error.",
+                    "Restart the app, and please report the details.",
                     traceback.format_exc(),
                 )
             )

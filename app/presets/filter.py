@@ -1,4 +1,4 @@
-"""Which presets a browser lists, and in which order: by words of its search, string, model, rate and favour."""
+"""Which presets a browser lists, and in which order."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Order = Literal["truest", "name", "error"]
 
 @dataclass(frozen=True)
 class PresetFilter:
-    """What is looked for; empty or None is anything.
+    """What is searched for; empty or 0 matches anything.
 
     Attributes:
-        words: parts of words, in any order, between blanks or commas; all of them must be found.
-        order: how true they sound, by name, or by their error in validation; what is not known comes last.
+        words: parts of words, in any order, separated by blanks or commas; all of them must match.
+        order: by distance of the sound from the truth, by name, or by validation error; unknown values come last.
         string: as `PresetInfo.string_kind`.
     """
 
@@ -32,9 +32,9 @@ class PresetFilter:
     order: Order = "truest"
 
     def applied(self, entries: Iterable[PresetEntry], favourites: Collection[str]) -> list[PresetEntry]:
-        """Favourites first, then by `order`; equals stay as they come."""
+        """Studio presets before research ones; in each group favourites first, then by `order` (a stable sort)."""
         found = [entry for entry in entries if self.matches(entry, favourites)]
-        return sorted(found, key=lambda entry: (entry.name not in favourites, *self._rank(entry)))
+        return sorted(found, key=lambda entry: (not entry.studio, entry.name not in favourites, *self._rank(entry)))
 
     def _rank(self, entry: PresetEntry) -> tuple[bool, float]:
         if self.order == "name":
@@ -60,7 +60,7 @@ class PresetFilter:
 
 
 def searched_text(entry: PresetEntry) -> str:
-    """All that a search can find of a preset, in lower case."""
+    """The text of a preset that a search compares with, in lower case."""
     info = entry.info
     parts = (
         info.title,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psygnal import Signal
 
 from app.presets.folders import user_folder
+from app.presets.words import model_word
 from engine.plain_text import one_line
 from engine.presets import (
     SHIPPED,
@@ -19,10 +21,13 @@ from engine.presets import (
     preset_files,
     read_info,
 )
+from engine.schema import SchemaError
+from training.cell import Cell
 from training.heard_file import Heard, read_heard
 
 FIRST = "studio_any_string"
 LONGEST_TITLE = 120  # characters in a list
+STUDIO = "studio_"  # begins the names of presets at full bandwidth
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,11 @@ class PresetEntry:
         return self.path.parent == user_folder()
 
     @property
+    def studio(self) -> bool:
+        """Whether it is listed before the research presets: at full bandwidth, for playing."""
+        return self.name.startswith(STUDIO)
+
+    @property
     def title(self) -> str:
         """As it is listed: a copy in the user's folder is told from the shipped one."""
         title = one_line(self.info.title, LONGEST_TITLE)
@@ -49,7 +59,7 @@ class PresetEntry:
 
 
 class Library:
-    """The presets in the order of the list, found by name. `changed` tells that there are others now."""
+    """The presets, found by name: studio presets first, by name among each other. `changed`: they are others now."""
 
     changed = Signal()
 
@@ -86,7 +96,7 @@ class Library:
 
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
-    """The usable presets by name, and a line for each file that is not one: it does not hide the rest.
+    """The usable presets, studio ones first, then by name; and a line for each file that cannot be used.
 
     By default those of the shipped and of the user's folder; of two of one name, the one of the first folder.
     """
@@ -99,7 +109,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
         for path in preset_files(folder):
             try:
                 if path.stem in entries:
-                    problems.append(f"{path}: there is a preset of this name already; rename the file to use it")
+                    problems.append(f"{path}: a preset of this name exists already; rename the file to use it")
                     continue
                 state = path.stat()
                 entry = _read_entry(path, state.st_mtime_ns, state.st_size)
@@ -110,11 +120,30 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                 problems.append(f"{path}: cannot be read ({error.strerror})")
             except Exception as error:  # whatever one file brings about, the others are listed
                 problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
-    return [entries[name] for name in sorted(entries)], problems
+    titles = Counter(entry.title for entry in entries.values())
+    for name, entry in entries.items():
+        if titles[entry.title] > 1:
+            told_apart = f"{entry.info.title} ({model_word(entry.info.model)})"
+            entries[name] = replace(entry, info=replace(entry.info, title=told_apart))
+    return sorted(entries.values(), key=lambda entry: (not entry.studio, entry.name)), problems
 
 
 @functools.lru_cache(maxsize=512)
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
     """Remembered for as long as the file is the same one: the browser looks each time that it opens."""
     info = read_info(path)
-    return PresetEntry(path.stem, path, info, described_parameters(path, info), size_bytes)
+    listed = replace(info, title=display_title(path.stem, info))
+    return PresetEntry(path.stem, path, listed, described_parameters(path, info), size_bytes)
+
+
+def display_title(name: str, info: PresetInfo) -> str:
+    """Of a preset that fills a cell of the paper's tables, the cell's title, however old the file; else its own."""
+    try:
+        cell = Cell.parse(name)
+    except SchemaError:
+        return info.title
+    if cell is None:
+        return info.title
+    named = cell.model, cell.tension_modulated, cell.initial, cell.rate_hz, cell.horizon
+    stored = info.model, info.tension_modulated, info.initial, info.rate_hz, info.horizon_steps
+    return cell.title if named == stored else info.title

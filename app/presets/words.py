@@ -1,4 +1,4 @@
-"""A preset's facts in a musician's words."""
+"""A preset's facts in words for a musician."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from engine.presets import PresetInfo
 _MODELS = {
     "dmd": ("DMD", "fixed partials fitted to the data: each has one frequency and one decay"),
     "koopman": ("Koopman", "learned partials, each of one frequency and one decay"),
-    "koopman_var": ("Koopman, variable", "learned partials whose pitch and decay follow how hard it is plucked"),
+    "koopman_var": ("Koopman, variable", "learned partials whose pitch and decay depend on the amplitude"),
     "koopman_integrated": (
         "Koopman, integrated phase",
-        "learned partials whose pitch glides as the string comes to rest, as tension does",
+        "learned partials whose pitch glides down with the tension as the string decays",
     ),
+    "koopman_tension": ("Koopman, shared tension", "one model for every string: all partials glide with one tension"),
     "lru": ("LRU", "a deep recurrent network of linear resonances"),
     "s5": ("S5", "a deep state-space network"),
     "fgru": ("Fourier GRU", "a gated recurrent network over the whole string"),

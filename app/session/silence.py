@@ -23,9 +23,9 @@ def why_silent(choices: Choices, library: Library) -> str:
     if choices.amplitude_mm == 0:
         return "silent: the amplitude is 0"
     if choices.volume_db <= VOLUME_RANGE_DB[0]:
-        return "silent: the volume is at its lowest"
+        return "silent: the volume is at its minimum"
     if (name := other_preset(choices.source_heard)) and library.find(name) is None:
-        return f"silent: the preset {name} is not there"
+        return f"silent: the preset {name} was not found"
     return _why_points_silent(choices) or _why_solo_silent(choices, library)
 
 
@@ -38,8 +38,8 @@ def why_ran_away(take: Take) -> str:
         what = f"The model of {title} cannot play this pluck and is silent: its output grows without bound at once."
     else:
         what = (
-            f"The output of {title}'s model ran away {take.model_ends_s:.2f} s after the pluck, and the model is "
-            "silent from there."
+            f"The output of the model of {title} grew without bound {take.model_ends_s:.2f} s after the "
+            "pluck; it is silent from there."
         )
     if outside:
         return f"{what} It was not trained for such plucks ({outside}). Choose one inside it; the truth plays."
@@ -54,7 +54,7 @@ def why_difference_silent(choices: Choices, take: Take) -> str:
     model, truth = (listened.signals[name].read() for name in SOURCES)
     peak = float(np.abs(model - truth).max(initial=0.0)) / ear.full_scale
     if peak == 0:
-        return "silent: model and truth do not differ here"
+        return "silent: model and truth are identical here"
     peak_db = 20 * math.log10(peak) + choices.difference_gain_db
     if peak_db < FAINT_DB:
         return f"too soft to hear: the difference peaks at {peak_db:.0f} dB; raise its gain"
@@ -80,8 +80,8 @@ def _why_solo_silent(choices: Choices, library: Library) -> str:
     if choices.solo == 0 or entry is None:
         return ""
     if choices.solo > entry.info.modes:
-        return f"silent: mode {choices.solo} is heard alone, and this string has {entry.info.modes}"
+        return f"silent: mode {choices.solo} is soloed, and this string has {entry.info.modes}"
     amplitudes = to_modes(choices.pluck.displacement(entry.info.grid_points), choices.solo).abs()
     if float(amplitudes[-1]) < 1e-4 * choices.amplitude_mm / 1000:
-        return f"silent: this pluck does not excite mode {choices.solo}, which is heard alone"
+        return f"silent: this pluck does not excite mode {choices.solo}, which is soloed"
     return ""

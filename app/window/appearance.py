@@ -27,7 +27,7 @@ class Appearance(QObject):
         if field == "face":
             self._put_on()
         else:
-            self._window.notices.inform(f"The window opens at {value} % from the next start on.")
+            self._window.notices.inform(f"UI scale: {value} % after a restart.")
 
     def _follow(self) -> None:
         if self.look.face == "system":

@@ -64,7 +64,9 @@ class AudioControl(QObject):
         self._notice = str(problem)
         if problem.kind is not ProblemKind.STALLED:
             device = self._output.status().device
-            self._notice += f" “{device.name}” plays on." if device else " The app goes on without sound."
+            self._notice += (
+                f" Playback continues on “{device.name}”." if device else " The app continues without sound."
+            )
         self._window.notices.tell(self._notice, problem.detail)
 
     def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:

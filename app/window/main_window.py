@@ -40,7 +40,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
     ("Return", "pluck_asked", "pluck"),
     ("X", "switch_asked", "switch between A and B at the playhead"),
-    ("Esc", "all_modes_asked", "hear all modes again"),
+    ("Esc", "all_modes_asked", "play all modes again"),
     ("Ctrl+L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
@@ -50,9 +50,9 @@ KEYS = (  # (key, name of the signal, what it does)
     ("M", "motion_asked", "show or hide the string's motion"),
     ("E", "envelope_asked", "show or hide the envelope of the motion"),
     ("Ctrl+E", "export_asked", "export WAV"),
-    ("Ctrl+T", "abx_asked", "listening test: can you tell model and truth apart?"),
+    ("Ctrl+T", "abx_asked", "blind listening test (ABX)"),
     ("Ctrl+,", "audio_asked", "audio settings"),
-    ("F8", "notices_asked", "notices of this run"),
+    ("F8", "notices_asked", "notices since the start"),
     ("Ctrl+M", "midi_asked", "MIDI"),
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
@@ -65,8 +65,8 @@ FACTS_HEIGHT = 20
 TITLE_BAR = 40  # at most; how high it is, is known too late
 
 PLAYED_KEYS = (  # see `app/keyboard.py`
-    ("A S D F G H J K L ;", "pluck at ten places, from left to right"),
-    ("1 … 9", "how hard, from softest to loudest (not while a knob has the keyboard)"),
+    ("A S D F G H J K L ;", "pluck at ten positions, from left to right"),
+    ("1 … 9", "amplitude, from softest to loudest (not while a knob has the keyboard focus)"),
     ("C   V", "softer, harder"),
 )
 
@@ -112,13 +112,13 @@ class MainWindow(QMainWindow):
         self.error_label.setToolTip(
             "Model against truth for this pluck: relative mean absolute error, all of the string"
         )
-        self._solo = tool_button("", "Hear all modes", "One mode is heard alone; click, or Esc, to hear all of them")
+        self._solo = tool_button("", "Play all modes", "One mode is soloed; click, or Esc, to play all modes")
         self._solo.setObjectName("solo")
         self._solo.setVisible(False)
         self._solo.clicked.connect(self.all_modes_asked)
         self.rate_label = Label()
         self.rate_label.setObjectName("badge")
-        self._audio_button = tool_button("Audio …", "Audio settings", "Where the sound goes, and how (Ctrl+,)")
+        self._audio_button = tool_button("Audio …", "Audio settings", "Audio output, sample rate and buffer (Ctrl+,)")
         self._audio_button.clicked.connect(self.audio_asked)
         self.menu = AppMenu(self)
         self._menu_button = menu_button(self.menu)
@@ -139,7 +139,7 @@ class MainWindow(QMainWindow):
         self._head = head = QHBoxLayout()
         head.addWidget(self._brand)
         head.addWidget(self.presets, 1)
-        tip = "Can you tell model and truth apart, blind? (Ctrl+T)"
+        tip = "Blind listening test: can you tell A and B apart? (Ctrl+T)"
         self._test_button = test = tool_button("ABX …", "Listening test", tip)
         test.clicked.connect(self.abx_asked)
         for widget in (test, self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
@@ -215,7 +215,7 @@ class MainWindow(QMainWindow):
 
     def show_solo(self, mode: int) -> None:
         """Which mode is heard alone; 0: all are heard."""
-        self._solo.setText(f"Mode {mode} alone  ✕")
+        self._solo.setText(f"Mode {mode} solo  ✕")
         self._solo.setVisible(mode > 0)
 
     def geometry_text(self) -> str:

@@ -237,7 +237,7 @@ class Performance(QObject):
             return ""
         entry = self._library.find(latest.stroke.preset.stem)
         name = entry.info.model.upper() if entry else "model"
-        return f"{name}: sounds in {latest.waits_s:.1f} s"
+        return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
     def _turn(self) -> None:
         """Hands over the next turn of the loop in time."""

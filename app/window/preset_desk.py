@@ -105,4 +105,4 @@ class PresetDesk(QObject):
             )
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.told.emit(f"No file manager was found here; your own presets lie in {folder}.")
+            self.told.emit(f"No file manager was found here; your own presets are in {folder}.")

@@ -20,6 +20,7 @@ EVERY_CELL = [
 
 def test_a_name_is_its_cell() -> None:
     assert len({cell.name for cell in EVERY_CELL}) == len(EVERY_CELL)
+    assert len({cell.title for cell in EVERY_CELL}) == len(EVERY_CELL)
     assert all(Cell.parse(cell.name) == cell for cell in EVERY_CELL)
 
 

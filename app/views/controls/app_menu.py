@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 from app.views.controls.parts import tool_button
 from app.views.look import Look
 
-FACES = {"system": "As the system", "dark": "Dark", "light": "Light"}
+FACES = {"system": "Follow system", "dark": "Dark", "light": "Light"}
 SIZES_PERCENT = (100, 115, 125, 150)
 
 
@@ -22,7 +22,7 @@ class AppMenu(QMenu):
         super().__init__(parent)
         self._choices: dict[tuple[str, object], QAction] = {}
         self._add_choices("Theme", "face", {name: face for face, name in FACES.items()})
-        self._add_choices("Size (from the next start)", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
+        self._add_choices("UI scale (after restart)", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         self.addSeparator()
         self.asked = {
             self.addAction(text): signal
@@ -53,7 +53,7 @@ class AppMenu(QMenu):
 
 def menu_button(menu: QMenu) -> QToolButton:
     """What opens it."""
-    button = tool_button("☰", "Menu", "Theme, size, notices, help")
+    button = tool_button("☰", "Menu", "Theme, UI scale, notices, help")
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)
     return button

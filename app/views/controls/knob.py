@@ -84,7 +84,7 @@ class Knob(QWidget):
         self.setAccessibleName(name)
         self.setAccessibleDescription(limits.text.format(self._value))
         self.setToolTip(
-            f"{tip or name}\nDrag, wheel or arrow keys; Shift is finer; type a number; double-click resets"
+            f"{tip or name}\nDrag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
         )
 
     @property

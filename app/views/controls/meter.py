@@ -20,7 +20,7 @@ class Meter(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Level")
         self.setToolTip(
-            "Playback level in dBFS. LIMIT lights when the safety limiter acts (playback only, never a file)"
+            "Playback level in dBFS. LIMIT lights while the safety limiter is active (playback only, not in files)"
         )
         self._peak_db = LOWEST_DB
         self._hold = 0

@@ -32,9 +32,9 @@ class NoticeBar(QFrame):
         self._label = Label()
         self._label.setWordWrap(True)
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._details = tool_button("Details", "Notice details", "What the system said, to copy (F8)")
+        self._details = tool_button("Details", "Notice details", "Show the error details, which can be copied (F8)")
         self._details.clicked.connect(self.show_all)
-        dismiss = tool_button("Dismiss", "Dismiss the notice", "Take this notice down; the bell keeps it")
+        dismiss = tool_button("Dismiss", "Dismiss the notice", "Dismiss (kept in the list)")
         dismiss.clicked.connect(self.hide)
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 4, 6, 4)
@@ -110,9 +110,9 @@ class Bell(QToolButton):
 
     def set_unseen(self, unseen: int) -> None:
         self.unseen = unseen
-        state = f"{unseen} not looked at" if unseen else "none new"
+        state = f"{unseen} unread" if unseen else "none unread"
         self.setAccessibleName(f"Notices, {state}")
-        self.setToolTip(f"Notices of this run: {state} (F8)")
+        self.setToolTip(f"Notices since the start: {state} (F8)")
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -31,14 +31,14 @@ class NoticeList(QDialog):
         self.resize(640, 420)
         self._notices: list[Notice] = []
         self._list = QListWidget()
-        self._list.setAccessibleName("Notices of this run")
+        self._list.setAccessibleName("Notices since the start")
         self._list.setWordWrap(True)
         self._list.currentRowChanged.connect(self._show_details)
         self._details = QPlainTextEdit(readOnly=True)
         self._details.setAccessibleName("Details")
         self._details.setTabChangesFocus(True)
         copy = QPushButton("Copy all")
-        copy.setToolTip("Copy every notice with its details, for a report")
+        copy.setToolTip("Copy all notices with their details, for a bug report")
         copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.report()))
         close = QPushButton("Close", default=True)
         close.clicked.connect(self.accept)
@@ -61,7 +61,7 @@ class NoticeList(QDialog):
         if self._notices:
             self._list.setCurrentRow(0)
         else:
-            self._details.setPlainText("Nothing has gone wrong in this run.")
+            self._details.setPlainText("No notices since the start.")
 
     def report(self) -> str:
         """Everything as text."""

@@ -82,7 +82,7 @@ class PresetBar(QWidget):
         self.filtered.setText(f"{listed} of {total}  ✕")
         self.filtered.setAccessibleName(f"Filtered: {listed} of {total} presets; clear the filter")
         self.filtered.setToolTip(
-            f"The browser lists {listed} of {total} presets, and previous and next go through these.\n"
+            f"{listed} of {total} presets match the filter; previous and next step through these.\n"
             "Click to clear the filter"
         )
 

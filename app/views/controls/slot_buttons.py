@@ -128,7 +128,7 @@ class SlotButtons(QWidget):
 
     def _menu_button(self, slot: str) -> QToolButton:
         letter = slot.upper()
-        button = tool_button("▾", f"What {letter} holds", f"What {letter} holds, and how loud it is")
+        button = tool_button("▾", f"Source of {letter}", f"Source and gain of {letter}")
         button.setObjectName("narrow")
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(button)

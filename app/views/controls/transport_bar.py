@@ -36,34 +36,34 @@ KNOBS = {  # field of `Choices` -> (label, range, tip)
     "position": (
         "position",
         KnobRange(*POSITION_RANGE, 0.35, 0.01),
-        "Where the string is pulled: 0 and 1 are its ends",
+        "Pluck position; 0 and 1 are the ends of the string",
     ),
     "amplitude_mm": (
         "amplitude",
         KnobRange(0, LARGEST_AMPLITUDE_MM, 4.0, 0.25, "{:.2f} mm"),
-        "How far it is pulled",
+        "Peak displacement of the pluck",
     ),
     "width": (
         "width",
         KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", logarithmic=True),
-        "How wide the pluck is",
+        "Width of the pluck, in lengths of the string",
     ),
-    "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Where the string is heard"),
+    "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Listening point on the string"),
     "listen_right": (
         "right",
         KnobRange(0, 1, 1 - DEFAULT_LISTEN, 0.01),
-        "In stereo, where the right ear hears the string; the left is at “listen”",
+        "Listening point of the right channel in stereo; the left is at “listen”",
     ),
-    "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "How long a pluck is rendered"),
+    "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "Length of a rendered pluck"),
     "speed": (
-        "motion",
+        "slow motion",
         KnobRange(*SPEED_RANGE, 0.004, 1.25, "× {:.3f}", logarithmic=True),
-        "Slow motion of the picture, as by a stroboscope at the playhead: the sound is not slowed",
+        "Slow motion of the string view, as under a stroboscope; the sound is not slowed",
     ),
     "volume_db": (
         "volume",
         KnobRange(*VOLUME_RANGE_DB, 0.0, 1.0, "{:+.0f} dB"),
-        "Playback volume; files are not changed",
+        "Playback volume; exported files are not affected",
     ),
 }
 

@@ -22,7 +22,7 @@ class AboutDialog(QDialog):
         body.setAccessibleName("About this program")
         body.setTabChangesFocus(True)
         copy = QPushButton("Copy")
-        copy.setToolTip("Copy all of this, for a report")
+        copy.setToolTip("Copy this text, for a bug report")
         copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text))
         close = QPushButton("Close", default=True)
         close.clicked.connect(self.accept)

@@ -34,8 +34,8 @@ Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
 
 WATCH_MS = 200
 RENDERING = "The sound is still being rendered."
-NO_DEVICE = "There is no sound device: connect one, or choose another in the window. The test needs ears."
-SAME = "A and B are the same, sample by sample: there is nothing to tell apart."
+NO_DEVICE = "No audio output: connect one, or choose another in the audio settings."
+SAME = "A and B are identical, sample by sample: there is nothing to compare."
 TRIVIAL = (
     "A and B differ so much here that anyone hears it at once: the test would say little. "
     "Choose a pluck that the model knows, or a better preset."

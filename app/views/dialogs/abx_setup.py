@@ -48,9 +48,9 @@ class SetupPage(QWidget):
         self._trials.setFixedSize(64, ROW_HEIGHT)
         self._trials.lineEdit().setTextMargins(6, 0, 0, 0)
         self._trials.setAccessibleName("Number of trials")
-        self._trials.setToolTip("Fixed before the start, for a test that may stop at a lucky moment proves nothing")
+        self._trials.setToolTip("Fixed before the start: a test that could stop at any time would prove nothing")
         self._trials.valueChanged.connect(self._show_trials)
-        self._restart = QCheckBox("Begin again from the pluck at each switch")
+        self._restart = QCheckBox("Restart from the pluck at each switch")
         self._restart.setChecked(restart)
         self._restart.setMinimumHeight(ROW_HEIGHT)
         self._restart.setToolTip("Otherwise the switch happens at the playhead, with a cross-fade")
@@ -107,7 +107,7 @@ class SetupPage(QWidget):
         form.setVerticalSpacing(12)
         self._listen = []
         for name, box in zip("AB", self._pair, strict=True):
-            listen = tool_button(f"▶  Hear {name}", f"Hear {name}", f"Get to know {name} before the test ({name})")
+            listen = tool_button(f"▶  Hear {name}", f"Hear {name}", f"Listen to {name} before the test ({name})")
             listen.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
             self._listen.append(listen)
             row = QHBoxLayout()
@@ -125,8 +125,8 @@ class SetupPage(QWidget):
         place.addWidget(change)
         form.addRow(_row_name("Record"), place)
         what = label(
-            text="In each trial X is A or B, hidden and drawn by chance. Listen to A, B and X as often as you like, "
-            "then say which one X is. Both play at the same level."
+            text="In each trial X is A or B, chosen at random and hidden. Listen to A, B and X as often as you like, "
+            "then answer which one X is. Both play at the same level."
         )
         records = QPushButton("Earlier records …", autoDefault=False)
         records.clicked.connect(self.records_asked)

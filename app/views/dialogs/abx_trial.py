@@ -12,7 +12,7 @@ from app.analysis.abx.sound import Candidate
 from app.views.controls.parts import label
 from app.views.controls.plain import Label
 
-HEAR = "Hear X, then say which one it is."
+HEAR = "Listen to X, then answer which one it is."
 SAY = "Which one is X?"
 _LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
 

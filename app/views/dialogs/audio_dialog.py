@@ -25,7 +25,7 @@ from app.audio.choices import Buffer, DeviceChoice, SoundChoice
 from app.views.controls.parts import combo_box
 from app.views.controls.plain import Label
 
-RATES = {0: "The device's own", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
+RATES = {0: "Device default", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
 BUFFERS: dict[Buffer, str] = {
     "low": "Low latency",
     "medium": "Medium",
@@ -37,8 +37,8 @@ BUFFERS: dict[Buffer, str] = {
     2048: "2048 frames",
 }
 ADVICE = (
-    "Hear crackles? Choose a larger buffer, or close programs that keep the computer busy. "
-    "A smaller buffer answers sooner to a pluck."
+    "Crackles? Choose a larger buffer, or close other programs that use the processor. "
+    "A smaller buffer has a lower latency."
 )
 
 
@@ -73,11 +73,13 @@ class AudioDialog(QDialog):
         self._problem_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._device = combo_box("Output", [("System default", None)])
         self._device.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        self._device.setToolTip("Where the sound goes; it is remembered by its name")
+        self._device.setToolTip("Audio output; remembered by its name")
         self._rate = combo_box("Sample rate", [(name, rate) for rate, name in RATES.items()])
-        self._rate.setToolTip("What the device runs at; the model's rate is converted to it")
+        self._rate.setToolTip("Sample rate of the device; the model's rate is converted to it")
         self._buffer = combo_box("Buffer", [(name, buffer) for buffer, name in BUFFERS.items()])
-        self._buffer.setToolTip("How much sound is kept ready: more is safer, less is more prompt")
+        self._buffer.setToolTip(
+            "Length of the audio buffer: longer is safer against dropouts, shorter has a lower latency"
+        )
         for box in (self._device, self._rate, self._buffer):
             box.activated.connect(self._choose)
         self._gaps = Label("0")
@@ -116,13 +118,13 @@ class AudioDialog(QDialog):
 
     def show_state(self, state: AudioState) -> None:
         heard = bool(state.playing_on)
-        _set(
-            self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if heard else "There is no sound."
-        )
+        _set(self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if heard else "No audio output.")
         _set(self._problem_label, state.problem)
         latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
         _set(self._gaps, f"{len(state.gaps)}{latest}")
-        tip = "Silences while a voice should have sounded, wherever they arose\n" + "\n".join(state.gaps[-12:])
+        tip = "Dropouts: silences while a voice should have sounded, whatever their cause\n" + "\n".join(
+            state.gaps[-12:]
+        )
         if self._gaps.toolTip() != tip:
             self._gaps.setToolTip(tip)
         _set(self._load, f"{100 * state.load:.0f} %")
@@ -139,9 +141,7 @@ class AudioDialog(QDialog):
         self._problem = QFrame()
         self._problem.setObjectName("panel")
         QHBoxLayout(self._problem).addWidget(self._problem_label)
-        rescan = _button(
-            "Look again", "Look for outputs that were connected meanwhile, and open the chosen one", self.rescan_asked
-        )
+        rescan = _button("Rescan", "Search for newly connected outputs and open the selected one", self.rescan_asked)
         self._tones = [
             _button(side.capitalize(), f"A soft tone for a second: {side}") for side in ("left", "both", "right")
         ]
@@ -160,7 +160,7 @@ class AudioDialog(QDialog):
         form.addRow("Test tone", _row(*self._tones, None))
         form.addRow("Gaps", _row(self._gaps, reset, None))
         form.addRow("Load", self._load)
-        close = _button("Close", "Close; every choice already counts")
+        close = _button("Close", "Close; changes are already applied")
         close.setDefault(True)
         close.clicked.connect(self.accept)
         column = QVBoxLayout(self)

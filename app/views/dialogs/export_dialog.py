@@ -31,7 +31,7 @@ from app.views.dialogs.export_pages import BatchPage, SoundPage, as_heard
 from app.views.dialogs.sound_form import SoundForm, wav_settings
 from engine.presets import load_preset
 
-_RECIPE_NOTE = "Each file carries its recipe: drop it on the window, and its preset and pluck are restored."
+_RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
 
 
 class ExportDialog(QDialog):
@@ -94,14 +94,14 @@ class ExportDialog(QDialog):
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")
         self.show_folder = QPushButton("Show in folder")
-        self.show_folder.setToolTip("Open the folder of what was saved")
+        self.show_folder.setToolTip("Open the folder of the saved files")
         self.show_folder.clicked.connect(self._open_folder)
         self.save = QPushButton("Export", default=True)
         self.save.setObjectName("primary")
         self.save.setToolTip("Render and save")
         self.save.clicked.connect(self._start)
         self.close_button = QPushButton("Close")
-        self.close_button.setToolTip("Close, or cancel what is being rendered (Escape)")
+        self.close_button.setToolTip("Close, or cancel the rendering (Escape)")
         self.close_button.clicked.connect(self._cancel_or_close)
         buttons = QHBoxLayout()
         buttons.addWidget(self.show_folder)
@@ -201,9 +201,7 @@ class ExportDialog(QDialog):
         self._say(f"{text}{left}")
 
     def _tell_cancelled(self) -> None:
-        kept = (
-            "what was finished is kept, and the same batch goes on there." if self._is_batch else "no file was left."
-        )
+        kept = "finished files are kept; export again to resume." if self._is_batch else "no file was written."
         self._end(f"Cancelled; {kept}")
 
     def _tell_sound(self, reports: list[WavReport]) -> None:
@@ -214,14 +212,14 @@ class ExportDialog(QDialog):
         if past_s := max(report.past_training_s for report in reports):
             lines.append(f"The last {past_s:.2f} s lie past the model's training; a marker says where it ends.")
         if not reports[0].decayed:
-            lines.append("It still rang at the longest duration, and was faded out there.")
+            lines.append("Not decayed at the maximum length: faded out there.")
         if any(report.clipped for report in reports):
             lines.append("Clipped: lower the amplitude, normalise, or choose floating point.")
         self._end("\n".join(lines), saved=True)
 
     def _tell_batch(self, rows: list[BatchRow]) -> None:
         counts = Counter(row.status for row in rows)
-        text = f"{counts['written']} files written, {counts['kept']} were there already, {counts['failed']} failed."
+        text = f"{counts['written']} files written, {counts['kept']} kept, {counts['failed']} failed."
         clipped = sum(row.clipped or 0 for row in rows)
         peaks = [row.peak_db for row in rows if row.peak_db is not None]
         level = f" Loudest peak {max(peaks):.1f} dBFS, {clipped} samples clipped." if peaks else ""

@@ -81,10 +81,10 @@ class SoundPage(QWidget):
         names = [entry for entry in SOURCE_NAMES if not (stereo and entry[1] == "both")]
         self.source = combo_box("Source", names, export.source)
         self.source.currentIndexChanged.connect(self.changed)
-        self.source.setToolTip("What is saved")
+        self.source.setToolTip("What to save")
         self.path = QLineEdit()
         self.path.setAccessibleName("File")
-        self.path.setToolTip("Two files have the source behind their names")
+        self.path.setToolTip("With two files, the source is appended to each name")
         self.path.textEdited.connect(self._name_edited)
         browse = tool_button("Browse …", tip="Choose the file")
         browse.clicked.connect(self._browse)
@@ -170,8 +170,8 @@ class BatchPage(QWidget):
             box.setMinimumSize(92, 28)
             box.setToolTip({data: text for text, data in SOURCE_NAMES}[source])
             box.setChecked(source in batch.sources)
-        self.overwrite = QCheckBox("Render again what is there already")
-        self.overwrite.setToolTip("Off: files that are there with the same recipe are kept")
+        self.overwrite = QCheckBox("Overwrite existing files")
+        self.overwrite.setToolTip("Off: existing files with the same settings are kept")
         self.folder = _line("Folder", batch.folder or str(Path(export.folder or Path.home()) / "strings"), "")
         browse = tool_button("Browse …", tip="Choose the folder")
         browse.clicked.connect(self._browse)
@@ -182,7 +182,7 @@ class BatchPage(QWidget):
         form.addRow(label("Presets"), self.presets)
         form.addRow(label("Plucks"), self.what)
         for name, edit in (("Positions", self.positions), ("Amplitudes, mm", self.amplitudes)):
-            several = row_of(faint("several: commas between"))
+            several = row_of(faint("comma-separated"))
             several.insertWidget(0, edit, 100)
             form.addRow(label(name), several)
         form.addRow(label("Sources"), row_of(*self.sources.values()))
@@ -238,7 +238,7 @@ class BatchPage(QWidget):
 
 def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
     pluck = f"{_shape_text(choices)}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
-    modes = f". All modes, though mode {choices.solo} is heard alone" if choices.solo else ""
+    modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
     return f"{preset.title}: {pluck}, {_heard_text(choices)}{modes}"
 
 
@@ -257,7 +257,7 @@ def _heard_text(choices: Choices) -> str:
 def _line(name: str, text: str, example: str) -> QLineEdit:
     edit = QLineEdit(text)
     edit.setAccessibleName(name)
-    edit.setToolTip(f"{name}: one, or several with commas between, for example {example}" if example else name)
+    edit.setToolTip(f"{name}: one or more, comma-separated, for example {example}" if example else name)
     if example:
         edit.setPlaceholderText(f"for example {example}")
     return edit
@@ -267,4 +267,4 @@ def _numbers(name: str, text: str) -> tuple[float, ...]:
     try:
         return tuple(float(word) for word in text.replace(";", ",").split(",") if word.strip())
     except ValueError as error:
-        raise ValueError(f"{name}: numbers with commas between, not {text!r}") from error
+        raise ValueError(f"{name}: comma-separated numbers, not {text!r}") from error

@@ -27,12 +27,12 @@ class HelpDialog(QDialog):
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName("Help topics")
         self.tabs.setDocumentMode(True)
-        self._add("Tour", "<h3>Two minutes</h3><ol>" + _items(TOUR) + "</ol>")
-        self._add("Keys", "<h3>Keys</h3>" + _table(keys) + "<h3>Hands</h3>" + _table(GESTURES))
+        self._add("Tour", "<h3>A tour of two minutes</h3><ol>" + _items(TOUR) + "</ol>")
+        self._add("Keys", "<h3>Keys</h3>" + _table(keys) + "<h3>Mouse gestures and knobs</h3>" + _table(GESTURES))
         self._add("Views", _sections(views))
         self._add(
             "Models",
-            "<p>Every model is told the shape in which the string is let go; all that follows is its own.</p>"
+            "<p>Every model is given the initial displacement of the string and computes the motion that follows.</p>"
             + _sections(MODELS),
         )
         close = QPushButton("Close", default=True)

@@ -5,69 +5,71 @@ from __future__ import annotations
 TOUR = (
     (
         "Pluck",
-        "Drag on the string and let go. The white handle is where, and how far, it is pulled. You hear the model.",
+        "Drag on the string and let go. The white handle shows the position and amplitude of the pluck. You hear the "
+        "model.",
     ),
     (
         "Compare",
-        "Press X: now you hear the truth, the solved physics, at the same playhead and level. Press X again. The "
-        "small arrows beside A and B choose what they hold: the difference made louder, or another preset.",
+        "Press X to hear the truth, the numerical solution of the string's equation, at the same playhead and "
+        "level. X again returns. The small arrows beside A and B select their sources: model, truth, the amplified "
+        "difference, or another preset.",
     ),
     (
         "Look",
-        "Amber is the model, blue the truth, in every view. The picture is slowed like under a stroboscope, the "
-        "sound is not: the motion knob sets how much.",
+        "Amber is the model, blue the truth, in every view. The string is shown in slow motion, as under a "
+        "stroboscope; the sound is not slowed. The slow motion knob sets the factor.",
     ),
     (
         "Go past the training",
-        "In the waveform, everything behind the red line is longer than any motion the model was shown. Choose "
-        "another preset with Page down and hear which of them drift there.",
+        "In the waveform, the red line marks the end of the training data; after it the model extrapolates. "
+        "Step through the presets with Page down to hear which of them drift there.",
     ),
     (
         "Look closer",
         "Choose Space–time or Error over time: a click moves the playhead there. In Eigenvalues and Partials a click "
-        "lets you hear one mode alone once it plays, Esc all of them; in the Error map it plucks there.",
+        "solos one mode, Esc plays all of them; in the Error map a click plucks there.",
     ),
     (
         "Listen elsewhere",
-        "Drag the green marker beneath the string. Near a node of a partial, that partial is gone; at the ends there "
-        "is silence. Stereo gives you two such points; Velocity listens as a magnetic pick-up does.",
+        "Drag the green marker beneath the string. At a node of a partial, that partial is not heard; at the ends "
+        "nothing is. Stereo has two listening points; Velocity is the signal of a magnetic pick-up.",
     ),
     (
-        "Leave what it knows",
-        "The hatched parts of the string are where the model was never plucked. You may pluck there; the window "
-        "says so.",
+        "Beyond the training range",
+        "The hatched parts of the string were not plucked in the model's training. You can pluck there: the model "
+        "extrapolates, and the window says so.",
     ),
     (
-        "Choose and judge",
-        "Ctrl+P browses the presets, the truest first, and a preset file dropped on the window becomes one of yours. "
-        "Ctrl+T is a blind test: can you tell model and truth apart?",
+        "Browse and test",
+        "Ctrl+P browses the presets, the most accurate sound first; a preset file dropped on the window is "
+        "added to your own. Ctrl+T is a blind test: can you tell model and truth apart?",
     ),
-    ("Keep it", "Ctrl+E saves WAVs that carry their recipe. Drop one on the window, and the sound is back."),
+    ("Export", "Ctrl+E saves WAV files that store their settings. Drop one on the window to restore them."),
 )
 
 GESTURES = (
-    ("Click on the string", "pluck there, as far as the last time"),
-    ("Drag on the string", "pluck there, that far"),
+    ("Click on the string", "pluck there, with the last amplitude"),
+    ("Drag on the string", "pluck there, with that amplitude"),
     ("Drag the green marker", "move the listening point; double-click resets it"),
     ("Arrow keys on the string", "move the pluck; with Shift the listening point"),
-    ("Drag, wheel or arrow keys on a knob", "change it; with Shift finely"),
+    ("Drag, wheel or arrow keys on a knob", "change it; with Shift in fine steps"),
     ("Digits on a knob", "type a value, then Enter"),
-    ("Delete or double-click on a knob", "its default"),
+    ("Delete or double-click on a knob", "reset to the default"),
     ("Click in the waveform", "move the playhead; the wheel zooms, double-click shows all"),
 )
 
 MODELS = (
     (
         "DMD",
-        "Dynamic mode decomposition: the one linear map that carries each frame, together with its predecessors, "
-        "closest to the next, found by least squares and not trained. Its eigenvalues are fixed frequencies and "
+        "Dynamic mode decomposition: the linear map from each frame and its predecessors to the next, "
+        "fitted by least squares. Its eigenvalues are fixed frequencies and "
         "decays, so it suits a linear string; it cannot follow partials that fall in pitch.",
     ),
     (
         "Koopman",
-        "A neural network maps the initial shape to a latent state in which time is linear: each latent turns and "
+        "A neural network maps the initial shape to a latent state in which time is linear: each latent rotates and "
         "decays at its own fixed eigenvalue. A second network maps the latents back to the string, and all "
-        "nonlinearity must lie in these two maps.",
+        "nonlinearity is in these two maps.",
     ),
     (
         "Koopman_var",
@@ -92,14 +94,14 @@ MODELS = (
     (
         "LRU",
         "Linear recurrent unit: layers of a diagonal linear recurrence that is stable for every weight, with "
-        "networks that bend each sample between them. The initial shape goes in as one impulse; from then on the "
-        "layers ring, and the string is read off sample by sample.",
+        "nonlinear networks between them. The initial shape is the input of the first sample, an impulse; from then "
+        "on the layers resonate, and each sample is decoded to the displacement of the string.",
     ),
     (
         "S5",
         "Structured state space: like the LRU a stack of diagonal recurrences with nonlinear layers between, but "
         "discretised from continuous time with a learned step. Its decay is not bounded by construction, so a "
-        "trained model may grow; playback is limited, and a runaway is silenced and told.",
+        "trained model may grow; playback is limited, and an unbounded output is muted with a notice.",
     ),
     (
         "FGRU",

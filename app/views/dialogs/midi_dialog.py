@@ -1,4 +1,4 @@
-"""MIDI: which input, what notes do, and which controller turns what. Stays open while one plays."""
+"""MIDI: which input, what notes do, and which controller sets what. It stays open while notes are played."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from app.views.controls.parts import combo_box
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
-    ("Say where the string is plucked", "position"),
-    ("Choose the preset", "preset"),
+    ("Set pluck position", "position"),
+    ("Select preset", "preset"),
 )
 
 
@@ -38,8 +38,8 @@ class MidiDialog(QDialog):
         self.setMinimumWidth(460)
         self._inputs = combo_box("MIDI input", [])
         self._inputs.activated.connect(lambda row: self.port_chosen.emit(self._inputs.itemData(row)))
-        self._notes = combo_box("What notes do", NOTE_MODES)
-        self._notes.setToolTip("Velocity always says how hard the string is plucked")
+        self._notes = combo_box("Function of notes", NOTE_MODES)
+        self._notes.setToolTip("Velocity always sets the amplitude")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
         self._problem = Label()
         self._problem.setObjectName("warning")
@@ -77,9 +77,9 @@ class MidiDialog(QDialog):
             taught = Label()
             learn, forget = QPushButton("Learn"), QPushButton("Forget")
             learn.setCheckable(True)
-            learn.setAccessibleName(f"Learn a controller for {label}")
-            forget.setAccessibleName(f"Forget the controller of {label}")
-            forget.setToolTip(f"No controller turns {label} any more")
+            learn.setAccessibleName(f"Assign a controller to {label}")
+            forget.setAccessibleName(f"Unassign {label}")
+            forget.setToolTip(f"Unassign {label}")
             for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
                 button.setAutoDefault(False)
                 button.clicked.connect(lambda _=False, asked=asked, field=field: asked.emit(field))
@@ -103,7 +103,7 @@ class MidiDialog(QDialog):
         """Whether controllers can be taught; where not, why, with the remedy."""
         for field, (_, learn, _) in self._rows.items():
             learn.setEnabled(not why_not)
-            learn.setToolTip(why_not or f"Then move the controller that shall turn {self._turned[field]}")
+            learn.setToolTip(why_not or f"Click, then move a control to assign it to {self._turned[field]}")
 
     def show_problem(self, text: str) -> None:
         self._problem.setText(text)
@@ -114,7 +114,7 @@ class MidiDialog(QDialog):
         self._notes.setCurrentIndex(max(0, self._notes.findData(notes)))
         for field, (taught, learn, forget) in self._rows.items():
             waits, number = field == learning, controllers.get(field)
-            taught.setText("Move a controller …" if waits else "–" if number is None else f"Controller {number}")
+            taught.setText("Move a control …" if waits else "–" if number is None else f"Controller {number}")
             taught.setObjectName("" if waits or number is not None else "faint")
             taught.style().polish(taught)
             learn.setChecked(waits)

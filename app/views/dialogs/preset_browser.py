@@ -1,6 +1,6 @@
-"""The preset browser: a search, a list and a card over the window. It stays open while presets are tried.
+"""The preset browser: a search, a list under two headings (studio, research) and a card. It stays open meanwhile.
 
-type              filters the list (words in any order; a comma between two)
+type              filters the list (words in any order)
 arrows            move in the list and load
 Space             plucks; in a search that has begun it is a blank
 Ctrl+D            makes a favourite, or no longer
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from html import escape
 
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QEvent, QModelIndex, QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -39,6 +39,7 @@ from app.views.dialogs.preset_card import preset_card
 _KEYS = Qt.Key
 _MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
 _STAR, _TITLE, _RATE, _ERROR, _HEARD = range(5)
+_HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}
 _HINT = "Type to search   ·   ↑ ↓ load   ·   Space plucks   ·   Ctrl+D favourite   ·   Enter closes"
 
 
@@ -57,10 +58,11 @@ class PresetBrowser(QFrame):
         self.setObjectName("browser")
         self.setAccessibleName("Preset browser")
         self._entries: list[PresetEntry] = []
+        self._rows: list[QTreeWidgetItem] = []  # of the entries, without the headings
         self._before: QWidget | None = None  # had the keyboard
         self.search = QLineEdit(placeholderText="Search presets")
         self.search.setAccessibleName("Search presets")
-        self.search.setToolTip("Words in any order, a comma between two")
+        self.search.setToolTip("Words in any order, separated by spaces or commas")
         self.search.setClearButtonEnabled(True)
         self.search.textChanged.connect(self._tell_filter)
         self._strings = combo_box(
@@ -75,7 +77,7 @@ class PresetBrowser(QFrame):
             "Order", [("Truest first", "truest"), ("By name", "name"), ("Smallest error", "error")]
         )
         self._order.setToolTip(
-            "In which order: how true presets sound, by name or by error; favourites come before all"
+            "Sort by distance of the sound from the truth, by name or by error; favourites first in each group"
         )
         self._order.currentIndexChanged.connect(self._tell_filter)
         self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
@@ -100,6 +102,8 @@ class PresetBrowser(QFrame):
         made.setToolTip("Arrows load, Space plucks, Enter closes")
         made.setHeaderLabels(["", "Preset", "Rate", "Error", "Heard"])
         made.setRootIsDecorated(False)
+        made.setIndentation(0)
+        made.setItemsExpandable(False)
         made.setUniformRowHeights(True)
         made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # presets of one string differ at the end
         made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -120,7 +124,8 @@ class PresetBrowser(QFrame):
         close = tool_button("✕", "Close the browser", "Close (Escape)")
         close.clicked.connect(self.dismiss)
         folder = tool_button(
-            "Open folder", tip="Show the folder of your own presets; a preset dropped here is put there"
+            "Open folder",
+            tip="Show your presets' folder; a preset file dropped on the window is copied to it",
         )
         folder.clicked.connect(self.folder_asked)
         head = QHBoxLayout()
@@ -173,27 +178,51 @@ class PresetBrowser(QFrame):
         self._entries = entries
         with QSignalBlocker(self.list):
             self.list.clear()
+            headings = {studio: self._add_heading(studio) for studio in dict.fromkeys(e.studio for e in entries)}
+            self._rows = []
             for entry in entries:
                 info = entry.info
                 star = "★" if entry.name in favourites else "☆"
                 heard = heard_word(entry.heard)
                 item = QTreeWidgetItem([star, entry.title, rate_word(info.rate_hz), error_word(info), heard])
                 kind = f"{model_word(info.model)}, {string_word(info.tension_modulated)}"
+                item.setData(_TITLE, Qt.ItemDataRole.UserRole, entry.name)
                 item.setToolTip(_TITLE, _tip(entry.title, kind, entry.path.name))
                 item.setToolTip(_HEARD, _tip(heard_sentence(entry.heard, entry.name)))
                 item.setToolTip(_STAR, "Favourite (Ctrl+D)")
                 for column in (_RATE, _ERROR):
                     item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                self.list.addTopLevelItem(item)
+                headings[entry.studio].addChild(item)
+                self._rows.append(item)
+            self.list.expandAll()
         found = f"{len(entries)} of {total} presets" if len(entries) < total else f"{total} presets"
         self._state.setText(f"{found}   ·   your own: {folder}" if total else f"No presets   ·   your own: {folder}")
         self.set_chosen(chosen)
 
+    def _add_heading(self, studio: bool) -> QTreeWidgetItem:
+        heading = QTreeWidgetItem(self.list, [_HEADINGS[studio]])
+        heading.setFlags(Qt.ItemFlag.ItemIsEnabled)
+        heading.setFirstColumnSpanned(True)
+        font = heading.font(0)
+        font.setBold(True)
+        heading.setFont(0, font)
+        return heading
+
     def set_chosen(self, name: str) -> None:
-        row = next((row for row, entry in enumerate(self._entries) if entry.name == name), -1)
+        row = self._row_of(name)
         with QSignalBlocker(self.list):
-            self.list.setCurrentIndex(self.list.model().index(row, _TITLE))  # none where it was filtered out
+            self._mark(row)  # none where it was filtered out
         self._card.setText(preset_card(self._entries[row]) if row >= 0 else _empty(bool(self._entries)))
+
+    def _row_of(self, name: str) -> int:
+        """Its place in the list without the headings; -1 where it is not listed."""
+        return next((row for row, entry in enumerate(self._entries) if entry.name == name), -1)
+
+    def _mark(self, row: int) -> None:
+        if row >= 0:
+            self.list.setCurrentItem(self._rows[row], _TITLE)
+        else:
+            self.list.setCurrentIndex(QModelIndex())
 
     # What is asked
 
@@ -242,16 +271,15 @@ class PresetBrowser(QFrame):
         )
 
     def _row_changed(self, item: QTreeWidgetItem | None) -> None:
-        if item is not None:
-            self.preset_chosen.emit(self._entries[self.list.indexOfTopLevelItem(item)].name)
+        if name := _name_of(item):
+            self.preset_chosen.emit(name)
 
     def _clicked(self, item: QTreeWidgetItem, column: int) -> None:
-        if column == _STAR:
-            self.favourite_asked.emit(self._entries[self.list.indexOfTopLevelItem(item)].name)
+        if column == _STAR and (name := _name_of(item)):
+            self.favourite_asked.emit(name)
 
     def _current_name(self) -> str:
-        row = self.list.currentIndex().row()
-        return self._entries[row].name if row >= 0 else ""
+        return _name_of(self.list.currentItem())
 
     # Keys and place
 
@@ -304,15 +332,15 @@ class PresetBrowser(QFrame):
             self.dismiss()
 
     def _move(self, key: Qt.Key) -> None:
-        rows = self.list.topLevelItemCount()
+        rows = len(self._rows)
         if rows == 0:
             return
         self.list.setFocus()  # where Space plucks
         page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
         step = {_KEYS.Key_Up: -1, _KEYS.Key_Down: 1, _KEYS.Key_PageUp: -page, _KEYS.Key_PageDown: page}[key]
-        here = self.list.currentIndex().row()
+        here = self._row_of(self._current_name())
         row = here + step if here >= 0 else (0 if step > 0 else rows - 1)
-        self.list.setCurrentIndex(self.list.model().index(min(max(row, 0), rows - 1), _TITLE))
+        self._mark(min(max(row, 0), rows - 1))
 
     def _place(self) -> None:
         """Under the bar of the presets; what moves the string and the sound stays in sight."""
@@ -323,10 +351,17 @@ class PresetBrowser(QFrame):
             self.setGeometry(14, top, width, max(300, height))
 
 
+def _name_of(item: QTreeWidgetItem | None) -> str:
+    """The name of a row's preset; empty for a heading and for none."""
+    return (item.data(_TITLE, Qt.ItemDataRole.UserRole) or "") if item is not None else ""
+
+
 def _tip(*lines: str) -> str:
     """Of plain text: what a file says is never taken for markup."""
     return f"<p>{'<br>'.join(map(escape, lines))}</p>"
 
 
 def _empty(any_listed: bool) -> str:
-    return "The chosen preset is not in this list." if any_listed else "No preset fits: clear the search or a filter."
+    return (
+        "The chosen preset is not in this list." if any_listed else "No matching preset: clear the search or filters."
+    )

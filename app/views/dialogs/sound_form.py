@@ -26,13 +26,13 @@ class SoundForm(QWidget):
         super().__init__(parent)
         self._preset_rate_hz = preset_rate_hz
         self.length = combo_box("Length", [("Until it has decayed", True), ("Fixed", False)], export.until_decayed)
-        self.length.setToolTip("Until it has decayed: nothing that can be heard is cut")
+        self.length.setToolTip("Until it has decayed")
         self.decay = spin_box("Decay", *DECAY_RANGE_DB, export.decay_db, " dB", 0, 5)
         self.decay.setPrefix("by ")
-        self.decay.setToolTip("The sound ends where model and truth have fallen so far below their loudest")
+        self.decay.setToolTip("The sound ends where model and truth are this far below their peak")
         self.longest = spin_box("Longest duration", 0.1, LONGEST_S, export.longest_s, " s", 1, 1)
         self.longest.setPrefix("at most ")
-        self.longest.setToolTip("A string that rings longer is faded out here")
+        self.longest.setToolTip("A string that rings longer is faded out at this length")
         self.seconds = spin_box("Duration", 0.1, LONGEST_S, export.seconds, " s", 1, 0.5)
         self.seconds.setToolTip("The end is faded out within 10 ms")
         names = [("The model's own", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ if rate)]
@@ -43,13 +43,13 @@ class SoundForm(QWidget):
         self.bits.setToolTip("16 bits are dithered; floating point never clips")
         self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
         self.normalise.setMinimumHeight(28)
-        self.normalise.setToolTip("Off: 10 mm of displacement are full scale, as in playback at 0 dB")
+        self.normalise.setToolTip("Off: 10 mm of displacement is full scale, as in playback at 0 dB")
         self.normalise.setChecked(export.normalise)
         self.gain = spin_box(
             "Gain of the difference", *DIFFERENCE_GAIN_RANGE_DB, export.difference_gain_db, " dB", 0, 6
         )
         self.gain.setPrefix("+")
-        self.gain.setToolTip("How much louder the difference of model and truth is made")
+        self.gain.setToolTip("Gain of the difference, model − truth")
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow(label("Length"), row_of(self.length, self.decay, self.longest, self.seconds))

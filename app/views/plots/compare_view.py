@@ -36,20 +36,20 @@ def times(value: float) -> str:
 
 
 COLUMNS = (
-    Column("Preset", "Double-click or Enter loads it"),
+    Column("Preset", "Double-click or Enter loads the preset"),
     Column("MAE", "Relative mean absolute error over the trained horizon, all of the string", percent),
     Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
     Column(
         "Null, dB",
-        "What is left of the sound at the listening point where model and truth are subtracted, all of the pluck",
+        "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck",
         decibels,
     ),
     Column("Speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
-    Column("Parameters", "Trainable numbers", lambda n: f"{n:,}"),
+    Column("Parameters", "Trainable parameters", lambda n: f"{n:,}"),
     Column("MSE", "Relative mean squared error over the trained horizon", scientific),
     Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
     Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
-    Column("Model", "The model's family"),
+    Column("Model", "Model architecture"),
     Column("Note", "Why there are no figures"),
 )
 
@@ -69,17 +69,17 @@ class CompareView(QWidget):
         self.setMinimumHeight(84)
         self._menu = QMenu(self)
         self._actions: dict[str, QAction] = {}
-        presets = tool_button("Presets ▾", "Presets to compare", "Choose the presets that are compared")
+        presets = tool_button("Presets ▾", "Presets to compare", "Select the presets to compare")
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
         self._words = words_label()
         self._stop = tool_button(
-            "Stop", "Stop comparing", "Stop computing; or compute what is missing, or all of it again"
+            "Stop", "Stop comparing", "Stop computing, compute missing rows, or compute all again"
         )
         self._stop.clicked.connect(self.stop_asked)
         copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
         self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
-        self.table.setToolTip("Double-click or Enter loads a preset; Delete takes it out. Ctrl+C copies the table")
+        self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
         copy.clicked.connect(self.table.copy)
         self.table.row_double_clicked.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_entered.connect(lambda name: self.preset_opened.emit(name))
@@ -105,7 +105,7 @@ class CompareView(QWidget):
         """What can be compared."""
         menu = self._menu
         menu.clear()
-        for text, signal in (("Those of the present string", self.same_string_asked), ("All", self.all_asked)):
+        for text, signal in (("Presets of the present string", self.same_string_asked), ("All", self.all_asked)):
             menu.addAction(text).triggered.connect(signal)
         menu.addSeparator()
         self._actions = {}

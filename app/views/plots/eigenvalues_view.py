@@ -44,7 +44,7 @@ class EigenvaluesView(QWidget):
         self._figure: PoleFigure | None = None
         self._solo = 0
         self._axes = combo_box("Axes", [(text, key) for key, text in AXES.items()])
-        self._axes.setToolTip("As a musician reads them, or as the mathematics has them")
+        self._axes.setToolTip("Frequency and decay time, or the complex plane")
         self._axes.activated.connect(lambda _: self._draw())
         self._layer = combo_box("Layer", [])
         self._layer.setToolTip("Which layer's eigenvalues are shown")

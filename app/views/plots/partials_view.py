@@ -33,7 +33,7 @@ def signed(value: float, digits: int = 1) -> str:
 
 _NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
 COLUMNS = (
-    Column("Mode", "The mode: so many half waves along the string", lambda n: f"{n}"),
+    Column("Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
     Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
     Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
     Column("Cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
@@ -57,7 +57,7 @@ class PartialsView(QWidget):
         self.setAccessibleName("Partials")
         self.setMinimumHeight(84)
         self._window = combo_box("Window of time", [(text.capitalize(), key) for key, text in WINDOWS.items()])
-        self._window.setToolTip("Which part of the pluck the figures are of")
+        self._window.setToolTip("The part of the pluck that is measured")
         self._window.activated.connect(lambda _: self.window_chosen.emit(self.window_key))
         self._words = words_label()
         self.table = FiguresTable("Partials of this pluck", COLUMNS)

@@ -21,8 +21,8 @@ MM = 1000.0
 GAINS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
 AUTO = 0  # the largest of them at which what is given as typical is within the scale
 QUANTITIES = (
-    ("model", "Model", "What the model says"),
-    ("truth", "Truth", "What the physics says"),
+    ("model", "Model", "Displacement of the model"),
+    ("truth", "Truth", "Displacement of the truth"),
     ("error", "Error", "Model − truth"),
 )
 PLACES = (0, 0.25, 0.5, 0.75, 1)
@@ -44,14 +44,14 @@ class SpaceTimeView(QWidget):
         )
         self.gains.setMinimumContentsLength(12)
         self.gains.setToolTip(
-            "How far the colours are magnified: the bar beside the picture tells the displacement.\n"
-            "Auto fits what is in view for most of the time; model and truth always have the same scale"
+            "Gain of the colour scale; the colour bar shows the displacement.\n"
+            "Auto fits most of the visible part; model and truth always have the same scale"
         )
         self.gains.setStyleSheet(f"{SMALL} padding-right: 0;")
         self.readout = Readout()
         self.plot = TimePlot(
             "Space–time",
-            "Click: see and hear this moment; with Shift also listen at this place of the string.\n"
+            "Click moves the playhead here; with Shift also the listening point.\n"
             "The wheel zooms in time, down to single frames; the right button pans; double-click shows all.\n"
             "Arrow keys move the playhead, + and − zoom",
             shaded=False,

@@ -22,8 +22,8 @@ LOWEST_HZ = 50.0
 RANGES_DB = (60, 90, 130)
 LABELLED_HZ = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 QUANTITIES = (
-    ("model", "Model", "What the model says"),
-    ("truth", "Truth", "What the physics says"),
+    ("model", "Model", "Sound of the model"),
+    ("truth", "Truth", "Sound of the truth"),
     ("error", "Error", "Model − truth, on the same scale"),
 )
 SCALES = (("log", "Log", "Octaves of equal height"), ("linear", "Linear", "Partials at equal distances"))
@@ -39,7 +39,7 @@ class SpectrogramView(QWidget):
         self.quantities = Segments("Shown", QUANTITIES)
         self.scales = Segments("Frequency axis", SCALES)
         self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), 90)
-        self.ranges.setToolTip("How far below full scale levels are told apart, the same for every source")
+        self.ranges.setToolTip("Range of levels below full scale, the same for every source")
         self.ranges.setStyleSheet(SMALL)
         self.readout = Readout()
         self.plot = TimePlot(

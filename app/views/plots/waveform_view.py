@@ -49,7 +49,7 @@ class WaveformView(TimePlot):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
             "Waveform",
-            "What the pick-up senses. Click moves the playhead; the wheel zooms in time, the right button pans;\n"
+            "Signal of the pick-up. Click moves the playhead; the wheel zooms in time, the right button pans;\n"
             "double-click shows all. Arrow keys move the playhead, + and − zoom",
             parent,
         )

@@ -53,7 +53,7 @@ WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
 MARKER_TIP = "Drag to hear the string from another point; double-click resets. Shift and arrow keys move it"
 TIPS: dict[str | None, str] = {  # by what the pointer is on
     None: "Click or drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
-    "pluck": "Drag along the string for the place, up and down for the amplitude; double-click resets.\n"
+    "pluck": "Drag along the string for the position, up and down for the amplitude; double-click resets.\n"
     "The wheel sets the width, with Shift the shape. Arrow keys do the same, with Ctrl for width and shape",
     "left": MARKER_TIP,
     "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
@@ -108,7 +108,7 @@ class StringView(QWidget):
         self._ground_key: tuple[object, ...] = ()
         self._backdrop: tuple[object, object, QPixmap] | None = None  # ground, envelopes, and both in one picture
         self._toggles = (
-            self._toggle("Motion", "Show the string in motion; off saves work (M)", self.motion_toggled),
+            self._toggle("Motion", "Show the string in motion; off saves processor time (M)", self.motion_toggled),
             self._toggle(
                 "Envelope", "Show how far the string swung within the last second (E)", self.envelope_toggled
             ),

@@ -190,7 +190,7 @@ def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> N
 
 
 def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
-    with pytest.raises(AudioUnavailable, match="“Headset” is no longer there") as caught:
+    with pytest.raises(AudioUnavailable, match="“Headset” is disconnected") as caught:
         open_device(AudioDevice("Headset", "ALSA", 48_000), 0.05, mixer)
     assert caught.value.kind is ProblemKind.VANISHED
 
@@ -203,8 +203,8 @@ def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice, mixer: Mixer) 
         (PortAudioError("Device unavailable", -9985), ProblemKind.BUSY, "in use by another program"),
         (PortAudioError("x", -9999, (0, -16, "Device or resource busy")), ProblemKind.BUSY, "in use"),
         (PortAudioError("x", -9999, (0, 0, "AUDCLNT_E_DEVICE_IN_USE")), ProblemKind.BUSY, "in use"),
-        (PortAudioError("x", -9999, (0, -19, "No such device")), ProblemKind.VANISHED, "no longer there"),
-        (PortAudioError("Invalid device", -9996), ProblemKind.VANISHED, "no longer there"),
+        (PortAudioError("x", -9999, (0, -19, "No such device")), ProblemKind.VANISHED, "disconnected"),
+        (PortAudioError("Invalid device", -9996), ProblemKind.VANISHED, "disconnected"),
         (PortAudioError("Internal PortAudio error", -9986), ProblemKind.OTHER, "could not be opened"),
         (ValueError("strange"), ProblemKind.OTHER, "could not be opened"),
     ],
@@ -223,7 +223,7 @@ def test_refusals_are_explained(
 def test_no_output_at_all(sounddevice: FakeSoundDevice) -> None:
     sounddevice.entries[:] = [("Microphone", 0, 0)]
     assert output_devices() == []
-    with pytest.raises(AudioUnavailable, match="no sound output") as caught:
+    with pytest.raises(AudioUnavailable, match="No audio output") as caught:
         default_device()
     assert caught.value.kind is ProblemKind.NO_DEVICE
 

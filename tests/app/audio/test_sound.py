@@ -233,7 +233,7 @@ def test_a_lost_device_is_told_once_and_found_again(
     wait_for(lambda: desk.rescans > tries + 2)
     assert [problem.kind for problem in desk.problems] == [ProblemKind.VANISHED]
     assert len(desk.outputs) == 1, "it is not replaced by another that nobody chose"
-    assert "no longer there" in str(sound.status().problem)
+    assert "disconnected" in str(sound.status().problem)
     desk.devices.insert(0, headphones)
     wait_for(lambda: sound.status().device == headphones)
     assert sound.mixer.voices == [voice]
@@ -260,7 +260,7 @@ def test_a_stall_is_told_and_withdrawn(sound: Sound, desk: Desk) -> None:
     opened(sound)
     desk.outputs[0].is_stalled = True
     wait_for(lambda: desk.problems != [])
-    assert "takes no sound at the moment" in str(sound.status().problem)
+    assert "is not responding" in str(sound.status().problem)
     time.sleep(0.2)
     assert [problem.kind for problem in desk.problems] == [ProblemKind.STALLED]
     desk.outputs[0].is_stalled = False
@@ -287,7 +287,7 @@ def test_a_fault_of_the_program_is_told_with_its_details(desk: Desk) -> None:
         sound.open()
         wait_for(lambda: desk.problems != [])
     (problem,) = desk.problems
-    assert "fault in this program" in problem.message
+    assert "internal error" in problem.message
     assert "a mistake" in problem.detail
 
 
@@ -298,7 +298,7 @@ def test_who_hears_of_a_problem_finds_it_in_the_status(desk: Desk) -> None:
         sound._on_problem = lambda problem: found.append(sound.status().problem)
         sound.open()
         wait_for(lambda: found != [])
-    assert "no sound output" in str(found[0])
+    assert "No audio output" in str(found[0])
 
 
 def test_closing_frees_the_device_and_may_be_repeated(sound: Sound, desk: Desk) -> None:

@@ -14,10 +14,10 @@ import soundfile
 from app.export.files import SoundRequest, export_sound
 from app.presets.filter import PresetFilter
 from app.presets.install import InstallError, install_preset
-from app.presets.library import Library, PresetEntry, list_presets
+from app.presets.library import Library, PresetEntry, display_title, list_presets
 from app.window.dropped_files import receive
 from engine.pluck import Pluck
-from engine.presets import load_preset, preset_digest
+from engine.presets import SHIPPED, load_preset, preset_digest
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
 
 
@@ -165,6 +165,28 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
 def entry(**changes: object) -> PresetEntry:
     (one, *_), _ = list_presets()
     return replace(one, name=str(changes.pop("name", one.name)), info=replace(one.info, **changes))  # type: ignore[arg-type]
+
+
+def test_a_preset_of_the_tables_is_titled_by_its_facts_and_any_other_by_its_file() -> None:
+    info = entry(
+        title="old", model="lru", rate_hz=4000, tension_modulated=True, initial="noise", horizon_steps=400
+    ).info
+    assert display_title("nylon_nonlinear_noise_4k_lru_400", info) == (
+        "Nylon B3, random shapes, 4 kHz — LRU, trained on 100 ms"
+    )
+    for name in (
+        "nylon_nonlinear_noise_4k_s5_400",
+        "nylon_nonlinear_noise_4k_lru",
+        "mine",
+        "nylon_linear_noise_4k_x",
+    ):
+        assert display_title(name, info) == "old", name
+
+
+def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first() -> None:
+    entries, _ = list_presets(SHIPPED)
+    assert len({one.title for one in entries}) == len(entries) > 2
+    assert [one.studio for one in entries] == sorted((one.studio for one in entries), reverse=True)
 
 
 def test_the_filter_finds_words_in_any_order_and_every_field(preset_folder: Path) -> None:

@@ -154,7 +154,7 @@ def test_in_a_small_window_with_a_filter_the_header_does_not_overlap(qtbot: QtBo
     window = controller.window
     bar = window.presets
     bar.set_listed(1, 21)
-    bar.name.setText("★  Nylon B3, noise, 16 kHz (integrated phase, blind recipe)   ▾")
+    bar.name.setText("★  Nylon B3, random shapes, 16 kHz — Integrated phase, blind   ▾")
 
     def apart() -> bool:
         parts = [bar.layout().itemAt(at).geometry() for at in range(4)]
@@ -201,7 +201,7 @@ def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> Non
         assert actions["Light"].isChecked()
         actions["150 %"].trigger()
         assert made.look.size_percent == 150
-        assert "next start" in window.notices.text
+        assert "restart" in window.notices.text
     finally:
         theme.apply_theme(qapp, "dark")
         qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)

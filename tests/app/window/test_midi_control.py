@@ -181,7 +181,7 @@ def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
     missing = False
     midi.show_dialog(window)
     assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())
-    assert "move the controller" in dialog._rows["width"][1].toolTip()
+    assert "move a control" in dialog._rows["width"][1].toolTip()
 
 
 def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:

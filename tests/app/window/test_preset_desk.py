@@ -91,7 +91,7 @@ def test_typing_filters_and_what_was_chosen_stays(
     assert browser._card.text().startswith("The chosen preset is not in this list")
     qtbot.keyClicks(browser.search, "x")
     assert listed(browser) == []
-    assert "No preset fits" in browser._card.text()
+    assert "No matching preset" in browser._card.text()
     qtbot.keyClick(browser.search, KEY.Key_Down)  # nothing to move to
     browser.search.setText("sec")
     qtbot.keyClick(browser.search, KEY.Key_Return)
@@ -167,13 +167,46 @@ def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -
     assert listed(browser) == ["first", "second"]
 
 
+def test_studio_presets_are_a_group_of_their_own_before_the_research_ones(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser, preset_folder: Path, small_preset: Path
+) -> None:
+    """The headings are passed over by arrows and page keys, which go through both groups in the listed order."""
+
+    def groups() -> dict[str, int]:
+        headings = [browser.list.topLevelItem(row) for row in range(browser.list.topLevelItemCount())]
+        return {heading.text(0): heading.childCount() for heading in headings}
+
+    shutil.copy(small_preset, preset_folder / "studio_zither.safetensors")
+    browser.favourite_asked.emit("second")
+    browser.dismiss()
+    controller.presets.toggle()
+    assert groups() == {"STUDIO PRESETS": 1, "RESEARCH PRESETS": 2}
+    assert listed(browser) == ["studio_zither", "second", "first"]  # a favourite is first of its group
+    qtbot.keyClick(browser.list, KEY.Key_Up)
+    assert controller.session.choices.preset == "second"
+    qtbot.keyClick(browser.list, KEY.Key_Up)
+    assert controller.session.choices.preset == "studio_zither"
+    qtbot.keyClick(browser.list, KEY.Key_Up)
+    assert controller.session.choices.preset == "studio_zither"
+    heading = browser.list.visualItemRect(browser.list.topLevelItem(1)).center()
+    qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=heading)
+    assert controller.session.choices.preset == "studio_zither"
+    browser.search.setText("second")
+    assert groups() == {"RESEARCH PRESETS": 1}
+    browser.clear_filter()
+    browser.dismiss()
+    for name in ("second", "first", "studio_zither"):
+        qtbot.keyClick(controller.window, KEY.Key_PageDown)
+        assert controller.session.choices.preset == name
+
+
 def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
     qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
     assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}
     assert "★" in controller.window.presets.name.text()
     browser._starred.click()
     assert listed(browser) == ["first"]
-    place = browser.list.visualItemRect(browser.list.topLevelItem(0)).topLeft() + QPoint(6, 6)
+    place = browser.list.visualItemRect(browser._rows[0]).topLeft() + QPoint(6, 6)
     qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=place)
     assert listed(browser) == []
     browser._starred.click()
@@ -284,9 +317,9 @@ def test_browser_and_card_say_how_true_a_preset_sounds(
     browser.dismiss()
     controller.presets.toggle()
     assert listed(browser) == ["second", "first"]  # what was not measured is last
-    heard = [browser.list.topLevelItem(row).text(4) for row in range(2)]
+    heard = [browser._rows[row].text(4) for row in range(2)]
     assert heard == ["pitch +13 cents …", "not measured"]
-    assert browser.list.topLevelItem(0).toolTip(1).startswith("<p>&lt;i&gt;sma&lt;/i&gt; str")
+    assert browser._rows[0].toolTip(1).startswith("<p>&lt;i&gt;sma&lt;/i&gt; str")
     assert "evaluate first --heard --write" in browser._card.text()
     controller.session.update(preset="second")
     card = browser._card.text()

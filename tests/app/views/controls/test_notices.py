@@ -62,7 +62,7 @@ def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) 
     shown = bar._list
     assert shown is not None
     assert bar.bell.unseen == 0
-    assert "none new" in bar.bell.accessibleName()
+    assert "none unread" in bar.bell.accessibleName()
     assert [shown._list.item(row).text().split("   ")[1:] for row in range(2)] == [
         ["note", "Saved."],
         ["error", "No sound."],

@@ -54,10 +54,10 @@ def test_a_fault_is_told_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDial
     assert "Loud" in dialog._state_label.text()
     dialog.show_state(SILENT)
     assert not dialog._problem.isHidden()
-    assert "no sound" in dialog._state_label.text()
+    assert "No audio output" in dialog._state_label.text()
     assert not button(dialog, "Left").isEnabled()
     with qtbot.waitSignal(dialog.rescan_asked):
-        button(dialog, "Look again").click()
+        button(dialog, "Rescan").click()
 
 
 def test_gaps_are_told_with_time_and_cause_and_the_load_as_a_share(dialog: AudioDialog) -> None:

@@ -97,7 +97,7 @@ def test_length_by_decay_and_its_limit(qtbot: QtBot, made, tmp_path: Path) -> No
     dialog = made({"until_decayed": True, "decay_db": 100, "longest_s": 0.3})
     assert dialog.form.decay.isVisible()
     assert not dialog.form.seconds.isVisible()
-    run(qtbot, dialog, "It still rang at the longest duration")
+    run(qtbot, dialog, "Not decayed at the maximum length")
     assert soundfile.info(tmp_path / "small_x0.40_a4.0_4000_model.wav").frames == 1200
 
 
@@ -180,10 +180,10 @@ def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Pa
         assert not dialog.save.isEnabled()
         field.setText(before)
     assert dialog.save.isEnabled()
-    run(qtbot, dialog, "8 files written, 0 were there already, 0 failed")
+    run(qtbot, dialog, "8 files written, 0 kept, 0 failed")
     assert len(wavs(tmp_path / "strings")) == 8
     assert (tmp_path / "strings" / "index.csv").is_file()
-    run(qtbot, dialog, "0 files written, 8 were there already")
+    run(qtbot, dialog, "0 files written, 8 kept")
 
 
 def test_a_batch_says_what_all_its_plucks_have_and_shows_what_is_checked(qtbot: QtBot, made) -> None:
