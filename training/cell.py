@@ -102,7 +102,7 @@ class Cell:
         start = "plucks" if self.initial == "gaussian" else "random shapes"
         details = [TITLE_WORDS.get(self.model, MODEL_NAMES[self.model])]
         if self.recipe != RECIPE:
-            details.append("blind" if self.recipe == "blind" else f"{self.recipe} recipe")
+            details.append(self.recipe if self.recipe in ("blind", "hinted") else f"{self.recipe} recipe")
         if self.horizon != HORIZON:
             details.append(f"trained on {1000 * self.horizon / self.rate_hz:g} ms")
         if self.seed:

@@ -56,7 +56,7 @@ KNOBS = {  # field of `Choices` -> (label, range, tip)
     ),
     "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "Length of a rendered pluck"),
     "speed": (
-        "slow motion",
+        "slow-mo",
         KnobRange(*SPEED_RANGE, 0.004, 1.25, "× {:.3f}", logarithmic=True),
         "Slow motion of the string view, as under a stroboscope; the sound is not slowed",
     ),

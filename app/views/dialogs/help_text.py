@@ -17,7 +17,7 @@ TOUR = (
     (
         "Look",
         "Amber is the model, blue the truth, in every view. The string is shown in slow motion, as under a "
-        "stroboscope; the sound is not slowed. The slow motion knob sets the factor.",
+        "stroboscope; the sound is not slowed. The slow-mo knob sets the factor.",
     ),
     (
         "Go past the training",

@@ -39,7 +39,7 @@ def library(small_preset: Path) -> Library:
         ({"solo": 2, "listen": 0.5}, "a node of mode 2"),
         ({"solo": 11}, "this string has 10"),
         ({"solo": 2, "position": 0.5}, "does not excite mode 2"),
-        ({"a": "preset:gone"}, "gone is not there"),
+        ({"a": "preset:gone"}, "gone was not found"),
         ({"b": "preset:gone"}, ""),
     ],
 )

@@ -169,7 +169,7 @@ def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Pa
     dialog.tabs.setCurrentIndex(1)
     assert dialog.save.text() == "Export 8 files"
     for field, text, words in (
-        (dialog.batch.positions, "0.3, x", "positions: numbers with commas"),
+        (dialog.batch.positions, "0.3, x", "positions: comma-separated numbers"),
         (dialog.batch.amplitudes, "", "amplitudes: give at least one"),
         (dialog.batch.positions, "0.3, 0.3", "positions: one is given twice"),
         (dialog.batch.amplitudes, "99", "amplitude must lie in 0 … 20 mm, not 99 mm"),
@@ -208,7 +208,7 @@ def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_p
     dialog.save.click()
     qtbot.waitUntil(lambda: len(wavs(tmp_path / "strings")) > 1, timeout=20_000)
     dialog.close_button.click()
-    qtbot.waitUntil(lambda: "Cancelled; what was finished is kept" in dialog.state.text(), timeout=30_000)
+    qtbot.waitUntil(lambda: "Cancelled; finished files are kept" in dialog.state.text(), timeout=30_000)
     assert 1 < len(wavs(tmp_path / "strings")) < 60
     assert list((tmp_path / "strings").glob(".*.unfinished")) == []
 
