@@ -120,9 +120,9 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                 problems.append(f"{path}: cannot be read ({error.strerror})")
             except Exception as error:  # whatever one file brings about, the others are listed
                 problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
-    titles = Counter(entry.title for entry in entries.values())
+    models = Counter(title for title, _ in {(entry.title, entry.info.model) for entry in entries.values()})
     for name, entry in entries.items():
-        if titles[entry.title] > 1:
+        if models[entry.title] > 1:  # two models of one string
             told_apart = f"{entry.info.title} ({model_word(entry.info.model)})"
             entries[name] = replace(entry, info=replace(entry.info, title=told_apart))
     return sorted(entries.values(), key=lambda entry: (not entry.studio, entry.name)), problems

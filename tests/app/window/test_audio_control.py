@@ -85,7 +85,7 @@ def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, output: F
     control.tell(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
     show(control, output.present)
     notices = control._window.notices
-    assert "“Speakers” Playback continues on" in notices.text
+    assert "Playback continues on “Speakers”" in notices.text
     assert notices.kept[-1][1] == "code"
     assert (control.device, control.sound) == (None, SoundChoice())
     assert "refuses" in control._dialog._problem_label.text()
