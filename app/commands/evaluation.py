@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from training.data.dataset import Dataset
 
 Split = Literal["validation", "test", "both"]
-LARGEST_DATASET_BYTES = 16 * 2**30
 WINDOWS = 4  # of the horizon
 LONGEST_PAST_S = 60.0
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
@@ -304,10 +303,7 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
         data = read_configuration(info.training, f"{preset.path}: metadata.training").data
     except SchemaError as error:
         raise Failure(f"{error}; without it the preset's data set cannot be made") from error
-    size = 4 * data.count * (data.steps // data.stride + 1) * data.modes
-    if size > LARGEST_DATASET_BYTES:
-        raise Failure(f"{preset.path}: its data set would take {size / 2**30:.0f} GiB; get the preset again")
-    for name in ("grid_points", "rate_hz", "modes"):
+    for name in ("rate_hz", "modes"):
         if getattr(data, name) != getattr(info, name):
             raise Failure(
                 f"{preset.path}: metadata.training.data.{name} is {getattr(data, name)}, the model's is "

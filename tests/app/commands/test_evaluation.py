@@ -230,9 +230,9 @@ def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: P
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"count": 10_000_000}, "its data set would take"),
+        ({"count": 10_000_000}, "GiB of data; ask for less"),
         ({"rate_hz": 8000}, "metadata.training.data.rate_hz is 8000, the model's is 4000"),
-        ({"grid_points": 51}, "metadata.training.data.grid_points is 51, the model's is 101"),
+        ({"grid_points": 51}, "grid_points is 101, the data's are 51"),
     ],
 )
 def test_a_data_set_that_is_not_the_models_is_told(
