@@ -468,7 +468,7 @@ def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controll
     slots, session = controller.window.transport.slots, controller.session
     views = [view(controller, "string"), view(controller, "waveform"), view(controller, "spectrum")]
     menu = next(
-        button.menu() for button in slots.findChildren(QToolButton) if button.accessibleName() == "What B holds"
+        button.menu() for button in slots.findChildren(QToolButton) if button.accessibleName() == "Source of B"
     )
     slots._fill(menu, "b")
     next(action for action in menu.actions() if action.text().startswith("Difference")).trigger()
