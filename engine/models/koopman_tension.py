@@ -298,7 +298,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
 
     def _rates(self) -> tuple[Tensor, Tensor]:
         """σ and ω a sample."""
-        return self.nu_log.clamp(-30, 5).exp(), self.theta_log.clamp(-16, 8).exp()
+        return self.nu_log.clamp(-30, 5).exp(), self.theta_log.clamp(-16, 6).exp()
 
     @property
     def _coupling(self) -> Tensor:
