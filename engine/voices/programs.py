@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, singledispatch
 from typing import Any
 
 import numpy as np
@@ -75,37 +75,31 @@ class Program:
         return int(self.memory.ctypes.data)
 
 
+@singledispatch
 def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Program | None:
-    """The program of a model whose latents move by themselves and whose decoder is linear; None for any other."""
-    if isinstance(model, DMD):
-        return _dmd_program(model, info, rate_hz)
-    if isinstance(model, KoopmanIntegrated) and _is_bank(model):
-        return _integrated_program(model, info, rate_hz)
-    if isinstance(model, KoopmanTension):
-        return _tension_program(model, info, rate_hz)
+    """The program of a model that is compiled here, registered below by its class; None: it is rendered ahead."""
     return None
 
 
-def _is_bank(model: KoopmanIntegrated) -> bool:
-    c = model.configuration
-    widths = (c.state_size, *c.eigenvalue_widths)
-    plain = model.multiplier is None and model.decoder_residual is None
-    return plain and max(widths) <= at.MOST_MODES and len(c.eigenvalue_widths) < 7
-
-
+@bank_program.register
 @torch.no_grad()
-def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int) -> Program:
+def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int) -> Program | None:
+    """None where a network stands behind the latents, or more than the kernel holds."""
     c, n = model.configuration, model.configuration.state_size
+    widths = (n, *c.eigenvalue_widths)
+    plain = model.multiplier is None and model.decoder_residual is None
+    if not plain or max(widths) > at.MOST_MODES or len(widths) > 7:
+        return None
     rates = model._rates()
     units = model.energy_units if model.energy_units is not None else torch.ones(n, dtype=torch.float64)
     rate_units = model._rate_units
     if not isinstance(rate_units, Tensor):
         rate_units = torch.full((2 * n,), float(rate_units), dtype=torch.float64)
-    network, at_zero, widths = np.zeros(0, np.float32), torch.zeros(2 * n), [0]
+    network, at_zero, sizes = np.zeros(0, np.float32), torch.zeros(2 * n), [0]
     if model.g is not None:
         at_zero = model.g(torch.zeros(n))
         layers = [layer for layer in model.g if isinstance(layer, nn.Linear)]
-        widths = [n, *(layer.out_features for layer in layers)]
+        sizes = [n, *(layer.out_features for layer in layers)]
         network = np.concatenate([_flat(layer) for layer in layers])
     turn = rates.coupling[:, n:]
     modulation = largest_m = torch.zeros(0, dtype=torch.float64)
@@ -128,10 +122,10 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
         at.P_SECOND_ORDER: int(c.second_order),
         at.P_HIGHER: int(model.g is not None or c.adiabatic),
         at.P_ADIABATIC: int(c.adiabatic),
-        at.P_LAYERS: len(widths) - 1 if model.g is not None else 0,
+        at.P_LAYERS: len(sizes) - 1 if model.g is not None else 0,
         at.P_MODULATION: int(model.M_out is not None),
         at.P_EARLY: math.ceil(SETTLED * c.node_spacing / ratio / at.QUANTUM) * at.QUANTUM,
-        **{at.P_WIDTHS + place: width for place, width in enumerate(widths)},
+        **{at.P_WIDTHS + place: width for place, width in enumerate(sizes)},
     }
     parts = (
         rates.sigma,
@@ -162,6 +156,7 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
     return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
 
 
+@bank_program.register
 @torch.no_grad()
 def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
     present = model.magnitude_log > -600
@@ -192,6 +187,7 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
     return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
 
 
+@bank_program.register
 @torch.no_grad()
 def _tension_program(model: KoopmanTension, info: PresetInfo, rate_hz: int) -> Program:
     own = model.tuned(Physics(info.resonator, rate_hz))  # in metres, at this rate
