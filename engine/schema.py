@@ -10,8 +10,10 @@ import dataclasses
 import functools
 import json
 import math
+import tomllib
 import types
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from engine import bounds
@@ -40,6 +42,25 @@ def parse_json(text: str | bytes, where: str) -> Any:
     except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
         raise SchemaError(f"{where}: not JSON that can be read ({error or type(error).__name__})") from error
     check_nesting(data, where)
+    return data
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        SchemaError: not TOML, or larger or nested deeper than `engine.bounds` allows.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
+    if len(raw) > bounds.LARGEST_TEXT_BYTES:
+        raise SchemaError(f"{path}: larger than the {bounds.LARGEST_TEXT_BYTES // 2**10} KiB that it may have")
+    try:
+        data = tomllib.loads(raw.decode("utf-8"))
+    except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
+        raise SchemaError(f"{path}: not valid TOML: {error or type(error).__name__}") from error
+    check_nesting(data, str(path))
     return data
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from engine.schema import SchemaError, read
+from engine.schema import SchemaError, read, read_toml
 from training.cell import Cell, configuration_of
-from training.configuration import TrainingConfiguration, read_toml
+from training.configuration import TrainingConfiguration
 
 CONFIGURATIONS = Path(__file__).parent / "configurations"
 

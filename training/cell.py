@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from engine.models import MODELS
-from engine.schema import SchemaError, read, write
-from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration, read_toml
+from engine.schema import SchemaError, read, read_toml, write
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 
 RECIPES = Path(__file__).parent / "recipes"
 MODES = {4000: 10, 16000: 25}  # kept by the authors at each sample rate in Hz

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Literal
 
 from engine import bounds
@@ -15,7 +13,7 @@ from engine.models import MODELS, read_model_configuration
 from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, check_nesting, read, write
+from engine.schema import SchemaError, read, write
 
 # models that can start from what the displacement shows (`fitting.phases`)
 FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
@@ -229,22 +227,3 @@ def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
     """The fields that differ from their default, as plain data: what a digest is taken of."""
     defaults = {f.name: f.default for f in fields(value)}
     return {name: entry for name, entry in write(value).items() if getattr(value, name) != defaults[name]}
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file.
-
-    Raises:
-        SchemaError: not TOML, or larger or nested deeper than `engine.bounds` allows.
-        OSError: it cannot be read.
-    """
-    with path.open("rb") as file:
-        raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
-    if len(raw) > bounds.LARGEST_TEXT_BYTES:
-        raise SchemaError(f"{path}: larger than the {bounds.LARGEST_TEXT_BYTES // 2**10} KiB that it may have")
-    try:
-        data = tomllib.loads(raw.decode("utf-8"))
-    except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
-        raise SchemaError(f"{path}: not valid TOML: {error or type(error).__name__}") from error
-    check_nesting(data, str(path))
-    return data

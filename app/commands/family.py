@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from app.commands.console import Report
 
 family = typer.Typer(help="One model of many strings.", no_args_is_help=True)
-DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "worst at")
+DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
 RISES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 
 
@@ -113,7 +113,8 @@ def evaluate(
             ]
             if tenth:
                 own = {loaded.name: players[loaded.name]}
-                last = measure(own, column, "test", tenth, rate, (9.0, 10.0), seed=seed)[loaded.name]
+                told = partial(_report, report, place / 2 + 0.2, 0.3)
+                last = measure(own, column, "test", tenth, rate, (9.0, 10.0), seed=seed, report=told)[loaded.name]
                 first = errors[loaded.name].strings[:tenth]
                 of_column[loaded.name]["tenth_second"] = _facts(last) | {
                     "over_first": last.geometric_mean / type(last)(tuple(first)).geometric_mean
@@ -122,12 +123,10 @@ def evaluate(
     if json:
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found})
         return
-    for told, of_column in found.items():
-        print(f"{told}, {strings} strings, first second at {rate} Hz, rel. MSE over the whole string")
-        rows = [
-            [name, number(f["geometric_mean"]), number(f["worst"]), f"{f['share_large']:.1%}", f["worst_at"]]
-            for name, f in of_column.items()
-        ]
+    for column_name, of_column in found.items():
+        print(f"{column_name}, {strings} strings, first second at {rate} Hz, rel. MSE over the whole string")
+        figures = ("geometric_mean", "worst", "share_large", "processor_s")
+        rows = [[who, *(number(f[name]) for name in figures), f["worst_at"]] for who, f in of_column.items()]
         print_table(("", *DESCRIBED), rows)
         parts = of_column[loaded.name]["by_rise"]
         rows = [
@@ -164,5 +163,6 @@ def _facts(errors: Any) -> dict[str, Any]:
         "geometric_mean": errors.geometric_mean,
         "worst": worst.rel_mse,
         "share_large": errors.share_large,
+        "processor_s": errors.processor_s,
         "worst_at": place,
     }

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from engine.metrics import ErrorSums
     from engine.pluck import Pluck
     from engine.presets import Preset, PresetInfo
-    from engine.resonators import StringParameters
+    from engine.resonators import Resonator, StringParameters
 
 InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
@@ -59,6 +59,7 @@ def simulate(
             "only the fast solver of the nonlinear string has sub-steps", param_hint="--substeps"
         )
     from app.commands import arrays
+    from engine import bounds
 
     initial = arrays.read_displacements(u0)
     points = initial.shape[1]
@@ -67,11 +68,15 @@ def simulate(
             f"a grid of {points} points holds 1 … {points - 2} modes, not {modes}", param_hint="--modes"
         )
     arrays.check_result_size(len(initial), steps + 1, points)
-    solve = _fast if solver == "fast" else _dop853
+    try:
+        bounds.check_motion(parameters, modes, points, rate, tension_modulated)
+    except ValueError as error:
+        raise Failure(f"{string}: {error}") from error
+    resonator = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=points)
+    fast = solver == "fast"
+    motion = _fast(resonator, rate, steps, substeps) if fast else _dop853(resonator, rate, steps)
     with progress("simulate") as report:
-        arrays.write_motion(
-            out, initial, steps, solve(parameters, tension_modulated, rate, modes, steps, substeps), report
-        )
+        arrays.write_motion(out, initial, steps, motion, report)
     if (peak_m := float(initial.abs().max())) > arrays.IMPLAUSIBLE_PEAK_M:
         say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
 
@@ -229,44 +234,28 @@ def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
         raise typer.BadParameter(f"must be {kinds}, or a string: {error}", param_hint="--string") from error
 
 
-def _fast(
-    parameters: StringParameters,
-    tension_modulated: bool,
-    rate_hz: float,
-    modes: int,
-    steps: int,
-    substeps: int | None,
-) -> Motion:
+def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
     from app.commands.arrays import blocks_of
     from engine.truth import ModalState, SplittingSolver
 
+    solver = SplittingSolver(resonator, rate_hz, substeps=substeps)
+
     def motion(initial: Tensor) -> Iterator[Tensor]:
-        string = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=initial.shape[1])
-        solver, state = (
-            SplittingSolver(string, rate_hz, substeps=substeps),
-            ModalState.at_rest(string.to_modes(initial)),
-        )
-        yield string.to_grid(state.amplitude[:, None])
+        state = ModalState.at_rest(resonator.to_modes(initial))
+        yield resonator.to_grid(state.amplitude[:, None])
         for count in blocks_of(steps):
             amplitudes, state = solver.advance(state, count)
-            yield string.to_grid(amplitudes)
+            yield resonator.to_grid(amplitudes)
 
     return motion
 
 
-def _dop853(
-    parameters: StringParameters,
-    tension_modulated: bool,
-    rate_hz: float,
-    modes: int,
-    steps: int,
-    substeps: int | None,
-) -> Motion:
+def _dop853(resonator: Resonator, rate_hz: float, steps: int) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
     def motion(initial: Tensor) -> Iterator[Tensor]:
-        string = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=initial.shape[1])
-        yield string.to_grid(solve_dop853(string, ModalState.at_rest(string.to_modes(initial)), rate_hz, steps))
+        start = ModalState.at_rest(resonator.to_modes(initial))
+        yield resonator.to_grid(solve_dop853(resonator, start, rate_hz, steps))
 
     return motion
 

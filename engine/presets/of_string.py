@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +9,9 @@ from engine.models.base import Physics
 from engine.presets.file import Preset, PresetError
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, read
+from engine.schema import read, read_toml
 
 HIGHEST_HZ = 20_000.0  # modes above are not heard
-LARGEST_FILE_BYTES = 65_536
 STRINGS = SHIPPED / "strings"
 
 
@@ -21,18 +19,10 @@ def read_string(path: Path) -> StringParameters:
     """The string of a TOML file: its eight parameters at top level, as `[data.string]` of a configuration has them.
 
     Raises:
-        SchemaError: no TOML, a field that is unknown or impossible; the message names file, field and remedy.
+        SchemaError: see `read_toml`; a field is unknown or impossible: the message names file, field and remedy.
         OSError: the file cannot be read.
     """
-    with path.open("rb") as file:
-        data = file.read(LARGEST_FILE_BYTES + 1)
-    if len(data) > LARGEST_FILE_BYTES:
-        raise SchemaError(f"{path}: is larger than the {LARGEST_FILE_BYTES} bytes that a string may have")
-    try:
-        fields = tomllib.loads(data.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
-        raise SchemaError(f"{path}: not valid TOML: {error}") from error
-    return read(StringParameters, fields, str(path))
+    return read(StringParameters, read_toml(path), str(path))
 
 
 def find_string(name_or_path: str) -> Path:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+import statistics
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor
 
 from engine.averaging import slow_flow
-from engine.models import KoopmanIntegrated, StringModel, build_model
+from engine.models import StringModel, build_model
 from engine.models.base import Physics
-from training.family.motions import solve, true_motion
+from training.family.motions import solve
 from training.family.strings import Column, PluckedString, displacement_m, draw_string
 
 # modal amplitudes (steps, modes) in m of a string, at a rate
@@ -27,13 +28,19 @@ SCALE_M = 1e-3
 
 @dataclass(frozen=True)
 class StringError:
-    """Of one string and pluck: relative squared error over the grid."""
+    """Of one string and pluck.
+
+    Attributes:
+        rel_mse: relative squared error over the grid.
+        processor_s: for a second of the whole string's motion.
+    """
 
     pitch_hz: float
     inharmonicity: float
     tension_rise: float
     modes: int
     rel_mse: float
+    processor_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,11 @@ class FamilyErrors:
         return max(self.strings, key=lambda one: one.rel_mse)
 
     @property
+    def processor_s(self) -> float:
+        """For a second of the middle one of the strings."""
+        return statistics.median(one.processor_s for one in self.strings)
+
+    @property
     def share_large(self) -> float:
         """Of the strings, above `LARGE`."""
         return sum(one.rel_mse > LARGE for one in self.strings) / len(self.strings)
@@ -65,28 +77,24 @@ def measure(
     rate_hz: int,
     seconds: tuple[float, float],
     *,
-    cache: Path | None = None,
     seed: int = 0,
     report: Callable[[float], None] = lambda share: None,
 ) -> dict[str, FamilyErrors]:
-    """The errors of each player from one time to another after the pluck.
-
-    Args:
-        cache: where true motions are kept; None: they are not.
-    """
+    """The errors of each player from one time to another after the pluck."""
     first, last = (round(edge * rate_hz) for edge in seconds)
     found: dict[str, list[StringError]] = {name: [] for name in players}
     for number in range(count):
         plucked = draw_string(column, split, number, seed)
-        truth = (solve(plucked, rate_hz, last) if cache is None else true_motion(plucked, rate_hz, last, cache))[
-            first:
-        ]
+        truth = solve(plucked, rate_hz, last)[first:]
         unheard = UNHEARD * float(plucked.amplitudes_m.square().sum()) * len(truth)
         for name, play in players.items():
-            wrong = play(plucked, rate_hz, last)[first:] - truth
+            started = time.process_time()
+            played = play(plucked, rate_hz, last)
+            processor_s = (time.process_time() - started) * rate_hz / last
+            wrong = played[first:] - truth
             error = float(wrong.square().sum() / max(float(truth.square().sum()), unheard))
             told = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
-            found[name].append(StringError(*told, error if math.isfinite(error) else math.inf))
+            found[name].append(StringError(*told, error if math.isfinite(error) else math.inf, processor_s))
         report((number + 1) / count)
     return {name: FamilyErrors(tuple(errors)) for name, errors in found.items()}
 
@@ -122,11 +130,7 @@ def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
         "physical_units": True,
         "second_order": True,
     }
-    model = build_model("koopman_integrated", sizes)
-    assert isinstance(model, KoopmanIntegrated)
-    physics = Physics(plucked.resonator, rate_hz, SCALE_M)
-    model.initialise("averaging", physics, torch.Generator().manual_seed(0))
-    return _played(model.eval(), plucked, steps)
+    return _played(_started("koopman_integrated", sizes, "averaging", plucked, rate_hz), plucked, steps)
 
 
 def averaged_flow(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
@@ -135,18 +139,20 @@ def averaged_flow(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
 
 
 def untrained(how: str) -> Player:
-    """`koopman_tension` as a start of its own leaves it."""
-    model = build_model("koopman_tension", {})
-    for curve in model.parameters():
-        torch.nn.init.zeros_(curve)
-    if how == "series":
-        from engine.models.koopman_tension import SERIES
+    """`koopman_tension` as its start of this name leaves it."""
 
-        with torch.no_grad():
-            state = model.state_dict()
-            state["r"][0] = state["p"][0] = SERIES
-            model.load_state_dict(state)
-    return player(model.eval())
+    def play(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
+        return _played(
+            _started("koopman_tension", {"modes": plucked.resonator.modes}, how, plucked, rate_hz), plucked, steps
+        )
+
+    return play
+
+
+def _started(name: str, sizes: dict[str, Any], how: str, plucked: PluckedString, rate_hz: int) -> StringModel[Any]:
+    model = build_model(name, sizes)
+    model.initialise(how, Physics(plucked.resonator, rate_hz, SCALE_M), torch.Generator().manual_seed(0))
+    return model.eval()
 
 
 def _played(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tensor:

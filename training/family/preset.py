@@ -14,8 +14,7 @@ from engine.models import KoopmanTension, build_model
 from engine.models.base import Physics
 from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, read, write
-from training.configuration import read_toml
+from engine.schema import SchemaError, read, read_toml, write
 from training.family.errors import player
 from training.family.fit import Case, FitProgress, fit_curves
 from training.family.motions import true_motion

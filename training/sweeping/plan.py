@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from engine import bounds
-from engine.schema import SchemaError, read
+from engine.schema import SchemaError, read, read_toml
 from training.cell import RECIPE, Cell, Initial, configuration_of
-from training.configuration import TrainingConfiguration, read_toml
+from training.configuration import TrainingConfiguration
 
 PLANS = Path(__file__).parent / "plans"
 
