@@ -61,7 +61,18 @@ RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
 LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins anew after its last sample
 ALIVE = 39  # W latents up to the last that can be heard
 WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
-HEADER = 41
+RESONATOR = 41  # W address of the modes that it is to have; the kernel glides there
+TAKEN = 42  # W the one that it is gliding to, or has reached
+GLIDE = 43  # W quanta left of the way
+CONTINUES = 44  # W address of the voice whose string this pluck is added to; 0: the string is at rest, or it is done
+PREPARED = 45  # W whether the rows that follow from its modes are there
+STEPS = 46  # W nodes, or sub-steps, of a frame, for which they were made
+DECAY = 47  # R of the largest energy in a frame
+LARGEST_ENERGY = 48  # R of latents that share a tension
+LARGEST_STRETCH = 49  # R
+PEAK = 50  # R m: of the displacement as it is let go
+JOINS = 51  # W whether its fade-in is the complement of the other's fade
+HEADER = 52
 
 
 @njit(inline="always", **COMPILED)
@@ -97,11 +108,16 @@ ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
 CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
 BANK_ROWS = 21
 
-# Rows of the truth's state: amplitude and speed
-TRUTH_ROWS = 2
+# Rows of the state of a voice with modes (the truth, or latents that share a tension): two that move, amplitude and
+# speed or x and y; four of its resonator as it is now; and what follows from them
+OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
+FOLLOWING = 6
+TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
+TENSION_ROWS = FOLLOWING + 8 + 2  # of `kernels.tension.node`, κ p and ω²; two to spare
 
-# Rows of latents that share a tension: x, y, and in the third the largest energy and stretch
-TENSION_ROWS = 4
+# Slots of the modes that a voice is to have, then the four rows above
+B_QUANTA = 0  # W of the way there
+B_HEADER = 2
 
 # Slots of a bank's program
 P_MODES = 0  # W
@@ -134,21 +150,23 @@ P_WIDTHS = P_OFFSETS + 12  # W sizes of the network's layers, from the input on,
 P_HEADER = P_WIDTHS + 8
 
 # Slots of the truth's program
-T_MODES = 0  # W
-T_STAGES = 1  # W
-T_LEVELS = 2  # W
-T_SILENCE = 3  # R
-T_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
-T_FLOWS, T_KICKS, T_COUPLING, T_ETA, T_SUBSTEPS, T_LEVEL_OF, T_INVERSE = 6, 7, 8, 9, 10, 11, 12  # W slots
-T_HEADER = 16
+T_SUBSTEPS = 0  # R in a period of the highest mode
+T_SILENCE = 1  # R
+T_LOUDNESS = 2  # R nepers: log of full scale's share of a metre
+T_RATE = 3  # R frames a second
+STAGES = 8  # exact rotations of a sub-step, a palindrome, with a kick between two
+T_ROTATIONS = 4  # R shares of a sub-step, of the first half
+T_KICKS = T_ROTATIONS + STAGES // 2  # R all
+T_HEADER = T_KICKS + STAGES - 1
 
-# Slots of the program of latents that share a tension; then the eight rows (modes,) of `kernels.tension.advance`
-S_MODES = 0  # W
-S_NODES = 1  # W of a frame
-S_DECAY = 2  # R of the largest energy in a frame
+# Slots of the program of latents that share a tension; then three curves of so many coefficients
+S_COEFFICIENTS = 0  # W
+S_NODE_PHASE = 1  # R
+S_HIGHEST_PHASE = 2  # R
 S_SILENCE = 3  # R
 S_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
-S_HEADER = 8
+S_RATE = 5  # R frames a second
+S_HEADER = 6
 
 # Slots of a rendered voice's program
 R_TAPS = 0  # W of the filter, to either side

@@ -15,7 +15,7 @@ from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
-from engine.kernels.voice import add, note_gap
+from engine.kernels.voice import add, note_gap, take_over
 
 TONE_HZ, TONE_LEVEL, TONE_FADE = 440.0, 0.1, 960
 UNDERFLOW = 4  # PortAudio's flag
@@ -52,6 +52,11 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
     _take_up(counts)
+    for place in range(counts[at.M_ACTIVE]):  # before any goes on
+        voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
+        whole = voice.view(np.int64)
+        if whole[at.CONTINUES] != 0 and whole[at.BEGIN_AT] <= counts[at.M_FRAMES]:
+            take_over(voice, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0
     for place in range(counts[at.M_ACTIVE]):

@@ -1,6 +1,7 @@
 """Latents that share one tension: `engine.models.koopman_tension`, compiled, for models and for a voice.
 
-A voice is what that module says, at the device's own rate: its program is the model of that rate, in metres.
+A voice is what that module says, at the device's own rate, in metres and seconds. Its modes are its own and may
+change while it rings: what the latents turn by follows from them and from the program's three curves.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from numba import njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.modes import damped, glide, gliding, rest_above, row
 
+SPARE = 1.5  # of the energy at the start, as in the model
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 
 
@@ -100,18 +103,18 @@ def advance(
         rows: (8, modes): the six that `node` takes, κ p, and ω².
     """
     batch, steps, modes = out.shape
-    for row in range(batch):
-        xs, ys = x[row], y[row]
+    for string in range(batch):
+        xs, ys = x[string], y[string]
         moving = modes
         for step in range(steps):
             for _ in range(nodes):
-                node(xs, ys, moving, largest_stretches[row], rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
-            largest_energies[row] *= decay
-            moving, _ = settle(xs, ys, moving, silence, largest_energies[row], rows[7])
+                node(xs, ys, moving, largest_stretches[string], rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+            largest_energies[string] *= decay
+            moving, _ = settle(xs, ys, moving, silence, largest_energies[string], rows[7])
             tension = 0.0
             for n in range(moving):
                 tension += rows[4, n] * xs[n] * xs[n]
-            frame = out[row, step]
+            frame = out[string, step]
             for n in range(moving):
                 frame[n] = xs[n] * (1 - rows[6, n] * tension)
             for n in range(moving, modes):
@@ -119,17 +122,145 @@ def advance(
 
 
 @njit(**COMPILED)
+def prepare(voice: np.ndarray, program: np.ndarray) -> None:
+    """The rows that follow from the voice's modes: `KoopmanTension.step` once more."""
+    counts, whole = voice.view(np.int64), program.view(np.int64)
+    n, rate = counts[at.MODES], program[at.S_RATE]
+    squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
+    couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
+    slot = at.state(n) + at.FOLLOWING * n
+    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    last = rest_above(voice, rate)
+    highest = program[at.S_HIGHEST_PHASE]
+    fastest = max(
+        damped(squares[0], sigmas[0]) / program[at.S_NODE_PHASE], damped(squares[last], sigmas[last]) / highest
+    )
+    nodes = max(1, math.ceil(fastest / rate))
+    h, coefficients = 1 / (nodes * rate), whole[at.S_COEFFICIENTS]
+    slowest = np.inf
+    for m in range(n):
+        sigma, omega = sigmas[m], damped(squares[m], sigmas[m])
+        slowest = min(slowest, sigma)
+        phase = h * omega
+        argument = min(max(2 * (phase / highest) ** 2 - 1, -1.0), 1.0)
+        growth = r = p = 0.0
+        now, before = 1.0, argument  # Chebyshev polynomials
+        for degree in range(coefficients):
+            growth += program[at.S_HEADER + degree] * now
+            r += program[at.S_HEADER + coefficients + degree] * now
+            p += program[at.S_HEADER + 2 * coefficients + degree] * now
+            now, before = (2 * argument * now - before, now)
+        growth = min(max(1 + phase * phase * growth, 0.0), 2.0)
+        r, p = min(max(r, -1.0), 1.0), min(max(p, -1.0), 1.0)
+        kappa, angle, shrunk = h * h * couplings[m], h * couplings[m] / omega, math.exp(-h * sigma)
+        rows[0, m], rows[1, m] = shrunk * math.cos(phase), shrunk * math.sin(phase)
+        rows[2, m], rows[3, m] = angle * growth, angle * kappa * r
+        rows[4, m], rows[5, m] = stretches[m] * growth, stretches[m] * kappa * r
+        rows[6, m], rows[7, m] = kappa * p, omega * omega
+    counts[at.STEPS] = nodes
+    voice[at.DECAY] = math.exp(-2 * slowest / rate)
+
+
+@njit(**COMPILED)
+def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
+    """Half of what `node` does first, forward or back, in place of y."""
+    first = second = 0.0
+    for m in range(len(x)):
+        square = x[m] * x[m]
+        first += rows[4, m] * square
+        second += rows[5, m] * square
+    first = min(first, largest_stretch)
+    linear, squared = first * (1 - 2 * second), first * first
+    for m in range(len(x)):
+        y[m] += sign * 0.5 * (rows[2, m] * linear - rows[3, m] * squared) * x[m]
+
+
+@njit(**COMPILED)
+def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
+    """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: `set_out` back."""
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    x, y = row(voice, n, 0), row(voice, n, 1)
+    slot = at.state(n) + at.FOLLOWING * n
+    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    sigmas, stretches = row(voice, n, at.SIGMA), row(voice, n, at.STRETCH)
+    for m in range(n):
+        q[m], v[m] = x[m], y[m]
+    _half_kick(rows, x, voice[at.LARGEST_STRETCH], v, 1.0)
+    for _ in range(8):  # x = q (1 + κ p S(q)), where κ p S is small
+        tension = 0.0
+        for m in range(n):
+            tension += stretches[m] * q[m] * q[m]
+        for m in range(n):
+            q[m] = x[m] / (1 + rows[6, m] * tension)
+    for m in range(n):
+        v[m] = -math.sqrt(rows[7, m]) * v[m] - sigmas[m] * q[m]
+
+
+@njit(**COMPILED)
+def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
+    """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
+
+    Args:
+        bounded: the largest energy and stretch are there; otherwise they follow from what is given.
+    """
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    x, y = row(voice, n, 0), row(voice, n, 1)
+    slot = at.state(n) + at.FOLLOWING * n
+    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    sigmas, couplings, stretches = row(voice, n, at.SIGMA), row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
+    tension = held = energy = widest = 0.0
+    for m in range(n):
+        omega, square = math.sqrt(rows[7, m]), q[m] * q[m]
+        tension += stretches[m] * square
+        held += couplings[m] * square
+        y[m] = -(v[m] + sigmas[m] * q[m]) / omega
+        energy += rows[7, m] * (square + y[m] * y[m])
+        widest = max(widest, stretches[m] / rows[7, m])
+    if not bounded:
+        voice[at.LARGEST_ENERGY] = SPARE * (energy + 0.5 * tension * held)
+    voice[at.LARGEST_STRETCH] = voice[at.LARGEST_ENERGY] * widest
+    for m in range(n):
+        x[m] = q[m] * (1 + rows[6, m] * tension)
+    _half_kick(rows, x, voice[at.LARGEST_STRETCH], y, -1.0)
+
+
+@njit(**COMPILED)
+def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
+    """What follows from its modes, and the latents, where a voice begins or its modes change."""
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    if counts[at.PREPARED] and not gliding(voice):
+        return
+    q, v, squares = row(voice, n, at.FOLLOWING + 8), row(voice, n, at.FOLLOWING + 9), row(voice, n, at.FOLLOWING + 7)
+    if counts[at.PREPARED]:
+        physical(voice, q, v)
+        glide(voice)
+        raised = 1.0  # by the work of whoever raises the tension
+        for m in range(n):
+            omega = damped(row(voice, n, at.OMEGA_SQUARED)[m], row(voice, n, at.SIGMA)[m])
+            raised = max(raised, omega * omega / squares[m])
+        voice[at.LARGEST_ENERGY] *= raised
+    else:
+        q[:], v[:] = row(voice, n, 0), row(voice, n, 1)
+    prepare(voice, program)
+    for m in range(counts[at.MOVING], n):
+        q[m] = v[m] = 0.0
+    set_out(voice, q, v, bool(counts[at.PREPARED]))
+    counts[at.PREPARED] = 1
+
+
+@njit(**COMPILED)
 def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string as it is let go."""
-    whole = program.view(np.int64)
+    _bring_up_to_date(voice, program)
     counts = voice.view(np.int64)
-    n = whole[at.S_MODES]
-    place = at.state(n)
-    x, y = voice[place : place + n], voice[place + n : place + 2 * n]
-    largest = voice[place + 2 * n :]
-    rows = program[at.S_HEADER : at.S_HEADER + 8 * n].reshape(8, n)
-    moving = counts[at.MOVING]
-    points = counts[at.POINTS]
+    n = counts[at.MODES]
+    x, y = row(voice, n, 0), row(voice, n, 1)
+    slot = at.state(n) + at.FOLLOWING * n
+    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    moving, nodes, points = counts[at.MOVING], counts[at.STEPS], counts[at.POINTS]
     sets = 2 if fading else 1
     total = 0.0
     for frame in range(at.QUANTUM):
@@ -139,18 +270,17 @@ def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, 
                 tension += rows[4, m] * x[m] * x[m]
             for which in range(sets):
                 for point in range(points):
-                    slot = at.weights(n, which, point, 0)
-                    plain, bent = voice[slot : slot + n], voice[slot + n : slot + 2 * n]
-                    found = seen = 0.0
+                    place = at.weights(n, which, point, 0)
+                    weights = voice[place : place + n]
+                    found = 0.0
                     for m in range(moving):
-                        found += plain[m] * x[m]
-                        seen += bent[m] * x[m]
-                    out[2 * which + point, frame] = found - tension * seen
-        for _ in range(whole[at.S_NODES]):
-            node(x, y, moving, largest[1], rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
-        largest[0] *= program[at.S_DECAY]
+                        found += weights[m] * (x[m] - rows[6, m] * tension * x[m])
+                    out[2 * which + point, frame] = found
+        for _ in range(nodes):
+            node(x, y, moving, voice[at.LARGEST_STRETCH], rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+        voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
         if frame % 16 == 15:
-            moving, total = settle(x, y, moving, program[at.S_SILENCE], largest[0], rows[7])
+            moving, total = settle(x, y, moving, program[at.S_SILENCE], voice[at.LARGEST_ENERGY], rows[7])
     counts[at.MOVING] = moving
     counts[at.GENERATED] += at.QUANTUM
     voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.S_LOUDNESS]

@@ -1,4 +1,7 @@
-"""A voice of the solved string: the splitting scheme of `engine.truth.splitting`, heard at two points."""
+"""A voice of the solved string: the splitting scheme of `engine.truth.splitting`, heard at two points.
+
+Its modes are its own and may change while it rings; the flows between two kicks follow from them.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,42 @@ from numba import njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.modes import damped, glide, gliding, rest_above, row
+
+
+@njit(**COMPILED)
+def _sub_steps(voice: np.ndarray, program: np.ndarray) -> int:
+    """Of a frame: they follow the highest mode that moves. What is linear needs none, which 0 says."""
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    squares, couplings = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.COUPLING)
+    if couplings[n - 1] == 0.0:
+        return 0
+    highest = math.sqrt(squares[counts[at.MOVING] - 1])
+    return max(1, math.ceil(program[at.T_SUBSTEPS] * highest / (2 * math.pi * program[at.T_RATE])))
+
+
+@njit(**COMPILED)
+def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
+    """The exact damped rotations between kicks, as `engine.truth.linear.damped_rotation`, of half the palindrome."""
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
+    for stage in range(at.STAGES // 2 if sub_steps else 1):
+        time_s = (program[at.T_ROTATIONS + stage] / sub_steps if sub_steps else 1.0) / program[at.T_RATE]
+        first = at.FOLLOWING + 4 * stage
+        qq, qv = row(voice, n, first), row(voice, n, first + 1)
+        vq, vv = row(voice, n, first + 2), row(voice, n, first + 3)
+        for m in range(n):
+            sigma, omega = sigmas[m], damped(squares[m], sigmas[m])
+            decay, cosine, sine = (
+                math.exp(-sigma * time_s),
+                math.cos(omega * time_s),
+                math.sin(omega * time_s) / omega,
+            )
+            qq[m], qv[m] = decay * (cosine + sigma * sine), decay * sine
+            vq[m], vv[m] = -decay * (sigma * sigma + omega * omega) * sine, decay * (cosine - sigma * sine)
+    counts[at.STEPS], counts[at.PREPARED] = sub_steps, 1
 
 
 @njit(**COMPILED)
@@ -17,17 +56,25 @@ def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, 
 
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left.
     """
-    whole = program.view(np.int64)
     counts = voice.view(np.int64)
-    n, stages = whole[at.T_MODES], whole[at.T_STAGES]
-    rows = at.state(n)
-    q, v = voice[rows : rows + n], voice[rows + n : rows + 2 * n]
-    coupling, eta = program[whole[at.T_COUPLING] :], program[whole[at.T_ETA] :]
-    inverse = program[whole[at.T_INVERSE] :]
+    n, points = counts[at.MODES], counts[at.POINTS]
+    changed = gliding(voice)
+    if changed:
+        glide(voice)
+        rest_above(voice, program[at.T_RATE])
+    sub_steps = _sub_steps(voice, program)
+    if changed or not counts[at.PREPARED] or sub_steps != counts[at.STEPS]:
+        _prepare(voice, program, sub_steps)
+    q, v = row(voice, n, 0), row(voice, n, 1)
+    squares, couplings, stretches = (
+        row(voice, n, at.OMEGA_SQUARED),
+        row(voice, n, at.COUPLING),
+        row(voice, n, at.STRETCH),
+    )
     silence = program[at.T_SILENCE]
     moving = counts[at.MOVING]
-    points = counts[at.POINTS]
     sets = 2 if fading else 1
+    step_s = 1 / (max(sub_steps, 1) * program[at.T_RATE])
     total = 0.0
     for frame in range(at.QUANTUM):
         if heard:
@@ -42,29 +89,28 @@ def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, 
         if frame % 16 == 0:
             total = 0.0
             for m in range(moving):
-                total += q[m] * q[m] + inverse[m] * v[m] * v[m]
+                total += q[m] * q[m] + v[m] * v[m] / squares[m]
             while moving > 1:
                 m = moving - 1
-                if not q[m] * q[m] + inverse[m] * v[m] * v[m] < silence * silence * total:
+                if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
                     break
                 q[m] = v[m] = 0.0
                 moving = m
-        level = whole[whole[at.T_LEVEL_OF] + moving - 1]
-        for _ in range(whole[whole[at.T_SUBSTEPS] + level]):
+        for _ in range(max(sub_steps, 1)):
             stretch = 0.0
-            for stage in range(stages):
-                kick = program[whole[at.T_KICKS] + level * stages + stage - 1] * stretch if stage > 0 else 0.0
-                slot = whole[at.T_FLOWS] + (level * stages + stage) * 4 * n
-                qq, qv = program[slot : slot + n], program[slot + n : slot + 2 * n]
-                vq, vv = program[slot + 2 * n : slot + 3 * n], program[slot + 3 * n : slot + 4 * n]
+            for stage in range(at.STAGES if sub_steps else 1):
+                kick = program[at.T_KICKS + stage - 1] * step_s * stretch if stage > 0 else 0.0
+                flow = at.state(n) + (at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)) * n
+                qq, qv = voice[flow : flow + n], voice[flow + n : flow + 2 * n]
+                vq, vv = voice[flow + 2 * n : flow + 3 * n], voice[flow + 3 * n : flow + 4 * n]
                 stretch = 0.0
                 for m in range(moving):
                     amplitude = q[m]
-                    speed = v[m] - kick * coupling[m] * amplitude
+                    speed = v[m] - kick * couplings[m] * amplitude
                     turned = qq[m] * amplitude + qv[m] * speed
                     q[m] = turned
                     v[m] = vq[m] * amplitude + vv[m] * speed
-                    stretch += eta[m] * turned * turned
+                    stretch += stretches[m] * turned * turned
     counts[at.MOVING] = moving
     counts[at.GENERATED] += at.QUANTUM
     voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.T_LOUDNESS]

@@ -11,6 +11,7 @@ from engine.kernels import bank, rendered, tension, truth
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
+from engine.kernels.modes import row
 
 MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
 WARMED = 3  # quanta: the one that is heard, and those before and after it
@@ -88,6 +89,37 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 
 @njit(**COMPILED)
+def take_over(voice: np.ndarray, scratch: np.ndarray) -> None:
+    """A pluck of a string that rings is added to its motion, as this voice begins; the voice that had it fades.
+
+    Where that one is over, or of another kind, the string is at rest.
+    """
+    counts = voice.view(np.int64)
+    before = carray(pointer(counts[at.CONTINUES]), (1 << 40,), np.float64)
+    befores = before.view(np.int64)
+    rings = befores[at.STATE] == at.SOUNDING and befores[at.GENERATED] > 0
+    if rings and befores[at.KIND] == counts[at.KIND]:
+        n, m = counts[at.MODES], befores[at.MODES]
+        q, v = scratch[:m], scratch[m : 2 * m]
+        if counts[at.KIND] == at.TENSION:
+            tension.physical(before, q, v)
+        else:
+            q[:], v[:] = row(before, m, 0), row(before, m, 1)
+        amplitudes, speeds = row(voice, n, 0), row(voice, n, 1)
+        widest = 0.0
+        for mode in range(min(n, m)):
+            amplitudes[mode] += q[mode]
+            speeds[mode] += v[mode]
+            widest += math.sqrt(q[mode] ** 2 + v[mode] ** 2 / row(voice, n, at.OMEGA_SQUARED)[mode])
+        voice[at.LIMIT] *= 1 + widest / max(voice[at.PEAK], 1e-9)
+        if befores[at.RELEASE] == 0:
+            befores[at.RELEASE] = counts[at.ATTACK]
+        counts[at.JOINS] = 1
+    fence()
+    counts[at.CONTINUES] = 0
+
+
+@njit(**COMPILED)
 def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     """Adds the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
     counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
@@ -136,7 +168,10 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
             if done + frame < length:
                 gain = source + (goal - source) * ((done + frame + 1) / length)
             if first + frame < attack:
-                gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
+                if counts[at.JOINS]:
+                    gain *= (first + frame + 1) / attack
+                else:
+                    gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
             mix[frame, 0] += gain * out[0, frame]
             mix[frame, 1] += gain * out[points - 1, frame]
         counts[at.GAIN_DONE] = min(done + quantum, length)

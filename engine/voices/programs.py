@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import lru_cache, singledispatch
 from typing import Any
 
@@ -18,14 +17,16 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from engine.bounds import SUBSTEPS_IN_A_PERIOD
 from engine.kernels import layout as at
-from engine.models.base import Physics, StringModel
+from engine.models.base import StringModel
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetInfo
-from engine.truth import SplittingSolver, default_substeps
+from engine.resonators.base import Resonator
+from engine.truth.splitting import KICKS, ROTATIONS
 from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
@@ -46,6 +47,7 @@ class Program:
         start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
         read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
             scale.
+        resonator: whose modes its voices begin with, and may leave; None: its kind has none of its own.
     """
 
     kind: int
@@ -55,6 +57,7 @@ class Program:
     grid_points: int
     start: Strike
     read: Callable[[Tensor], tuple[Array, Array]]
+    resonator: Resonator | None = None
     _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
@@ -188,24 +191,25 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
 
 
 @bank_program.register
-@torch.no_grad()
 def _tension_program(model: KoopmanTension, info: PresetInfo, rate_hz: int) -> Program:
-    own = model.tuned(Physics(info.resonator, rate_hz))  # in metres, at this rate
-    step, n = own.step(Fraction(1)), info.modes
-    reals = {at.S_DECAY: step.decay, at.S_SILENCE: HEARD_SILENCE, at.S_LOUDNESS: -math.log(FULL_SCALE_M)}
-    memory = _packed(at.S_HEADER, reals, {at.S_MODES: n, at.S_NODES: step.nodes}, {at.S_HEADER - 1: step.rows})
+    return tension_program(model, info.resonator, rate_hz)
 
-    def start(displacement_m: Tensor) -> tuple[Array, Array]:
-        with torch.inference_mode():
-            state = own.let_go(displacement_m.double()[None], step)
-        limits = torch.cat([state.largest_energy, state.largest_stretch])
-        return state.x[0].numpy(), torch.cat([state.y[0], limits]).numpy()
 
-    def read(weights: Tensor) -> tuple[Array, Array]:
-        found = weights.double().T @ own.shapes.T / FULL_SCALE_M
-        return torch.cat([found, found * step.seen], dim=1).numpy(), np.zeros(len(found))
-
-    return Program(at.TENSION, memory, n, rate_hz, info.grid_points, start, read)
+@torch.no_grad()
+def tension_program(model: KoopmanTension, resonator: Resonator, rate_hz: int) -> Program:
+    """What the model learned, for a resonator of any kind at any rate."""
+    c, curves = model.configuration, torch.stack([model.A, model.r, model.p])
+    reals = {
+        at.S_NODE_PHASE: c.node_phase,
+        at.S_HIGHEST_PHASE: c.highest_phase,
+        at.S_SILENCE: HEARD_SILENCE,
+        at.S_LOUDNESS: -math.log(FULL_SCALE_M),
+        at.S_RATE: float(rate_hz),
+    }
+    memory = np.concatenate(
+        [_header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), curves.flatten().numpy()]
+    )
+    return _with_modes(at.TENSION, memory, resonator, rate_hz)
 
 
 def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
@@ -214,37 +218,35 @@ def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) 
     Args:
         coarser: how many times fewer sub-steps than `default_substeps`.
     """
-    n = info.modes
-    resonator = info.resonator
-    substeps = max(1, -(-default_substeps(resonator, rate_hz) // coarser))
-    solver = SplittingSolver(resonator, rate_hz, substeps=substeps, silence=HEARD_SILENCE)
-    flows, kicks, coupling, eta, steps, level_of, inverse = (part.numpy() for part in solver.constants)
-    levels, stages = flows.shape[:2]
-    padded = np.zeros((levels, stages))
-    padded[:, : stages - 1] = kicks
-    memory = _packed(
-        at.T_HEADER,
-        {at.T_SILENCE: HEARD_SILENCE, at.T_LOUDNESS: -math.log(FULL_SCALE_M)},
-        {at.T_MODES: n, at.T_STAGES: stages, at.T_LEVELS: levels},
-        {
-            at.T_FLOWS: flows,
-            at.T_KICKS: padded,
-            at.T_COUPLING: coupling,
-            at.T_ETA: eta,
-            at.T_SUBSTEPS: steps,
-            at.T_LEVEL_OF: level_of,
-            at.T_INVERSE: inverse,
-        },
-    )
+    return solver_program(info.resonator, rate_hz, coarser)
+
+
+def solver_program(resonator: Resonator, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
+    """The physics of a resonator at any rate."""
+    reals = {
+        at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
+        at.T_SILENCE: HEARD_SILENCE,
+        at.T_LOUDNESS: -math.log(FULL_SCALE_M),
+        at.T_RATE: float(rate_hz),
+        **{at.T_ROTATIONS + stage: share for stage, share in enumerate(ROTATIONS[: at.STAGES // 2])},
+        **{at.T_KICKS + stage: share for stage, share in enumerate(KICKS)},
+    }
+    return _with_modes(at.TRUTH, _header(at.T_HEADER, reals, {}), resonator, rate_hz)
+
+
+def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int) -> Program:
+    """Of a kind whose voices move amplitudes of the resonator's modes."""
+    resonator.eigenvalues()  # it swings
+    shapes, n = resonator.shapes, resonator.modes
 
     def start(displacement_m: Tensor) -> tuple[Array, Array]:
         return resonator.to_modes(displacement_m.double()).numpy(), np.zeros(n)
 
     def read(weights: Tensor) -> tuple[Array, Array]:
-        found = (weights.T @ resonator.shapes.T / FULL_SCALE_M).numpy()
+        found = (weights.double().T @ shapes.T / FULL_SCALE_M).numpy()
         return np.concatenate([found, np.zeros_like(found)], axis=1), np.zeros(len(found))
 
-    return Program(at.TRUTH, memory, n, rate_hz, info.grid_points, start, read)
+    return Program(kind, memory, n, rate_hz, resonator.points, start, read, resonator)
 
 
 def model_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Program:
@@ -299,16 +301,22 @@ def _packed(
 ) -> Array:
     """One array of a header and its parts, whose places the header tells."""
     arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
-    memory = np.zeros(header_slots + sum(len(array) for array in arrays))
+    header = _header(header_slots, reals, wholes)
+    memory = np.concatenate([header, np.zeros(sum(len(array) for array in arrays))])
     counts = memory.view(np.int64)
-    for slot, real in reals.items():
-        memory[slot] = real
-    for slot, whole in wholes.items():
-        counts[slot] = whole
     place = header_slots
     for slot, array in zip(parts, arrays, strict=True):
         counts[slot] = place
         target = counts if array.dtype == np.int64 else memory
         target[place : place + len(array)] = array
         place += len(array)
+    return memory
+
+
+def _header(slots: int, reals: dict[int, float], wholes: dict[int, int]) -> Array:
+    memory = np.zeros(slots)
+    for slot, real in reals.items():
+        memory[slot] = real
+    for slot, whole in wholes.items():
+        memory.view(np.int64)[slot] = whole
     return memory

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from engine.kernels import layout as at
 from engine.pluck import FULL_SCALE_M
+from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
 from engine.voices.programs import Program
 
@@ -54,14 +55,18 @@ class Voice:
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         peak = float(displacement_m.abs().max())
+        memory[at.PEAK] = peak
         memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second
         self._samples: NDArray[np.float32] | None = None
         self._source_rate_hz = source_rate_hz
-        if program.kind in (at.TRUTH, at.TENSION):
+        self._blocks: list[NDArray[np.float64]] = []  # of modes, which the kernel may be reading
+        self._before: Voice | None = None
+        if program.resonator is not None:
             counts[at.MOVING] = n
+            memory[place + at.OMEGA_SQUARED * n : place + at.FOLLOWING * n] = _rows(program.resonator)
         elif program.kind == at.BANK:
             from engine.kernels.bank import strike
 
@@ -174,6 +179,40 @@ class Voice:
         self.ear = ear
         return True
 
+    def retune(self, resonator: Resonator, seconds: float = 0.005) -> None:
+        """Other modes while it rings, as a tension, a length or a damping that changes: it gets there evenly.
+
+        Amplitude and speed of each mode go on. Any one thread; the latest wish counts.
+
+        Raises:
+            ValueError: the voice has no modes of its own, or not so many.
+        """
+        if self.program.resonator is None or resonator.modes != self.program.modes:
+            raise ValueError(f"a voice with {self.program.modes} modes cannot take {resonator.modes} others")
+        block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
+        block.view(np.int64)[at.B_QUANTA] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM))
+        taken = int(self._counts[at.TAKEN])
+        for place, each in enumerate(self._blocks):
+            if int(each.ctypes.data) == taken:
+                del self._blocks[:place]
+                break
+        self._blocks.append(block)
+        self._counts[at.RESONATOR] = int(block.ctypes.data)
+
+    def continues(self, before: Voice) -> None:
+        """Before it is handed over: it is the same string, plucked again while `before` rings.
+
+        Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
+        """
+        before.forget_before()
+        self._before = before
+        self._counts[at.CONTINUES] = before.address
+
+    def forget_before(self) -> None:
+        """Lets go of the voice that it continues, once it has taken its motion over."""
+        if self._counts[at.CONTINUES] == 0:
+            self._before = None
+
     def append(self, samples: NDArray[np.floating]) -> None:
         """More of what a rendered voice reads, (frames, points) of full scale at its own rate."""
         assert self._samples is not None
@@ -224,6 +263,12 @@ class Voice:
             place = at.HEADER + (which * 2 + point) * 2 * n
             self.memory[place : place + 2 * n] = weights[point]
             self.memory[at.HEADER + 8 * n + which * 2 + point] = bias[point]
+
+
+def _rows(resonator: Resonator) -> NDArray[np.float64]:
+    """ω², σ, k and η², one after the other."""
+    own = resonator.omega.square(), resonator.sigma, resonator.coupling, resonator.stretch
+    return np.concatenate([each.numpy() for each in own])
 
 
 def _state(modes: int) -> int:

@@ -1,0 +1,76 @@
+"""A voice's modes, which may change while it rings: another tension, length or damping.
+
+What they shall be is a block of memory that somebody else wrote; its address is the command. The kernel goes there in
+equal steps, one a quantum, of ω², σ, k and η² (`engine.resonators.base`). Amplitude and speed of each mode go on as
+they are: it is their equation that changes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import carray, njit
+
+from engine.kernels import layout as at
+from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import fence, pointer
+
+TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, before it would sound as another
+
+
+@njit(inline="always", **COMPILED)
+def row(voice: np.ndarray, modes: int, which: int) -> np.ndarray:
+    """One row (modes,) of a voice's state."""
+    slot = at.state(modes) + which * modes
+    return voice[slot : slot + modes]
+
+
+@njit(inline="always", **COMPILED)
+def gliding(voice: np.ndarray) -> bool:
+    """Whether its modes are still to change."""
+    counts = voice.view(np.int64)
+    return counts[at.RESONATOR] != counts[at.TAKEN] or counts[at.GLIDE] > 0
+
+
+@njit(**COMPILED)
+def glide(voice: np.ndarray) -> None:
+    """A step towards the modes that it is to have."""
+    counts = voice.view(np.int64)
+    wanted = counts[at.RESONATOR]
+    if wanted != counts[at.TAKEN]:
+        fence()
+        counts[at.GLIDE] = max(1, carray(pointer(wanted), (at.B_HEADER,), np.int64)[at.B_QUANTA])
+        counts[at.TAKEN] = wanted
+    n, left = counts[at.MODES], counts[at.GLIDE]
+    block = carray(pointer(counts[at.TAKEN]), (at.B_HEADER + 4 * n,), np.float64)
+    present = at.state(n) + at.OMEGA_SQUARED * n
+    for place in range(4 * n):
+        voice[present + place] += (block[at.B_HEADER + place] - voice[present + place]) / left
+    counts[at.GLIDE] = left - 1
+
+
+@njit(inline="always", **COMPILED)
+def damped(omega_squared: float, sigma: float) -> float:
+    """√(ω² - σ²); a mode that would no longer swing swings slowly."""
+    return math.sqrt(max(omega_squared - sigma * sigma, 0.01 * omega_squared))
+
+
+@njit(**COMPILED)
+def rest_above(voice: np.ndarray, rate: float) -> int:
+    """Lays modes to rest that lie too high for the rate; the highest of the others."""
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    squares, sigmas, first, second = (
+        row(voice, n, at.OMEGA_SQUARED),
+        row(voice, n, at.SIGMA),
+        row(voice, n, 0),
+        row(voice, n, 1),
+    )
+    last = n - 1
+    while last > 0 and damped(squares[last], sigmas[last]) > TOO_HIGH * rate:
+        last -= 1
+    for m in range(last + 1, counts[at.MOVING]):
+        first[m] = second[m] = 0.0
+    counts[at.MOVING] = min(counts[at.MOVING], last + 1)
+    return last
