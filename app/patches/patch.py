@@ -77,6 +77,18 @@ def _lines(text: str) -> str:
     return text
 
 
+def explained(error: ValueError) -> str:
+    """What is wrong with the first field that was refused: its path, what it must be, and what was found."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors(include_url=False, include_context=False)[0]
+    field = ".".join(str(part) for part in first["loc"])[:100]
+    said = first["msg"].removeprefix("Value error, ")
+    found = first["input"]
+    shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
+    return f"{field}: {said}{shown}" if field else said
+
+
 def _number(low: float, high: float) -> Any:
     return Field(ge=low, le=high, strict=True, allow_inf_nan=False)
 
@@ -219,8 +231,8 @@ class TuningChoice(_Value):
     """Which pitch each key has; see `app.patches.tuning`.
 
     Attributes:
-        a4_hz: of key 69 without a scale or a keyboard mapping.
-        scale: the text of a .scl file, "" for twelve equal steps.
+        a4_hz: of key 69; a keyboard mapping has a reference pitch of its own.
+        scale: the text of a .scl file, "" for twelve equal steps. It begins at key 60 without a mapping.
         keymap: the text of a .kbm file, "" for none.
         transpose: keys that everything sounds higher.
     """
@@ -229,6 +241,14 @@ class TuningChoice(_Value):
     scale: ScalaText = ""
     keymap: ScalaText = ""
     transpose: Annotated[int, _number(-48, 48)] = 0
+
+    @model_validator(mode="after")
+    def _gives_pitches(self) -> Self:
+        if self.scale or self.keymap:
+            from app.patches.tuning import Tuning  # brings a library that few patches need
+
+            Tuning(self)
+        return self
 
 
 class Body(_Value):
