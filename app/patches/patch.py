@@ -1,0 +1,386 @@
+"""A patch: everything that an instrument is, as one checked and immutable value.
+
+Lengths, areas and tensions are those of physics, in SI units; places on the string are in its lengths, from 0 to 1.
+Whatever comes from a file is bounded here. Which pitch a key has, and where patches lie, is told in `tuning` and
+`library`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from app.shared.vocabulary import Pickup as PickupKind
+from engine import bounds
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
+
+if TYPE_CHECKING:
+    from engine.resonators.string import StringParameters
+
+Category = Literal["guitar", "bass", "harp", "keys", "world", "experimental"]
+CATEGORIES: tuple[Category, ...] = get_args(Category)
+Mode = Literal["poly", "guitar", "mpe"]
+ASSIGNABLE: tuple[str, ...] = (
+    "knobs.stiffness",
+    "knobs.decay",
+    "knobs.brightness_decay",
+    "knobs.modulus",
+    "knobs.density",
+    "knobs.gauge",
+    "pluck.position",
+    "pluck.width",
+    "pluck.width_hard",
+    "pluck.softest_mm",
+    "pluck.hardest_mm",
+    "pluck.curve",
+    "pickup.points.0",
+    "pickup.points.1",
+    "damping.release_t60_s",
+    "body.mix",
+    "body.size",
+    "room.mix",
+    "room.t60_s",
+    "level_db",
+)  # what the mod wheel and macros may turn
+
+LONGEST_NAME = 60  # characters
+LONGEST_DESCRIPTION = 400
+LONGEST_SCALE = 2**16  # characters of a .scl or .kbm
+MOST_STRINGS = 128
+MOST_MACROS = 8
+MOST_TARGETS = 8
+FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on one of the three systems
+HIGHEST_KEY = 127
+VELOCITIES = (1, 127)
+LEVEL_RANGE_DB = (-60.0, 24.0)
+
+
+def _plain(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be one line of printable characters; remove the others")
+    return text.strip()
+
+
+def _safe(name: str) -> str:
+    """A name that can be a file's on every system, and never a path."""
+    name = _plain(name)
+    if name.startswith(".") or name.endswith(".") or any(c in FORBIDDEN_IN_NAMES for c in name):
+        raise ValueError(f"must not begin or end with a full stop, or hold one of {FORBIDDEN_IN_NAMES}; rename it")
+    return name
+
+
+def _lines(text: str) -> str:
+    if not all(c.isprintable() or c in "\r\n\t" for c in text):
+        raise ValueError("must be the text of a Scala file, without control characters; save it as plain text")
+    return text
+
+
+def explained(error: ValueError) -> str:
+    """What is wrong with the first field that was refused: its path, what it must be, and what was found."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors(include_url=False, include_context=False)[0]
+    field = ".".join(str(part) for part in first["loc"])[:100]
+    said = first["msg"].removeprefix("Value error, ")
+    found = first["input"]
+    shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
+    return f"{field}: {said}{shown}" if field else said
+
+
+def _number(low: float, high: float) -> Any:
+    return Field(ge=low, le=high, strict=True, allow_inf_nan=False)
+
+
+Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_safe)]
+Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe)]  # a name elsewhere, "" for none
+Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(_plain)]
+ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
+Key = Annotated[int, _number(0, HIGHEST_KEY)]
+Share = Annotated[float, _number(0, 1)]
+Multiplier = Annotated[float, _number(0.1, 10)]
+Position = Annotated[float, _number(*POSITION_RANGE)]
+Width = Annotated[float, _number(*WIDTH_RANGE)]
+Millimetres = Annotated[float, _number(0.001, LARGEST_AMPLITUDE_MM)]
+Flag = Annotated[bool, Field(strict=True)]
+
+
+class _Value(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PhysicalString(_Value):
+    """The eight parameters of `StringParameters`, known before the engine is loaded."""
+
+    length_m: Annotated[float, _number(*bounds.STRING["length_m"])]
+    area_m2: Annotated[float, _number(*bounds.STRING["area_m2"])]
+    second_moment_m4: Annotated[float, _number(*bounds.STRING["second_moment_m4"])]
+    density_kg_m3: Annotated[float, _number(*bounds.STRING["density_kg_m3"])]
+    youngs_modulus_pa: Annotated[float, _number(*bounds.STRING["youngs_modulus_pa"])]
+    damping_d1_kg_m_s: Annotated[float, _number(*bounds.STRING["damping_d1_kg_m_s"])]
+    damping_d3_kg_m_s: Annotated[float, _number(*bounds.STRING["damping_d3_kg_m_s"])]
+    tension_n: Annotated[float, _number(*bounds.STRING["tension_n"])]
+
+    @property
+    def parameters(self) -> StringParameters:
+        """As the engine takes them."""
+        from engine.resonators.string import StringParameters  # brings torch
+
+        return StringParameters(**self.model_dump())
+
+
+class Fretted(_Value):
+    """Every key is this string with another length."""
+
+    kind: Literal["fretted"] = "fretted"
+    string: PhysicalString
+
+
+class OpenString(_Value):
+    """One string of a set, and the key that it sounds when nothing shortens it."""
+
+    note: Key
+    string: PhysicalString
+
+
+class StringSet(_Value):
+    """Strings by rising open note. A key shortens the highest at or below it; below all, the lowest is slackened."""
+
+    kind: Literal["set"] = "set"
+    strings: Annotated[tuple[OpenString, ...], Field(min_length=1, max_length=MOST_STRINGS)]
+
+    @model_validator(mode="after")
+    def _rise(self) -> Self:
+        notes = [string.note for string in self.strings]
+        if any(low >= high for low, high in itertools.pairwise(notes)):
+            raise ValueError("strings must be listed by rising note, each note once; put them in order")
+        return self
+
+
+class Knobs(_Value):
+    """Multipliers of the strings' own values; 1 leaves them. The tension rise of plucks follows from them.
+
+    Attributes:
+        stiffness: of the bending stiffness alone (the second moment of area): how inharmonic it is.
+        decay: of d₁, damping of all modes alike; above 1 falls sooner.
+        brightness_decay: of d₃, damping that grows with frequency; above 1 is darker.
+        modulus: of Young's modulus: bending stiffness, and how much a hard pluck glides.
+        density: of the mass per volume.
+        gauge: of the radius: the area grows with its square, the second moment with its fourth power.
+    """
+
+    stiffness: Multiplier = 1.0
+    decay: Multiplier = 1.0
+    brightness_decay: Multiplier = 1.0
+    modulus: Multiplier = 1.0
+    density: Multiplier = 1.0
+    gauge: Annotated[float, _number(0.25, 4)] = 1.0
+
+
+class PluckChoices(_Value):
+    """How a key pulls its string. Widths are as in `engine.pluck.Pluck`; a triangle has none.
+
+    Attributes:
+        width, width_hard: of the softest and of the hardest pluck.
+        softest_mm, hardest_mm: amplitudes of velocity 1 and 127; between them a step of velocity is a step in dB.
+        curve: 0 is even; towards 1 the middle velocities are louder, towards -1 softer.
+    """
+
+    shape: Shape = "triangular"
+    position: Position = 0.2
+    width: Width = 0.12
+    width_hard: Width = 0.06
+    softest_mm: Millimetres = 0.1
+    hardest_mm: Millimetres = 3.0
+    curve: Annotated[float, _number(-1, 1)] = 0.0
+
+    @model_validator(mode="after")
+    def _softest_is_softer(self) -> Self:
+        if self.softest_mm > self.hardest_mm:
+            raise ValueError("softest_mm must not be above hardest_mm; lower it")
+        return self
+
+    def pluck(self, velocity: float) -> Pluck:
+        """Of a velocity in 1 … 127, which need not be whole; others count as the nearest."""
+        low, high = VELOCITIES
+        share = min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-self.curve)
+        return Pluck(
+            self.position,
+            self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
+            self.shape,
+            self.width + (self.width_hard - self.width) * share,
+        )
+
+
+class Pickup(_Value):
+    """Where the string is heard, one point or left and right, and whether as displacement or its velocity."""
+
+    points: Annotated[tuple[Share, ...], Field(min_length=1, max_length=2)] = (0.37,)
+    kind: PickupKind = "displacement"
+
+
+class Damping(_Value):
+    """What happens when a key is let go: nothing (`let_ring`), or all partials fall by 60 dB in `release_t60_s`."""
+
+    release_t60_s: Annotated[float, _number(0.01, 60)] = 0.3
+    let_ring: Flag = False
+
+
+class TuningChoice(_Value):
+    """Which pitch each key has; see `app.patches.tuning`.
+
+    Attributes:
+        a4_hz: of key 69; a keyboard mapping has a reference pitch of its own.
+        scale: the text of a .scl file, "" for twelve equal steps. It begins at key 60 without a mapping.
+        keymap: the text of a .kbm file, "" for none.
+        transpose: keys that everything sounds higher.
+    """
+
+    a4_hz: Annotated[float, _number(220, 880)] = 440.0
+    scale: ScalaText = ""
+    keymap: ScalaText = ""
+    transpose: Annotated[int, _number(-48, 48)] = 0
+
+    @model_validator(mode="after")
+    def _gives_pitches(self) -> Self:
+        if self.scale or self.keymap:
+            from app.patches.tuning import Tuning  # brings a library that few patches need
+
+            Tuning(self)
+        return self
+
+
+class Body(_Value):
+    """What the strings stand on: the name of an impulse response ("": none), its share, its size (1: as it is)."""
+
+    name: Reference = ""
+    mix: Share = 0.5
+    size: Annotated[float, _number(0.25, 4)] = 1.0
+
+
+class Room(_Value):
+    """How much is heard of the room, and its reverberation time."""
+
+    mix: Share = 0.0
+    t60_s: Annotated[float, _number(0.1, 20)] = 1.2
+
+
+class Target(_Value):
+    """A field that a macro turns, by its path, and its values at 0 and 1."""
+
+    field: str
+    low: Annotated[float, _number(-1e6, 1e6)]
+    high: Annotated[float, _number(-1e6, 1e6)]
+
+
+class Macro(_Value):
+    """One knob that turns several fields; `value` is where it stands."""
+
+    name: Annotated[str, Field(min_length=1, max_length=24), AfterValidator(_plain)]
+    value: Share = 0.5
+    targets: Annotated[tuple[Target, ...], Field(min_length=1, max_length=MOST_TARGETS)]
+
+
+class Patch(_Value):
+    """See the module and the parts.
+
+    Attributes:
+        preset: the model that plays it, by the name of a preset of many strings; never a path.
+        range: the lowest and the highest key that sound.
+        mode: all keys on as many strings as needed; a MIDI channel a string, each of them monophonic; or MPE.
+        mod_wheel: one of ASSIGNABLE, or "none".
+        level_db: of everything that is heard of it.
+        macros: the fields hold as they are written; turning a macro writes its targets (`turned`).
+    """
+
+    version: Literal[1] = 1
+    name: Name
+    category: Category
+    description: Text = ""
+    author: Text = ""
+    preset: Name = "studio_any_string"
+    strings: Annotated[Fretted | StringSet, Field(discriminator="kind")]
+    knobs: Knobs = Knobs()
+    range: tuple[Key, Key] = (28, 88)
+    pluck: PluckChoices = PluckChoices()
+    pickup: Pickup = Pickup()
+    damping: Damping = Damping()
+    mode: Mode = "poly"
+    bend_semitones: Annotated[float, _number(0, 48)] = 2.0
+    mod_wheel: str = "none"
+    tuning: TuningChoice = TuningChoice()
+    body: Body = Body()
+    room: Room = Room()
+    level_db: Annotated[float, _number(*LEVEL_RANGE_DB)] = 0.0
+    macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> Self:
+        low, high = self.range
+        if low > high:
+            raise ValueError(f"range: the lowest key {low} is above the highest, {high}; exchange them")
+        if self.mod_wheel != "none":
+            self._check_assignable("mod_wheel", self.mod_wheel)
+        for number, macro in enumerate(self.macros):
+            for target in macro.targets:
+                where = f"macros.{number}: target {target.field[:LONGEST_NAME]}"
+                self._check_assignable(where, target.field)
+                for value in (target.low, target.high):
+                    try:
+                        self._replacement(target.field, value)
+                    except ValidationError as error:
+                        raise ValueError(f"{where}: {error.errors()[0]['msg']}, found {value:g}") from error
+                    except ValueError as error:
+                        raise ValueError(f"{where}: {error}") from error
+        return self
+
+    def value(self, field: str) -> float:
+        """Of one of ASSIGNABLE. Raises ValueError where it is none, or the patch has no such pick-up point."""
+        self._check_assignable("field", field)
+        found: Any = self
+        for part in field.split("."):
+            found = found[int(part)] if isinstance(found, tuple) else getattr(found, part)
+        return float(found)
+
+    def with_value(self, field: str, value: float) -> Patch:
+        """With one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of its bounds."""
+        return self.with_values({field: value})
+
+    def with_values(self, values: dict[str, float]) -> Patch:
+        """With several of ASSIGNABLE changed, one after the other. Raises ValueError as `with_value` does."""
+        patch = self
+        for field, value in values.items():
+            self._check_assignable("field", field)
+            name, replacement = patch._replacement(field, value)
+            patch = Patch.model_validate({**dict(patch), name: replacement})
+        return patch
+
+    def turned(self, macro: int, value: float) -> Patch:
+        """With a macro turned to `value` in 0 … 1, and its targets written."""
+        share = min(1.0, max(0.0, value))
+        chosen = self.macros[macro]
+        moved = chosen.model_copy(update={"value": share})
+        macros = (*self.macros[:macro], moved, *self.macros[macro + 1 :])
+        targets = {t.field: t.low + share * (t.high - t.low) for t in chosen.targets}
+        return self.model_copy(update={"macros": macros}).with_values(targets)
+
+    def _check_assignable(self, where: str, field: str) -> None:
+        if field not in ASSIGNABLE or (field == "pickup.points.1" and len(self.pickup.points) < 2):
+            raise ValueError(
+                f"{where}: {bounds.brief(field)} is no field that can be turned; try {', '.join(ASSIGNABLE)}"
+            )
+
+    def _replacement(self, field: str, value: float) -> tuple[str, Any]:
+        """The name of the patch's own field that changes, and its new and checked value."""
+        name, *inner = field.split(".")
+        if not inner:  # the level, which is the patch's own
+            bounds.check(name, value, LEVEL_RANGE_DB, "dB")
+            return name, value
+        section: _Value = getattr(self, name)
+        changed: Any = value
+        if len(inner) == 2:
+            entries = list(getattr(section, inner[0]))
+            entries[int(inner[1])] = value
+            changed = tuple(entries)
+        return name, type(section).model_validate({**dict(section), inner[0]: changed})

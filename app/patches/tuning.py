@@ -1,0 +1,125 @@
+"""Which pitch each key has: twelve equal steps, or a Scala scale and keyboard mapping, read by `tuning_library`.
+
+Source: the formats .scl and .kbm of Scala (Manuel Op de Coul), as Surge's tuning library understands them: every key
+is retuned, whichever first and last one a mapping names. It is loaded only where there is a scale or a mapping.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from engine.bounds import brief
+from engine.plain_text import one_line
+
+if TYPE_CHECKING:
+    from app.patches.patch import TuningChoice
+
+A4_KEY = 69
+LARGEST_FILE_BYTES = 2**16
+MOST_NOTES = 1_000  # of a scale
+LARGEST_MAPPED = 20_000.0  # any number of a keyboard mapping: it is counted up to, or tones are made for it
+NOTES = (-128, 255)  # every key with any transposition and bend
+
+
+class Tuning:
+    """The pitch of each key. Equal choices make equal tunings."""
+
+    def __init__(self, choice: TuningChoice) -> None:
+        """Raises ValueError: the scale or the mapping is damaged, or gives no pitch; the message names the field."""
+        self._transpose = choice.transpose
+        self._a4_hz = choice.a4_hz
+        self._table: tuple[np.ndarray, np.ndarray] | None = None  # mapped keys, and log₂ of their pitch in Hz
+        if choice.scale.strip() or choice.keymap.strip():
+            self._table = _table(choice)
+
+    def hz(self, note: float) -> float:
+        """The pitch of a key, or between two keys, in equal parts of the interval between them.
+
+        A key that the mapping leaves out has one too, between those of its neighbours, for a slide to pass; whether
+        a key is to sound is told by `mapped`.
+        """
+        note += self._transpose
+        if self._table is None:
+            return float(self._a4_hz * 2 ** ((note - A4_KEY) / 12))
+        return float(2 ** np.interp(note, *self._table))
+
+    def mapped(self, key: int) -> bool:
+        """Whether the keyboard mapping gives the key a pitch of its own; a key that is left out stays silent."""
+        return self._table is None or bool(np.isin(key + self._transpose, self._table[0]))
+
+
+def read_scala(path: Path) -> str:
+    """The text of a .scl or .kbm file, checked, for a `TuningChoice`.
+
+    Raises:
+        ValueError: it cannot be read, is too long, or can be no tuning; the message names the file, in one line.
+    """
+    from app.patches.patch import TuningChoice, explained
+
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE_BYTES + 1)
+    except OSError as error:
+        raise ValueError(one_line(f"{path}: cannot be read ({error.strerror}); check the name")) from error
+    if len(raw) > LARGEST_FILE_BYTES:
+        raise ValueError(one_line(f"{path}: longer than {LARGEST_FILE_BYTES // 2**10} KiB; give a .scl or .kbm file"))
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")  # as Scala itself writes
+    if not text.strip():
+        raise ValueError(one_line(f"{path}: is empty; give a .scl or .kbm file"))
+    try:
+        TuningChoice.model_validate({"keymap" if path.suffix.lower() == ".kbm" else "scale": text})
+    except ValueError as error:
+        raise ValueError(one_line(f"{path}: {explained(error)}")) from error
+    return text
+
+
+def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
+    import tuning_library
+
+    # what is not ASCII stands in comments and descriptions, which mean nothing
+    scale, keymap = (text.encode("ascii", "replace").decode() for text in (choice.scale, choice.keymap))
+    field = "scale"
+    try:
+        if scale.strip():
+            tones = tuning_library.parse_scl_data(scale)
+            if tones.count > MOST_NOTES:
+                raise ValueError(f"has {tones.count} notes, at most {MOST_NOTES} may be given")
+        else:
+            tones = tuning_library.even_temperament_12_note_scale()
+        if keymap.strip():
+            field = "keymap"
+            _check_numbers(keymap)
+            mapping = tuning_library.parse_kbm_data(keymap)
+        else:
+            mapping = tuning_library.tune_A69_to(choice.a4_hz)
+        tuned = tuning_library.Tuning(tones, mapping)
+    except (RuntimeError, ValueError, OverflowError, MemoryError) as error:
+        remedy = "give the text of a Scala file, or none"
+        raise ValueError(f"{field}: {one_line(str(error), 200).rstrip('.')}; {remedy}") from error
+    mapped = np.array([note for note in range(NOTES[0], NOTES[1] + 1) if tuned.is_midi_note_mapped(note)])
+    pitch_hz = np.array([tuned.frequency_for_midi_note(int(note)) for note in mapped])
+    bad = mapped[~(np.isfinite(pitch_hz) & (pitch_hz > 0))]
+    if not len(mapped) or len(bad):
+        told = f"key {bad[0]}" if len(bad) else "any key"
+        raise ValueError(f"{field}: gives no pitch to {told}; its intervals or its reference pitch are impossible")
+    return mapped, np.log2(pitch_hz)
+
+
+def _check_numbers(keymap: str) -> None:
+    """Raises ValueError where a line of a keyboard mapping would be counted up to for ever."""
+    for line in keymap.splitlines():
+        words = line.split()
+        if not words or words[0].startswith("!") or words[0] == "x":
+            continue
+        try:
+            fits = 0 <= float(words[0]) <= LARGEST_MAPPED
+        except ValueError:
+            fits = False
+        if not fits:
+            raise ValueError(f"{brief(words[0])} is no number of 0 … {LARGEST_MAPPED:g}")

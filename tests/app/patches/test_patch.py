@@ -1,0 +1,113 @@
+"""A patch: what it refuses, and what its numbers mean."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target
+
+STRING = {
+    "length_m": 0.65,
+    "area_m2": 4.5614e-07,
+    "second_moment_m4": 2.963e-14,
+    "density_kg_m3": 1140.0,
+    "youngs_modulus_pa": 5.4e9,
+    "damping_d1_kg_m_s": 0.0010383,
+    "damping_d3_kg_m_s": 6.8103e-06,
+    "tension_n": 53.4,
+}
+
+
+def patch(**changes: Any) -> Patch:
+    facts = {"name": "B", "category": "guitar", "strings": {"kind": "fretted", "string": STRING}, **changes}
+    return Patch.model_validate(facts)
+
+
+@pytest.mark.parametrize(
+    ("field", "changes"),
+    [
+        ("name", {"name": ""}),
+        ("name", {"name": "../other"}),
+        ("name", {"name": "two\nlines"}),
+        ("name", {"name": "x" * 61}),
+        ("preset", {"preset": "/etc/passwd"}),
+        ("version", {"version": 2}),
+        ("category", {"category": "strings"}),
+        ("colour", {"colour": 1}),
+        ("range", {"range": [60, 40]}),
+        ("range", {"range": [0, 128]}),
+        ("bend_semitones", {"bend_semitones": math.nan}),
+        ("bend_semitones", {"bend_semitones": "2"}),
+        ("pluck.softest_mm", {"pluck": {"softest_mm": math.inf}}),
+        ("softest_mm", {"pluck": {"softest_mm": 4, "hardest_mm": 3}}),
+        ("pickup.points", {"pickup": {"points": [0.1, 0.2, 0.3]}}),
+        ("damping.let_ring", {"damping": {"let_ring": 1}}),
+        ("tuning.scale", {"tuning": {"scale": "x" * 65_537}}),
+        ("tuning.scale", {"tuning": {"scale": "a\x1b[2J"}}),
+        ("mod_wheel", {"mod_wheel": "name"}),
+        ("mod_wheel", {"mod_wheel": "pickup.points.1"}),
+        ("macros.0", {"macros": [{"name": "m", "targets": [{"field": "tuning.scale", "low": 0, "high": 1}]}]}),
+        ("knobs.decay", {"macros": [{"name": "m", "targets": [{"field": "knobs.decay", "low": 0, "high": 1}]}]}),
+        ("level_db", {"macros": [{"name": "m", "targets": [{"field": "level_db", "low": 0, "high": 99}]}]}),
+        ("strings.fretted.string.length_m", {"strings": {"kind": "fretted", "string": {**STRING, "length_m": 0}}}),
+        ("strings", {"strings": {"kind": "set", "strings": [{"note": n, "string": STRING} for n in (50, 50)]}}),
+        ("strings", {"strings": {"kind": "bow"}}),
+    ],
+)
+def test_impossible_values_are_refused_by_name(field: str, changes: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match=field):
+        patch(**changes)
+
+
+def test_a_patch_survives_json() -> None:
+    strings = StringSet(strings=tuple(OpenString(note=n, string=patch().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
+    whole = patch(strings=strings, macros=[Macro(name="m", targets=(Target(field="level_db", low=-3, high=3),))])
+    assert Patch.model_validate_json(whole.model_dump_json()) == whole
+
+
+def test_the_engine_takes_its_strings() -> None:
+    strings = patch().strings
+    assert strings.kind == "fretted" and strings.string.parameters.undamped_frequency(1) > 0
+
+
+def test_equal_steps_of_velocity_are_equal_steps_in_db() -> None:
+    choices = PluckChoices(shape="gaussian", softest_mm=0.1, hardest_mm=2, width=0.12, width_hard=0.04)
+    plucks = [choices.pluck(1 + 126 * share) for share in (0, 0.25, 0.5, 0.75, 1)]
+    ratios = [hard.amplitude_mm / soft.amplitude_mm for soft, hard in itertools.pairwise(plucks)]
+    assert ratios == pytest.approx([20**0.25] * 4)
+    assert plucks[0].amplitude_mm == pytest.approx(0.1) and plucks[-1].amplitude_mm == pytest.approx(2)
+    assert plucks[0].width == pytest.approx(0.12) and plucks[-1].width == pytest.approx(0.04)
+    assert choices.pluck(500) == plucks[-1] and choices.pluck(-3) == plucks[0]
+
+
+@pytest.mark.parametrize("curve", [-1, -0.3, 0.4, 1])
+def test_the_curve_keeps_the_ends_and_bends_the_middle(curve: float) -> None:
+    even, bent = PluckChoices(), PluckChoices(curve=curve)
+    for velocity in (1, 127):
+        assert bent.pluck(velocity).amplitude_mm == pytest.approx(even.pluck(velocity).amplitude_mm)
+    assert (bent.pluck(64).amplitude_mm > even.pluck(64).amplitude_mm) == (curve > 0)
+
+
+def test_each_assignable_field_can_be_read_and_changed() -> None:
+    first = patch(pickup=Pickup(points=(0.2, 0.3)), level_db=1)
+    for field in ASSIGNABLE:
+        value = first.value(field)
+        changed = first.with_value(field, value * 0.95)
+        assert changed.value(field) == pytest.approx(value * 0.95)
+        assert changed.with_value(field, value) == first
+        with pytest.raises(ValueError, match=field.split(".")[-2 if field[-1].isdigit() else -1]):
+            first.with_value(field, 1e5)
+
+
+def test_a_macro_writes_its_targets() -> None:
+    targets = (Target(field="knobs.decay", low=0.5, high=2.5), Target(field="pluck.position", low=0.4, high=0.1))
+    first = patch(macros=(Macro(name="age", targets=targets),))
+    turned = first.turned(0, 0.25)
+    assert turned.knobs.decay == pytest.approx(1.0) and turned.pluck.position == pytest.approx(0.325)
+    assert turned.macros[0].value == 0.25
+    assert first.turned(0, 7).knobs.decay == pytest.approx(2.5)

@@ -1,0 +1,146 @@
+"""Pitches against closed forms, and scales that can be none."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from app.patches.patch import TuningChoice
+from app.patches.tuning import Tuning, read_scala
+
+C4_HZ = 440 * 2 ** (-9 / 12)
+JUST = [Fraction(a, b) for a, b in ((9, 8), (5, 4), (4, 3), (3, 2), (5, 3), (15, 8), (2, 1))]
+
+
+def scale(*tones: object, name: str = "a scale") -> str:
+    return "\n".join(["! made.scl", "!", name, f" {len(tones)}", "!", *(f" {tone}" for tone in tones)]) + "\n"
+
+
+def keymap(*keys: object, middle: int = 60, reference: int = 69, hz: float = 440, octave: int = 0) -> str:
+    return "\n".join(str(line) for line in (len(keys), 0, 127, middle, reference, hz, octave, *keys)) + "\n"
+
+
+@pytest.mark.parametrize("a4_hz", [415.0, 440.0, 443.5])
+@pytest.mark.parametrize("note", [-5.0, 0.0, 21.0, 60.0, 69.0, 69.31, 108.0, 140.5])
+def test_twelve_equal_steps(a4_hz: float, note: float) -> None:
+    assert Tuning(TuningChoice(a4_hz=a4_hz)).hz(note) == pytest.approx(a4_hz * 2 ** ((note - 69) / 12), rel=1e-12)
+
+
+def test_twelve_equal_steps_as_a_scale_are_the_same() -> None:
+    told = Tuning(TuningChoice(scale=scale(*(f"{100 * n}." for n in range(1, 13))), a4_hz=432))
+    for note in (0, 33.25, 60, 69, 127):
+        assert told.hz(note) == pytest.approx(432 * 2 ** ((note - 69) / 12), rel=1e-9)
+
+
+def test_transposition_moves_all_keys() -> None:
+    assert Tuning(TuningChoice(transpose=-12)).hz(69) == pytest.approx(220)
+    just = TuningChoice(scale=scale(*JUST))
+    moved = just.model_copy(update={"transpose": 3})
+    assert Tuning(moved).hz(60) == pytest.approx(Tuning(just).hz(63), rel=1e-12)
+
+
+def test_a_just_scale_begins_at_c4_and_key_69_is_a4() -> None:
+    tuned = Tuning(TuningChoice(scale=scale(*JUST), a4_hz=440))
+    steps = [Fraction(1), *JUST[:-1]]
+    first_hz = 440 / (float(steps[9 % 7]) * 2)  # key 69 is degree 2 of the next octave of seven
+    for key in range(39, 90):
+        octave, degree = divmod(key - 60, 7)
+        assert tuned.hz(key) == pytest.approx(first_hz * float(steps[degree]) * 2.0**octave, rel=1e-9)
+    assert tuned.hz(69) == pytest.approx(440, rel=1e-9)
+
+
+def test_nineteen_equal_steps() -> None:
+    tuned = Tuning(TuningChoice(scale=scale(*(f"{1200 / 19 * n:.6f}" for n in range(1, 19)), "2/1")))
+    for key in range(20, 120):
+        assert tuned.hz(key) == pytest.approx(440 * 2 ** ((key - 69) / 19), rel=1e-6)
+
+
+def test_between_two_keys_the_interval_is_divided_evenly() -> None:
+    tuned = Tuning(TuningChoice(scale=scale(*JUST)))
+    assert tuned.hz(60.25) == pytest.approx(tuned.hz(60) * (9 / 8) ** 0.25, rel=1e-9)
+
+
+def test_keys_that_a_mapping_leaves_out_are_told_and_lie_between() -> None:
+    """White keys play the seven notes; black keys are silent."""
+    white = keymap(0, "x", 1, "x", 2, 3, "x", 4, "x", 5, "x", 6, octave=7)
+    tuned = Tuning(TuningChoice(scale=scale(*JUST), keymap=white))
+    mapped = [key for key in range(60, 73) if tuned.mapped(key)]
+    assert mapped == [60, 62, 64, 65, 67, 69, 71, 72]
+    first_hz = 440 / (5 / 3)
+    for key, ratio in zip(mapped, [Fraction(1), *JUST], strict=True):
+        assert tuned.hz(key) == pytest.approx(first_hz * float(ratio), rel=1e-9)
+    assert tuned.hz(61) == pytest.approx((tuned.hz(60) * tuned.hz(62)) ** 0.5, rel=1e-9)
+    moved = Tuning(TuningChoice(scale=scale(*JUST), keymap=white, transpose=1))
+    assert not moved.mapped(60) and moved.mapped(61)
+
+
+def test_a_mapping_has_a_reference_of_its_own() -> None:
+    tuned = Tuning(TuningChoice(keymap=keymap(reference=60, hz=256), a4_hz=440))
+    assert tuned.hz(60) == pytest.approx(256) and tuned.hz(72) == pytest.approx(512)
+
+
+@pytest.mark.parametrize(
+    ("field", "choice"),
+    [
+        ("scale", {"scale": "nothing"}),
+        ("scale", {"scale": scale("3/2", "0/1")}),
+        ("scale", {"scale": "! \n\nname\n 5\n 3/2\n"}),
+        ("scale", {"scale": scale("-3/2", "2/1")}),
+        ("scale", {"scale": scale("1e400.0", "2/1")}),
+        ("scale", {"scale": scale("100.", "90000000.")}),
+        ("scale", {"scale": scale(*(f"{n}." for n in range(1, 1_100)))}),
+        ("keymap", {"keymap": "12\n"}),
+        ("keymap", {"keymap": keymap(hz=0)}),
+        ("keymap", {"keymap": keymap(hz=-440)}),
+        ("keymap", {"keymap": keymap(0, "x")}),
+        ("keymap", {"keymap": keymap(0, 2_000_000_000)}),
+        ("keymap", {"keymap": keymap(0, middle=2_000_000_000)}),
+        ("keymap", {"keymap": keymap(0, reference=2_000_000_000)}),
+        ("keymap", {"keymap": keymap("nan")}),
+        ("keymap", {"keymap": keymap(0, 1, "α")}),
+    ],
+)
+def test_what_gives_no_pitch_is_refused(field: str, choice: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match=field):
+        TuningChoice.model_validate(choice)
+
+
+def test_files_are_read_as_scala_writes_them(tmp_path: Path) -> None:
+    path = tmp_path / "old.scl"
+    path.write_bytes(scale("3/2", "2/1", name="pélog").replace("\n", "\r\n").encode("latin-1"))
+    assert Tuning(TuningChoice(scale=read_scala(path))).hz(69) == pytest.approx(440)
+    mapping = tmp_path / "white.KBM"
+    mapping.write_text(keymap(hz=430))
+    assert Tuning(TuningChoice(keymap=read_scala(mapping))).hz(69) == pytest.approx(430)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("absent.scl", None),
+        ("long.scl", b"!\n" * 40_000),
+        ("empty.scl", b" \n"),
+        ("bytes.kbm", bytes(range(256))),
+        ("short.kbm", b"12\n0\n"),
+    ],
+)
+def test_a_file_that_is_no_tuning_is_told_in_one_line(tmp_path: Path, name: str, content: bytes | None) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ValueError) as caught:
+        read_scala(path)
+    assert name in str(caught.value) and str(caught.value).isprintable() and len(str(caught.value)) <= 500
+
+
+def test_the_library_is_loaded_where_a_scale_is_given() -> None:
+    code = (
+        "import sys; from app.patches.patch import TuningChoice; TuningChoice();"
+        "from app.patches.tuning import Tuning; Tuning(TuningChoice(a4_hz=430)).hz(60);"
+        "assert 'tuning_library' not in sys.modules and 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
