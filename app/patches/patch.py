@@ -289,6 +289,7 @@ class Patch(_Value):
         preset: the model that plays it, by the name of a preset of many strings; never a path.
         range: the lowest and the highest key that sound.
         mode: all keys on as many strings as needed; a MIDI channel a string, each of them monophonic; or MPE.
+        bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
         mod_wheel: one of ASSIGNABLE, or "none".
         level_db: of everything that is heard of it.
         macros: the fields hold as they are written; turning a macro writes its targets (`turned`).
@@ -308,6 +309,7 @@ class Patch(_Value):
     damping: Damping = Damping()
     mode: Mode = "poly"
     bend_semitones: Annotated[float, _number(0, 48)] = 2.0
+    bend_by: Literal["tension", "length"] = "tension"
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
     body: Body = Body()

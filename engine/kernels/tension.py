@@ -244,6 +244,8 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
         voice[at.LARGEST_ENERGY] *= raised
     else:
         q[:], v[:] = row(voice, n, 0), row(voice, n, 1)
+        if gliding(voice):
+            glide(voice)
     prepare(voice, program)
     for m in range(counts[at.MOVING], n):
         q[m] = v[m] = 0.0

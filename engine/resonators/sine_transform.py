@@ -8,6 +8,7 @@ factor in front of sin(μπx/ℓ), in metres; the paper's ȳ is this times ‖K�
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import torch
 from torch import Tensor
@@ -27,6 +28,11 @@ def grid_positions(grid_points: int) -> Tensor:
 def synthesis_matrix(grid_points: int, modes: int) -> Tensor:
     """float64 (modes, grid_points): amplitudes @ synthesis = displacement, with exact zeros at the ends."""
     _check(grid_points, modes)
+    return _sines(grid_points, modes).clone()
+
+
+@lru_cache(maxsize=128)  # strings of many pitches have many numbers of modes, on one grid
+def _sines(grid_points: int, modes: int) -> Tensor:
     shapes = mode_shapes(grid_positions(grid_points), modes)
     shapes[:, 0] = shapes[:, -1] = 0
     return shapes

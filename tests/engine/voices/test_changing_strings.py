@@ -87,11 +87,20 @@ BEND: Changes = [(40 + 2 * step, bent(step / 20), 0.002) for step in range(1, 41
         ([], 1e-9),
         (BEND, 1e-9),
         ([(50, bent(2), 0.005)], 1e-9),
+        ([(0, bent(2), 0.0)], 1e-9),
         ([(60, damped(0.1), 0.01), (160, bent(0), 0.01)], 1e-9),
         ([(70, Pluck(0.2, 3.0, "raised_cosine", 0.2), 0.0)], 1e-6),
         ([(50, bent(1), 0.0), (70, Pluck(0.6, 4.0, "raised_cosine", 0.15), 0.0), (90, bent(-1), 0.02)], 1e-6),
     ],
-    ids=["unchanged", "a slow bend", "a jump", "damped and free again", "plucked again", "all"],
+    ids=[
+        "unchanged",
+        "a slow bend",
+        "a jump",
+        "bent before it is struck",
+        "damped and free again",
+        "plucked again",
+        "all",
+    ],
 )
 def test_the_model_follows_the_truth_through_every_change(changes: Changes, allowed: float) -> None:
     """Relative MSE of 0.4 s with a tension rise of 2 %."""

@@ -1,0 +1,53 @@
+"""What a player does. Values, without any device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
+PEDAL_DOWN = 64  # from this value on
+
+
+@dataclass(frozen=True)
+class NoteOn:
+    """A key goes down; velocity 1 … 127."""
+
+    key: int
+    velocity: int
+    channel: int = 0
+
+
+@dataclass(frozen=True)
+class NoteOff:
+    """A key is let go."""
+
+    key: int
+    channel: int = 0
+
+
+@dataclass(frozen=True)
+class Bend:
+    """The pitch wheel, -1 … 1 of the patch's range."""
+
+    value: float
+    channel: int = 0
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A controller moves to 0 … 127."""
+
+    number: int
+    value: int
+    channel: int = 0
+
+
+Event = NoteOn | NoteOff | Bend | Controller
+
+
+@dataclass(frozen=True)
+class TimedEvent:
+    """An event and when it is, in s from the beginning."""
+
+    time_s: float
+    event: Event

@@ -1,0 +1,57 @@
+"""How loud a key is, in closed form, and the gain that makes all keys of a patch equally loud.
+
+Measured as loudness meters do: mean square after the K-weighting of ITU-R BS.1770-5, here over the first part of the
+note. The quiet string's partials decay each by itself, so that the mean square is a sum over them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
+from engine.resonators.base import Resonator
+from engine.voices import Ear
+
+PART_S = 0.4  # of the note: a loudness meter's block
+WANTED_DB = -30.0  # of a note at REFERENCE_VELOCITY: ten hard ones struck at once stay below full scale
+REFERENCE_VELOCITY = 100
+GAIN_RANGE_DB = (-36.0, 36.0)
+# BS.1770: the shelf and the high-pass as analogue filters of second order
+_SHELF_HZ, _SHELF_DB, _SHELF_Q = 1681.97, 4.0, 0.7072
+_PASS_HZ, _PASS_Q = 38.135, 0.5003
+
+
+def k_weight(frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The square of K-weighting's gain."""
+    s = 1j * frequencies_hz
+    gain = 10 ** (_SHELF_DB / 20)
+    middle = 10 ** (_SHELF_DB / 40)
+    shelf = (gain * s**2 + middle / _SHELF_Q * _SHELF_HZ * s + _SHELF_HZ**2) / (
+        s**2 + _SHELF_HZ / _SHELF_Q * s + _SHELF_HZ**2
+    )
+    high_pass = s**2 / (s**2 + _PASS_HZ / _PASS_Q * s + _PASS_HZ**2)
+    return np.abs(shelf * high_pass) ** 2
+
+
+def level_db(resonator: Resonator, pluck: Pluck, ear: Ear) -> float:
+    """Of a quiet pluck's first 0.4 s, K-weighted, in dB of full scale; -inf for silence."""
+    q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
+    weights = (resonator.shapes @ ear.weights(resonator.points)).numpy() / FULL_SCALE_M  # (modes, points)
+    sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()
+    if ear.pickup == "velocity":
+        weights = weights * omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
+    falls = 2 * sigma * PART_S
+    mean = np.where(falls > 1e-6, -np.expm1(-falls) / np.maximum(falls, 1e-6), 1.0)
+    squares = 0.5 * (weights * q[:, None]) ** 2 * (mean * k_weight(omega / (2 * np.pi)))[:, None]
+    total = float(squares.sum(0).mean())
+    return 10 * float(np.log10(total)) if total > 0 else -float("inf")
+
+
+def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, level_db_: float = 0.0) -> float:
+    """The factor that brings a pluck at the reference velocity to the wanted level, `level_db_` above it."""
+    with torch.inference_mode():
+        found = level_db(resonator, pluck, ear)
+    low, high = GAIN_RANGE_DB
+    return float(10 ** ((min(max(WANTED_DB - found, low), high) + level_db_) / 20))

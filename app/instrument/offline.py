@@ -1,0 +1,129 @@
+"""Events to samples, faster than they sound: the same player, voices and limiter as are heard, without a device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.player import Player, Struck
+from app.patches.patch import Patch
+from engine.kernels.layout import AHEAD
+from engine.presets import Preset
+from engine.voices import Mixer
+
+BLOCK_FRAMES = 4_096
+LONGEST_TAIL_S = 60.0
+SILENT_DB = -90.0  # of full scale: beyond the last event it ends where a block's peak is below
+MOST_RINGING = 96  # the oldest of more make room
+STOLEN_S = 0.03
+
+
+class _Stage:
+    """A player before a mixer that nobody listens to."""
+
+    def __init__(self, patch: Patch, preset: Preset, rate_hz: int, source: str, limited: bool) -> None:
+        self.mixer = Mixer(rate_hz, limited=limited)
+        self._source = source
+        self._struck: list[Struck] = []
+        self.player = Player(patch, preset, rate_hz, self._take, (source,))
+
+    def _take(self, struck: Struck) -> None:
+        self._struck = [each for each in self._struck if not each.over]
+        for each in self._struck[: max(0, len(self._struck) + 1 - MOST_RINGING)]:
+            each.voices[self._source].release(STOLEN_S)
+        voice = struck.voices[self._source]
+        voice.start_with_gain(struck.gain)
+        self._struck.append(struck)
+        self.mixer.add(voice)
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing rings any more."""
+        self.mixer.forget_ended()
+        return not self.mixer.voices
+
+
+def render_events(
+    patch: Patch,
+    preset: Preset,
+    timed: Sequence[TimedEvent],
+    rate_hz: int,
+    source: str = "model",
+    seconds: float | None = None,
+    limited: bool = True,
+    advanced: Callable[[float], None] = lambda seconds: None,
+) -> Iterator[NDArray[np.float32]]:
+    """What a patch gives for events, in blocks (frames, channels), ±1 being full scale; the same for ever.
+
+    An event counts from the next quantum of 64 frames on.
+
+    Args:
+        seconds: how long it is; None until all has died away, a minute after the last event at most.
+        limited: through the limiter, as it is heard; without it, samples may pass full scale.
+        advanced: is told how much sound there is, in s; may raise, to end it.
+
+    Raises:
+        ValueError: a key has no possible string, or `source` is none.
+    """
+    if source not in ("model", "truth"):
+        raise ValueError(f"source must be model or truth, not {source!r}")
+    stage = _Stage(patch, preset, rate_hz, source, limited)
+    channels = len(patch.pickup.points)
+    skipped = AHEAD if limited else 0  # what the limiter holds back at the beginning
+    done, events = 0, sorted(timed, key=lambda each: each.time_s)
+
+    def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
+        nonlocal done, skipped
+        while done < frame:
+            block = stage.mixer.render(min(BLOCK_FRAMES, frame - done))
+            done += len(block)
+            cut, skipped = block[skipped:, :channels], max(0, skipped - len(block))
+            if len(cut):
+                yield cut
+            advanced(done / rate_hz)
+
+    for each in events:
+        if seconds is not None and each.time_s >= seconds:
+            break
+        yield from blocks_until(round(each.time_s * rate_hz))
+        stage.player.handle(each.event)
+    if seconds is not None:
+        yield from blocks_until(round(seconds * rate_hz) + (AHEAD if limited else 0))
+        return
+    last = done + round(LONGEST_TAIL_S * rate_hz)
+    quiet = 10 ** (SILENT_DB / 20)
+    while done < last and not stage.silent:
+        for block in blocks_until(min(last, done + BLOCK_FRAMES)):
+            yield block
+            if float(np.abs(block).max(initial=0.0)) < quiet:
+                return
+
+
+def render_note(
+    patch: Patch,
+    preset: Preset,
+    key: int,
+    velocity: int,
+    held_s: float,
+    seconds: float,
+    rate_hz: int,
+    source: str = "model",
+) -> NDArray[np.float32]:
+    """One key that is held for so long, (frames, channels), without a limiter.
+
+    Raises:
+        ValueError: the key has no string, or an impossible one.
+    """
+    events: list[tuple[float, Event]] = [(0.0, NoteOn(key, velocity))]
+    if held_s < seconds:
+        events.append((held_s, NoteOff(key)))
+    timed = [TimedEvent(time_s, event) for time_s, event in events]
+    blocks = list(render_events(patch, preset, timed, rate_hz, source, seconds, limited=False))
+    sound = np.concatenate(blocks)
+    if not math.isfinite(float(np.abs(sound).max())):
+        raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")
+    return sound

@@ -1,0 +1,395 @@
+"""A patch under a player's hands: events become voices, and change those that ring.
+
+What rings is known by its place: a key, or in guitar mode a channel, whose string is one. A place that is struck
+again goes on with the motion that it has; a key that is let go damps its string, unless the pedal or the patch lets
+it ring. Everything that hands do to a string changes the modes of its voices, of the model's and of the truth's alike.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+from app.instrument import events
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
+from app.instrument.loudness import REFERENCE_VELOCITY, gain_of
+from app.instrument.strings import KeyString, Strings, bent, damped, slid
+from app.patches.patch import Patch
+from engine.models.koopman_tension import KoopmanTension
+from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
+from engine.presets import Preset
+from engine.resonators.base import Resonator
+from engine.resonators.string import StringParameters
+from engine.voices import Ear, Program, Voice
+from engine.voices.programs import solver_program, tension_program
+
+SOURCES = ("model", "truth")
+MPE_BEND_SEMITONES = 48.0  # of a member channel
+MPE_MASTER = 0
+MPE_POSITIONS = (0.05, 0.5)  # of the pluck, from the lowest to the highest slide before the key
+DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the way to other modes
+STOP_S = 0.03
+KEPT_KEYS = 256
+# What a wheel all the way up makes of a field: a factor of its own value, or a value
+WHEEL_FACTORS = {"knobs": 4.0, "damping.release_t60_s": 10.0, "room.t60_s": 3.0, "body.size": 2.0}
+WHEEL_VALUES = {"pluck.position": 0.5, "pluck.curve": 1.0, "body.mix": 1.0, "room.mix": 1.0, "level_db": 6.0}
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key sounds with: remembered, so that a strike costs no physics.
+
+    Attributes:
+        gain: that makes it as loud as the others.
+        programs: by source.
+    """
+
+    string: KeyString
+    resonator: Resonator
+    gain: float
+    programs: dict[str, Program]
+
+
+@dataclass(eq=False)
+class Struck:
+    """A string that was struck, as a player left it.
+
+    Attributes:
+        place: which string of the instrument it is.
+        parameters: of the string, with what hands do to it.
+        continues: the one whose motion it goes on with.
+        held: whether the key is down.
+        kept: it was let go while the pedal was down.
+    """
+
+    place: int
+    event: NoteOn
+    key: Key
+    pluck: Pluck
+    ear: Ear
+    gain: float
+    voices: dict[str, Voice]
+    parameters: StringParameters
+    continues: Struck | None = None
+    held: bool = True
+    kept: bool = False
+    damped: bool = False
+
+    @property
+    def over(self) -> bool:
+        return all(voice.over for voice in self.voices.values())
+
+    def retune(self, parameters: StringParameters, seconds: float) -> None:
+        self.parameters = parameters
+        own = self.key.resonator
+        modes = own.modes
+        resonator = replace(
+            own,
+            omega=parameters.undamped_frequencies(modes),
+            sigma=parameters.decay_rates(modes),
+            coupling=parameters.tension_coupling(modes) if own.tension_modulated else own.coupling,
+            stretch=parameters.wavenumbers(modes).square(),
+        )
+        for voice in self.voices.values():
+            voice.retune(resonator, seconds)
+
+
+@dataclass
+class _Channel:
+    bend: float = 0.0  # -1 … 1
+    pedal: bool = False
+    slide: int | None = None
+
+
+@dataclass
+class _Hands:
+    channels: dict[int, _Channel] = field(default_factory=dict)
+    wheel: int = 0
+
+    def of(self, channel: int) -> _Channel:
+        return self.channels.setdefault(channel, _Channel())
+
+
+class Player:
+    """Plays one patch. Every public method may be called from any thread.
+
+    Args:
+        preset: of many strings, which plays the patch.
+        deliver: is given what was struck, with voices that are not handed over yet; called in the event's thread.
+        sources: of which there are voices.
+
+    Raises:
+        ValueError: the preset learned one string only, or the tuning is impossible.
+    """
+
+    def __init__(
+        self,
+        patch: Patch,
+        preset: Preset,
+        rate_hz: int,
+        deliver: Callable[[Struck], None],
+        sources: Sequence[str] = SOURCES,
+    ) -> None:
+        if not isinstance(preset.model, KoopmanTension):
+            raise ValueError(
+                f"{preset.path}: it knows one string only; choose a preset of many, as studio_any_string"
+            )
+        self._model: KoopmanTension = preset.model
+        self._preset, self._rate_hz, self._deliver = preset, rate_hz, deliver
+        self._sources = tuple(sources)
+        self._lock = threading.RLock()
+        self._hands = _Hands()
+        self._ringing: dict[int, Struck] = {}
+        self._all: list[Struck] = []  # those that were struck again among them, until they are over
+        self._take(patch)
+
+    # What is played
+
+    @property
+    def patch(self) -> Patch:
+        return self._patch
+
+    @property
+    def preset(self) -> Preset:
+        return self._preset
+
+    def set_patch(self, patch: Patch) -> None:
+        """Another patch, or the same with a knob turned: strings that ring take what is new without a gap.
+
+        Raises:
+            ValueError: the tuning is impossible; nothing has changed then.
+        """
+        with self._lock:
+            self._take(patch)
+            for struck in self._sounding():
+                self._retune(struck, KNOB_S)
+
+    def set_rate(self, rate_hz: int) -> None:
+        """Another rate of the device: what was struck before ends there."""
+        with self._lock:
+            if rate_hz != self._rate_hz:
+                self._rate_hz = rate_hz
+                self._ringing.clear()
+                self._all.clear()
+                self._take(self._patch)
+
+    def prepare(self, keys: Sequence[int] | None = None) -> None:
+        """Computes what keys sound with, so that a strike need not."""
+        low, high = self._patch.range
+        for key in keys if keys is not None else range(low, high + 1):
+            try:
+                self._key(key)
+            except ValueError:
+                continue  # told when it is struck
+
+    # What players do
+
+    def handle(self, event: Event) -> Struck | None:
+        """Does what an event says, and gives what was struck.
+
+        Raises:
+            ValueError: a key has no possible string.
+        """
+        with self._lock:
+            if isinstance(event, NoteOn):
+                return self._note_on(event)
+            if isinstance(event, NoteOff):
+                self._note_off(event)
+            elif isinstance(event, Bend):
+                self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
+                for struck in self._sounding():
+                    if self._bends(struck, event.channel):
+                        self._retune(struck, BEND_S)
+            else:
+                self._controller(event)
+        return None
+
+    def stop(self, seconds: float = STOP_S) -> None:
+        """All strings fade out."""
+        with self._lock:
+            for struck in self._all:
+                for voice in struck.voices.values():
+                    voice.release(seconds)
+            self._ringing.clear()
+            self._all.clear()
+
+    def sounding(self) -> list[Struck]:
+        """What rings now, one for each place."""
+        with self._lock:
+            return list(self._sounding())
+
+    # How it is done
+
+    def _take(self, patch: Patch) -> None:
+        strings = Strings(patch)
+        ear = Ear(tuple(patch.pickup.points), patch.pickup.kind)
+        rate_hz, model = self._rate_hz, self._model
+
+        @lru_cache(maxsize=KEPT_KEYS)
+        def key_of(key: int) -> Key | None:
+            string = strings.of_key(key)
+            if string is None:
+                return None
+            modes = min(string.modes, model.configuration.grid_points - 2)
+            resonator = string.parameters.resonator(modes, grid_points=model.configuration.grid_points)
+            pluck = _on(string, patch.pluck.pluck(REFERENCE_VELOCITY))
+            gain = gain_of(resonator, pluck, ear, patch.level_db)
+            programs: dict[str, Program] = {}
+            for source in self._sources:
+                programs[source] = (
+                    solver_program(resonator, rate_hz)
+                    if source == "truth"
+                    else tension_program(model, resonator, rate_hz)
+                )
+            return Key(string, resonator, gain, programs)
+
+        self._patch, self._ear, self._key = patch, ear, key_of
+
+    def _sounding(self) -> list[Struck]:
+        self._all = [struck for struck in self._all if not struck.over]
+        self._ringing = {place: struck for place, struck in self._ringing.items() if not struck.over}
+        return list(self._ringing.values())
+
+    def _note_on(self, event: NoteOn) -> Struck | None:
+        if event.velocity <= 0:
+            self._note_off(NoteOff(event.key, event.channel))
+            return None
+        key = self._key(event.key)
+        if key is None:
+            return None
+        place = self._place(event)
+        pluck = _on(key.string, self._pluck(event))
+        voices = {
+            source: Voice(program, pluck.displacement(program.grid_points), self._ear)
+            for source, program in key.programs.items()
+        }
+        before = self._ringing.get(place)
+        if before is not None and before.over:
+            before = None
+        if before is not None:
+            for source, voice in voices.items():
+                if not before.voices[source].over:
+                    voice.continues(before.voices[source])
+        struck = Struck(place, event, key, pluck, self._ear, key.gain, voices, key.string.parameters, before)
+        parameters = self._with_hands(struck)
+        if parameters != key.string.parameters:
+            struck.retune(parameters, 0.0)
+        self._sounding()
+        self._ringing[place] = struck
+        self._all.append(struck)
+        self._deliver(struck)
+        return struck
+
+    def _note_off(self, event: NoteOff) -> None:
+        for struck in self._sounding():
+            if struck.held and (struck.event.key, struck.event.channel) == (event.key, event.channel):
+                struck.held = False
+                struck.kept = self._pedal(event.channel)
+                self._damp(struck)
+
+    def _damp(self, struck: Struck) -> None:
+        """Where nothing holds it."""
+        if struck.held or struck.kept or struck.damped or self._patch.damping.let_ring:
+            return
+        struck.damped = True
+        self._retune(struck, DAMPER_S)
+
+    def _controller(self, event: Controller) -> None:
+        channel = self._hands.of(event.channel)
+        if event.number == events.SUSTAIN:
+            channel.pedal = event.value >= events.PEDAL_DOWN
+            if not channel.pedal:
+                for struck in self._sounding():
+                    if struck.kept and not self._pedal(struck.event.channel):
+                        struck.kept = False
+                        self._damp(struck)
+        elif event.number == events.SLIDE:
+            channel.slide = event.value
+        elif event.number == events.MOD_WHEEL:
+            self._hands.wheel = event.value
+            if self._patch.mod_wheel.startswith("knobs."):
+                for struck in self._sounding():
+                    self._retune(struck, KNOB_S)
+        elif event.number == events.SOUND_OFF:
+            self.stop()
+        elif event.number == events.NOTES_OFF:
+            for struck in self._sounding():
+                struck.held = struck.kept = False
+                self._damp(struck)
+        elif event.number == events.RESET:
+            self._hands = _Hands()
+            for struck in self._sounding():
+                self._retune(struck, KNOB_S)
+
+    def _place(self, event: NoteOn) -> int:
+        if self._patch.mode == "guitar":
+            return event.channel
+        return event.key if self._patch.mode == "poly" else 128 * event.channel + event.key
+
+    def _pedal(self, channel: int) -> bool:
+        shared = self._patch.mode == "mpe" and self._hands.of(MPE_MASTER).pedal
+        return shared or self._hands.of(channel).pedal
+
+    def _bends(self, struck: Struck, channel: int) -> bool:
+        return struck.event.channel == channel or (self._patch.mode == "mpe" and channel == MPE_MASTER)
+
+    def _ratio(self, struck: Struck) -> float:
+        """By which the pitch wheels raise it."""
+        own = self._hands.of(struck.event.channel).bend
+        if self._patch.mode != "mpe" or struck.event.channel == MPE_MASTER:
+            return float(2 ** (own * self._patch.bend_semitones / 12))
+        shared = self._hands.of(MPE_MASTER).bend
+        return float(2 ** ((own * MPE_BEND_SEMITONES + shared * self._patch.bend_semitones) / 12))
+
+    def _pluck(self, event: NoteOn) -> Pluck:
+        pluck = self._wheeled("pluck").pluck.pluck(event.velocity)
+        slide = self._hands.of(event.channel).slide
+        if self._patch.mode == "mpe" and slide is not None:
+            low, high = MPE_POSITIONS
+            return replace(pluck, position=low + (high - low) * min(max(slide, 0), 127) / 127)
+        return pluck
+
+    def _wheeled(self, part: str) -> Patch:
+        """The patch as the mod wheel turns it, where it turns anything of this part."""
+        name, share = self._patch.mod_wheel, self._hands.wheel / 127
+        if share == 0 or not name.startswith(part):
+            return self._patch
+        value = self._patch.value(name)
+        factor = WHEEL_FACTORS.get(name, WHEEL_FACTORS.get(name.split(".")[0], 0.0))
+        goal = WHEEL_VALUES.get(name, value * factor if factor else value)
+        for turned in (value + share * (goal - value), value):
+            try:
+                return self._patch.with_value(name, turned)
+            except ValueError:  # beyond its bounds
+                continue
+        return self._patch
+
+    def _with_hands(self, struck: Struck) -> StringParameters:
+        """The string of its key, with knobs, wheels and dampers as they are."""
+        patch = self._wheeled("knobs")
+        string = struck.key.string.parameters
+        now = self._key(struck.event.key) if patch is self._patch else None
+        if now is not None:
+            string = now.string.parameters
+        elif (wheeled := Strings(patch).of_key(struck.event.key)) is not None:
+            string = wheeled.parameters
+        ratio = self._ratio(struck)
+        try:
+            string = (slid if self._patch.bend_by == "length" else bent)(string, ratio)
+            if struck.damped:
+                string = damped(string, self._wheeled("damping").damping.release_t60_s)
+        except ValueError:  # no such string: it stays as it is
+            return struck.parameters
+        return string
+
+    def _retune(self, struck: Struck, seconds: float) -> None:
+        parameters = self._with_hands(struck)
+        if parameters != struck.parameters:
+            struck.retune(parameters, seconds)
+
+
+def _on(string: KeyString, pluck: Pluck) -> Pluck:
+    """A pluck of the whole string, on the string that a key leaves of it."""
+    return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))

@@ -1,0 +1,199 @@
+"""What is heard of a player's hands: everything is measured on rendered sound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.instrument.events import MOD_WHEEL, SOUND_OFF, SUSTAIN, Bend, Controller, Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.loudness import k_weight
+from app.instrument.offline import render_events, render_note
+from app.instrument.player import Player, Struck
+from app.patches.patch import Damping, Knobs, Patch, Pickup
+from engine.presets import Preset, load_preset
+from engine.presets.finding import SHIPPED
+from engine.voices import Mixer
+
+RATE_HZ = 48_000
+
+
+def changed(patch: Patch, **parts: object) -> Patch:
+    return Patch.model_validate({**dict(patch), **parts})
+
+
+def play(
+    patch: Patch, preset: Preset, seconds: float, *events: tuple[float, Event], source: str = "model"
+) -> NDArray[np.float64]:
+    timed = [TimedEvent(time_s, event) for time_s, event in events]
+    blocks = list(render_events(patch, preset, timed, RATE_HZ, source, seconds, limited=False))
+    return np.concatenate(blocks)[:, 0].astype(np.float64)
+
+
+def level_db(sound: NDArray[np.float64], begin_s: float, end_s: float) -> float:
+    part = sound[round(begin_s * RATE_HZ) : round(end_s * RATE_HZ)]
+    return float(20 * np.log10(max(np.sqrt(np.mean(part**2)), 1e-12)))
+
+
+def pitch_hz(sound: NDArray[np.float64], near_hz: float, begin_s: float = 0.1, end_s: float = 1.0) -> float:
+    """Of the partial near a frequency, by the phase of two windows."""
+    part = sound[round(begin_s * RATE_HZ) : round(end_s * RATE_HZ)]
+    padded = 2**20
+    spectrum = np.abs(np.fft.rfft(part * np.hanning(len(part)), padded))
+    low, high = (int(near_hz * factor * padded / RATE_HZ) for factor in (0.97, 1.03))
+    peak = low + int(spectrum[low:high].argmax())
+    left, middle, right = np.log(spectrum[peak - 1 : peak + 2])
+    return float((peak + 0.5 * (left - right) / (left - 2 * middle + right)) * RATE_HZ / padded)
+
+
+def cents(one_hz: float, other_hz: float) -> float:
+    return float(1200 * np.log2(one_hz / other_hz))
+
+
+@pytest.mark.parametrize("key", [28, 40, 57, 69, 81, 88])
+@pytest.mark.parametrize("source", ["model", "truth"])
+def test_quiet_keys_are_in_tune_to_half_a_cent(patch: Patch, preset: Preset, key: int, source: str) -> None:
+    wanted_hz = 440 * 2 ** ((key - 69) / 12)
+    sound = render_note(patch, preset, key, 8, 2.0, 1.2, RATE_HZ, source)[:, 0].astype(np.float64)
+    assert abs(cents(pitch_hz(sound, wanted_hz), wanted_hz)) < 0.5
+
+
+def test_keys_are_equally_loud_within_three_decibels(patch: Patch, preset: Preset) -> None:
+    levels = []
+    for key in range(28, 89, 6):
+        sound = render_note(patch, preset, key, 100, 2.0, 0.4, RATE_HZ)[:, 0].astype(np.float64)
+        spectrum = np.abs(np.fft.rfft(sound)) ** 2
+        weighted = (spectrum * k_weight(np.fft.rfftfreq(len(sound), 1 / RATE_HZ))).sum()
+        levels.append(10 * np.log10(2 * weighted / len(sound) ** 2))
+    assert max(levels) - min(levels) < 3
+    assert -33 < float(np.mean(levels)) < -27
+
+
+def test_a_chord_of_ten_hard_keys_stays_below_full_scale(patch: Patch, preset: Preset) -> None:
+    chord = [(0.0, NoteOn(key, 120)) for key in (33, 40, 45, 49, 52, 57, 61, 64, 69, 73)]
+    assert np.abs(play(patch, preset, 1.0, *chord)).max() < 1
+
+
+def test_velocity_is_level_and_timbre(patch: Patch, preset: Preset) -> None:
+    soft, hard = (play(patch, preset, 0.5, (0.0, NoteOn(45, velocity))) for velocity in (20, 127))
+    assert level_db(hard, 0, 0.5) - level_db(soft, 0, 0.5) > 12
+    shapes = [np.abs(np.fft.rfft(sound)) / np.linalg.norm(sound) for sound in (soft, hard)]
+    assert np.linalg.norm(shapes[0] - shapes[1]) / np.linalg.norm(shapes[0]) > 0.3
+
+
+def test_letting_go_damps_and_the_pedal_holds(patch: Patch, preset: Preset) -> None:
+    on, off = (0.0, NoteOn(57, 90)), (0.3, NoteOff(57))
+    held = play(patch, preset, 1.2, on)
+    damped = play(patch, preset, 1.2, on, off)
+    pedal = play(patch, preset, 1.2, (0.0, Controller(SUSTAIN, 127)), on, off, (0.8, Controller(SUSTAIN, 0)))
+    np.testing.assert_array_equal(held[:14_000], damped[:14_000])
+    assert level_db(damped, 0.5, 0.6) < level_db(held, 0.5, 0.6) - 50  # 60 dB in 0.15 s
+    np.testing.assert_array_equal(held[:38_000], pedal[:38_000])
+    assert level_db(pedal, 1.0, 1.1) < level_db(held, 1.0, 1.1) - 50
+    ring = changed(patch, damping=Damping(let_ring=True))
+    np.testing.assert_array_equal(play(ring, preset, 1.2, on, off), held)
+
+
+def test_the_same_key_again_adds_to_the_string_and_leaves_the_loud_tail(patch: Patch, preset: Preset) -> None:
+    alone = play(patch, preset, 1.0, (0.0, NoteOn(45, 120)))
+    again = play(patch, preset, 1.0, (0.0, NoteOn(45, 120)), (0.4, NoteOn(45, 2)))
+    assert level_db(again, 0.45, 0.6) > level_db(alone, 0.45, 0.6) - 1.5
+    joint = slice(round(0.395 * RATE_HZ), round(0.41 * RATE_HZ))
+    assert np.abs(np.diff(again, 2))[joint].max() < 1.3 * np.abs(np.diff(alone, 2))[joint].max() + 1e-5
+
+
+@pytest.mark.parametrize(("by", "semitones"), [("tension", 2.0), ("length", 2.0), ("tension", -2.0)])
+def test_the_wheel_bends_to_its_range_and_back(patch: Patch, preset: Preset, by: str, semitones: float) -> None:
+    bending = changed(patch, bend_by=by)
+    half = (0.05, Bend(semitones / 2))
+    sound = play(bending, preset, 2.0, (0.0, NoteOn(57, 8)), half, (1.0, Bend(0.0)))
+    assert abs(cents(pitch_hz(sound, 220 * 2 ** (semitones / 12), 0.1, 0.95), 220 * 2 ** (semitones / 12))) < 0.5
+    assert abs(cents(pitch_hz(sound, 220, 1.1, 2.0), 220)) < 0.5
+
+
+BUSY = [
+    (0.0, NoteOn(45, 110)),
+    (0.2, NoteOn(52, 90)),
+    *[(0.3 + 0.01 * step, Bend(step / 20)) for step in range(20)],
+    (0.6, NoteOff(45)),
+    (0.7, NoteOn(52, 127)),
+    (0.9, Bend(0.0)),
+    (1.0, Controller(SUSTAIN, 127)),
+    (1.1, NoteOff(52)),
+    (1.2, NoteOn(64, 70)),
+    (1.3, Controller(SUSTAIN, 0)),
+]
+
+
+def test_the_model_is_the_truth_under_the_same_hands(patch: Patch, preset: Preset) -> None:
+    model, truth = (play(patch, preset, 2.0, *BUSY, source=source) for source in ("model", "truth"))
+    assert float(((model - truth) ** 2).sum() / (truth**2).sum()) < 1e-5
+
+
+def test_events_give_the_same_samples_for_ever(patch: Patch, preset: Preset) -> None:
+    np.testing.assert_array_equal(play(patch, preset, 1.5, *BUSY), play(patch, preset, 1.5, *BUSY))
+
+
+def test_in_guitar_mode_a_channel_is_one_string(guitar: Patch, preset: Preset) -> None:
+    struck: list[Struck] = []
+    player = Player(guitar, preset, RATE_HZ, struck.append)
+    mixer = Mixer(RATE_HZ)
+    for key in (64, 67, 71):
+        player.handle(NoteOn(key, 100, channel=0))
+        mixer.add(*struck[-1].voices.values())
+        mixer.render(4800)
+    player.handle(NoteOn(60, 100, channel=1))
+    mixer.add(*struck[-1].voices.values())
+    assert [each.event.key for each in player.sounding()] == [71, 60]
+    assert [each.over for each in struck] == [True, True, False, False]
+
+
+def test_in_mpe_each_note_bends_alone(patch: Patch, preset: Preset) -> None:
+    mpe = changed(patch, mode="mpe")
+    sound = play(mpe, preset, 1.2, (0.0, NoteOn(45, 8, 1)), (0.0, NoteOn(57, 8, 2)), (0.02, Bend(4 / 48, 2)))
+    assert abs(cents(pitch_hz(sound, 110), 110)) < 0.5
+    wanted_hz = 220 * 2 ** (4 / 12)
+    assert abs(cents(pitch_hz(sound, wanted_hz), wanted_hz)) < 0.5
+
+
+def test_a_knob_changes_strings_that_ring(patch: Patch, preset: Preset) -> None:
+    struck: list[Struck] = []
+    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
+    mixer = Mixer(RATE_HZ, limited=False)
+    player.handle(NoteOn(57, 60))
+    mixer.add(*struck[0].voices.values())
+    before = mixer.render(RATE_HZ // 2)[:, 0]
+    player.set_patch(changed(patch, knobs=Knobs(decay=10.0)))
+    after = mixer.render(RATE_HZ)[:, 0]
+    assert float(np.abs(np.diff(after, 2)[:4000]).max()) <= float(np.abs(np.diff(before, 2)).max())
+    free = play(patch, preset, 1.5, (0.0, NoteOn(57, 60))) / struck[0].gain
+    fallen = level_db(after.astype(np.float64), 0.8, 0.9) - level_db(free, 1.3, 1.4)
+    assert fallen < -3
+
+
+def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> None:
+    wheel = changed(patch, mod_wheel="pluck.position")
+    struck: list[Struck] = []
+    player = Player(wheel, preset, RATE_HZ, struck.append)
+    player.handle(NoteOn(50, 90))
+    player.handle(Controller(MOD_WHEEL, 127))
+    player.handle(NoteOn(52, 90))
+    assert [each.pluck.position for each in struck] == [pytest.approx(0.2), pytest.approx(0.5)]
+
+
+def test_all_sound_off_ends_everything(patch: Patch, preset: Preset) -> None:
+    sound = play(patch, preset, 1.0, (0.0, NoteOn(45, 90)), (0.1, NoteOn(57, 90)), (0.4, Controller(SOUND_OFF, 0)))
+    assert np.abs(sound[round(0.5 * RATE_HZ) :]).max() == 0
+
+
+def test_velocity_pick_ups_and_two_points_are_heard(patch: Patch, preset: Preset) -> None:
+    stereo = changed(patch, pickup=Pickup(points=(0.1, 0.3), kind="velocity"))
+    sound = render_note(stereo, preset, 50, 100, 0.5, 1.0, RATE_HZ)
+    assert sound.shape == (RATE_HZ, 2)
+    assert level_db(sound[:, 0].astype(float), 0, 0.4) > -40
+    assert np.abs(sound[:, 0] - sound[:, 1]).max() > 1e-3
+
+
+def test_a_preset_of_one_string_is_refused(patch: Patch) -> None:
+    with pytest.raises(ValueError, match="knows one string only"):
+        Player(patch, load_preset(SHIPPED / "studio_nylon_b3.safetensors"), RATE_HZ, lambda struck: None)

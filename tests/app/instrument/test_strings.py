@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from app.instrument.strings import Strings, bent, damped, fretted, pitch_hz_of, slid, turned
+from app.patches.patch import Knobs, Patch, TuningChoice
+from engine.resonators.string import StringParameters
+
+STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
+
+
+def cents(one_hz: float, other_hz: float) -> float:
+    return 1200 * math.log2(one_hz / other_hz)
+
+
+@pytest.mark.parametrize("key", range(28, 89))
+def test_every_key_has_its_pitch_by_length_alone(patch: Patch, key: int) -> None:
+    found = Strings(patch).of_key(key)
+    assert found is not None
+    assert abs(cents(pitch_hz_of(found.parameters), 440 * 2 ** ((key - 69) / 12))) < 1e-3
+    assert replace(found.parameters, length_m=STEEL.length_m) == STEEL
+    assert 1 <= found.modes <= 99
+
+
+def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guitar: Patch) -> None:
+    strings = Strings(Patch.model_validate({**dict(guitar), "tuning": TuningChoice(a4_hz=443.0)}))
+    for key in (30, 40, 44, 45, 64, 80):
+        found = strings.of_key(key)
+        assert found is not None
+        assert abs(cents(pitch_hz_of(found.parameters), 443 * 2 ** ((key - 69) / 12))) < 1e-3
+    low, lowest = strings.of_key(30), strings.of_key(40)
+    assert low is not None
+    assert lowest is not None
+    assert low.parameters.tension_n < 0.5 * lowest.parameters.tension_n
+    assert abs(low.parameters.length_m / lowest.parameters.length_m - 1) < 1e-3
+
+
+def test_a_key_beyond_the_range_is_none(patch: Patch) -> None:
+    assert Strings(patch).of_key(27) is None
+    assert Strings(patch).of_key(89) is None
+
+
+@pytest.mark.parametrize("semitones", [-2, -0.5, 0.3, 2, 12])
+def test_bends_and_slides_reach_the_pitch(semitones: float) -> None:
+    ratio = 2 ** (semitones / 12)
+    by_tension, by_length = bent(STEEL, ratio), slid(STEEL, ratio)
+    for changed in (by_tension, by_length):
+        assert abs(cents(pitch_hz_of(changed), ratio * pitch_hz_of(STEEL))) < 1e-3
+    assert by_tension.length_m == STEEL.length_m
+    assert by_length.tension_n == STEEL.tension_n
+
+
+def test_a_bend_below_what_stiffness_alone_gives_is_refused() -> None:
+    rod = replace(STEEL, second_moment_m4=1e-9)
+    with pytest.raises(ValueError, match="no tension lowers it"):
+        bent(rod, 0.05)
+
+
+def test_a_damper_adds_its_decay_to_every_partial() -> None:
+    added = damped(STEEL, 0.2).decay_rates(20) - STEEL.decay_rates(20)
+    assert added.tolist() == pytest.approx([math.log(1000) / 0.2] * 20)
+
+
+def test_gauge_and_density_leave_pitch_and_decay_and_change_how_stiff_it_is() -> None:
+    thick = turned(STEEL, Knobs(gauge=1.5, density=1.2))
+    assert abs(cents(pitch_hz_of(fretted(thick, 220.0)), 220.0)) < 1e-3
+    assert thick.decay_rate(1) == pytest.approx(STEEL.decay_rate(1))
+    assert thick.second_moment_m4 == pytest.approx(1.5**4 * STEEL.second_moment_m4)
+    assert turned(STEEL, Knobs()) == STEEL
+
+
+def test_an_impossible_key_is_named(patch: Patch) -> None:
+    from app.patches.patch import Fretted, PhysicalString
+
+    heavy = {**patch.strings.string.model_dump(), "tension_n": 1e-3, "second_moment_m4": 0.0}  # type: ignore[union-attr]
+    bad = Patch.model_validate({**dict(patch), "strings": Fretted(string=PhysicalString.model_validate(heavy))})
+    with pytest.raises(ValueError, match=r"key 88 of test.*length_m"):
+        Strings(bad).of_key(88)
