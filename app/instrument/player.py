@@ -2,7 +2,7 @@
 
 What rings is known by its place: a key, or in guitar mode a channel, whose string is one. A place that is struck
 again goes on with the motion that it has; a key that is let go damps its string, unless the pedal or the patch lets
-it ring. Everything that hands do to a string changes the modes of its voices, of the model's and of the truth's alike.
+it ring. Whatever hands do to a string changes the modes of its voices, the model's and the truth's alike.
 """
 
 from __future__ import annotations
