@@ -14,7 +14,21 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, batch, bench, evaluation, family, info, listing, motion, render, sweep, tables, training
+from app.commands import (
+    abx,
+    batch,
+    bench,
+    evaluation,
+    family,
+    info,
+    listing,
+    motion,
+    patches,
+    render,
+    sweep,
+    tables,
+    training,
+)
 from app.commands.console import say, use_any_output
 from app.shared.thread_priority import wait_asleep
 
@@ -55,9 +69,11 @@ def start(
 for command in (
     listing.presets,
     listing.models,
+    patches.patches,
     motion.simulate,
     motion.predict,
     render.render,
+    play.play,
     batch.batch,
     info.info,
     motion.compare,

@@ -99,7 +99,7 @@ Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(_pla
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
 Key = Annotated[int, _number(0, HIGHEST_KEY)]
 Share = Annotated[float, _number(0, 1)]
-Multiplier = Annotated[float, _number(0.1, 10)]
+Multiplier = Annotated[float, _number(0.05, 20)]
 Position = Annotated[float, _number(*POSITION_RANGE)]
 Width = Annotated[float, _number(*WIDTH_RANGE)]
 Millimetres = Annotated[float, _number(0.001, LARGEST_AMPLITUDE_MM)]

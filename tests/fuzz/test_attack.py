@@ -22,6 +22,10 @@ from app.commands.console import Failure
 from app.export.files import SoundRequest
 from app.export.recipe import Recipe, RecipeError, read_recipe, request_of
 from app.export.wav import WavSettings
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import PatchError, list_patches, read_patch
+from app.patches.patch import TuningChoice
+from app.patches.tuning import Tuning, read_scala
 from app.presets.library import list_presets
 from app.window.settings import Settings, load_settings
 from engine.pluck import Pluck
@@ -98,6 +102,23 @@ def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, see
         assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
 
     attacked(f"presets ({name})", rounds // 4, seed, attack)
+
+
+def test_patches(tmp_path: Path, rounds: int, seed: int) -> None:
+    """A stranger's patch, with a scale and a mapping, is listed or told, and hides no other."""
+    tuning = {"scale": SCALE.decode(), "keymap": "0\n0\n127\n60\n69\n440.0\n5\n"}
+    facts = {**json.loads(PATCH.read_bytes()), "tuning": tuning}
+    whole, path = json.dumps(facts).encode(), tmp_path / "stranger.json"
+    (tmp_path / "good.json").write_bytes(whole)
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(json_or_bytes(whole, draw))
+        entries, problems = list_patches(tmp_path)
+        assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
+        for problem in problems:
+            in_one_line(ValueError(problem), path)
+
+    attacked("patches", rounds // 4, seed, attack)
 
 
 @dataclass(frozen=True)
@@ -183,6 +204,28 @@ def settings(path: Path) -> None:
         aside.unlink()
 
 
+def scala(path: Path) -> None:
+    """Reads a .scl or .kbm, and asks for every pitch."""
+    text = read_scala(path)
+    tuning = Tuning(TuningChoice.model_validate({"keymap" if path.suffix == ".kbm" else "scale": text}))
+    assert all(0 < tuning.hz(key) < np.inf for key in range(128))
+
+
+def scala_or_bytes(whole: bytes, draw: random.Random) -> bytes:
+    if draw.random() < 0.4:
+        return damaged_bytes(whole, draw)
+    lines = whole.decode().splitlines()
+    for _ in range(draw.choice((1, 1, 3))):
+        lines[draw.randrange(len(lines))] = draw.choice(
+            ("-1", "0", "x", "1e300", "nan", "inf.", "9" * 5000, "2000000000", "-2000000000.", "1/0", "0/1", "-3/2",
+             "1/" + "9" * 30, "", "!", "\u00e9", "5" * 200 + ".", "1.2.3", "20000", "128")
+        )  # fmt: skip
+    return "\n".join(lines).encode()
+
+
+PATCH = min(PATCHES.glob("*.json"))
+SCALE = b"! a.scl\n!\nfifths and thirds\n 5\n!\n 9/8\n 386.3\n 3/2\n 5/3\n 2/1\n"
+KEYMAP = b"7\n0\n127\n60\n69\n440.0\n12\n0\n2\n4\n5\n7\n9\n11\n"
 PLAN = b"""description = "a plan"
 [[block]]
 models = ["koopman", "dmd"]
@@ -223,6 +266,9 @@ TARGETS = (
     Target("heard.csv", lambda p: HEARD, heard, ()),
     Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
+    Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
+    Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
+    Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),
     Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (RecordError,), json_or_bytes),
 )
 

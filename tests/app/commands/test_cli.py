@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[3]
 COMMANDS = [
     "presets",
     "models",
+    "patches",
     "simulate",
     "predict",
     "render",

@@ -4,28 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
 from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target
+from tests.app.patches.conftest import STRING
 
-STRING = {
-    "length_m": 0.65,
-    "area_m2": 4.5614e-07,
-    "second_moment_m4": 2.963e-14,
-    "density_kg_m3": 1140.0,
-    "youngs_modulus_pa": 5.4e9,
-    "damping_d1_kg_m_s": 0.0010383,
-    "damping_d3_kg_m_s": 6.8103e-06,
-    "tension_n": 53.4,
-}
-
-
-def patch(**changes: Any) -> Patch:
-    facts = {"name": "B", "category": "guitar", "strings": {"kind": "fretted", "string": STRING}, **changes}
-    return Patch.model_validate(facts)
+Make = Callable[..., Patch]
 
 
 @pytest.mark.parametrize(
@@ -59,19 +47,19 @@ def patch(**changes: Any) -> Patch:
         ("strings", {"strings": {"kind": "bow"}}),
     ],
 )
-def test_impossible_values_are_refused_by_name(field: str, changes: dict[str, Any]) -> None:
+def test_impossible_values_are_refused_by_name(make_patch: Make, field: str, changes: dict[str, Any]) -> None:
     with pytest.raises(ValidationError, match=field):
-        patch(**changes)
+        make_patch(**changes)
 
 
-def test_a_patch_survives_json() -> None:
-    strings = StringSet(strings=tuple(OpenString(note=n, string=patch().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
-    whole = patch(strings=strings, macros=[Macro(name="m", targets=(Target(field="level_db", low=-3, high=3),))])
+def test_a_patch_survives_json(make_patch: Make) -> None:
+    strings = StringSet(strings=tuple(OpenString(note=n, string=make_patch().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
+    whole = make_patch(strings=strings, macros=[Macro(name="m", targets=(Target(field="level_db", low=-3, high=3),))])
     assert Patch.model_validate_json(whole.model_dump_json()) == whole
 
 
-def test_the_engine_takes_its_strings() -> None:
-    strings = patch().strings
+def test_the_engine_takes_its_strings(make_patch: Make) -> None:
+    strings = make_patch().strings
     assert strings.kind == "fretted" and strings.string.parameters.undamped_frequency(1) > 0
 
 
@@ -93,8 +81,8 @@ def test_the_curve_keeps_the_ends_and_bends_the_middle(curve: float) -> None:
     assert (bent.pluck(64).amplitude_mm > even.pluck(64).amplitude_mm) == (curve > 0)
 
 
-def test_each_assignable_field_can_be_read_and_changed() -> None:
-    first = patch(pickup=Pickup(points=(0.2, 0.3)), level_db=1)
+def test_each_assignable_field_can_be_read_and_changed(make_patch: Make) -> None:
+    first = make_patch(pickup=Pickup(points=(0.2, 0.3)), level_db=1)
     for field in ASSIGNABLE:
         value = first.value(field)
         changed = first.with_value(field, value * 0.95)
@@ -104,9 +92,9 @@ def test_each_assignable_field_can_be_read_and_changed() -> None:
             first.with_value(field, 1e5)
 
 
-def test_a_macro_writes_its_targets() -> None:
+def test_a_macro_writes_its_targets(make_patch: Make) -> None:
     targets = (Target(field="knobs.decay", low=0.5, high=2.5), Target(field="pluck.position", low=0.4, high=0.1))
-    first = patch(macros=(Macro(name="age", targets=targets),))
+    first = make_patch(macros=(Macro(name="age", targets=targets),))
     turned = first.turned(0, 0.25)
     assert turned.knobs.decay == pytest.approx(1.0) and turned.pluck.position == pytest.approx(0.325)
     assert turned.macros[0].value == 0.25

@@ -1,0 +1,69 @@
+"""play: a MIDI file through a patch, to a WAV file."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from app.commands import arguments
+from app.commands.console import Failure, progress, say
+from app.commands.render import BitsOption
+
+DEFAULT_RATE_HZ = 48_000
+
+
+def play(
+    midi: Annotated[Path, typer.Argument(metavar="FILE.mid", help="The MIDI file to play.")],
+    patch: Annotated[str, typer.Option(metavar="PATCH", help="A patch's name, or the path of its file.")],
+    out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
+    source: Annotated[
+        Literal["model", "truth"], typer.Option(help="Whether the learned model sounds, or the solved string.")
+    ] = "model",
+    rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = DEFAULT_RATE_HZ,
+    bits: BitsOption = "24",
+    seconds: Annotated[
+        float | None, typer.Option(metavar="S", help="How long the file is; default until all has died away.")
+    ] = None,
+    normalise: Annotated[bool, typer.Option("--normalise", help="To -1 dBFS.")] = False,
+) -> None:
+    """Play a MIDI file through a patch, faster than it sounds. The same files give the same samples."""
+    from app.export.files import LONGEST_S, RATE_RANGE_HZ
+
+    arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
+    if seconds is not None:
+        arguments.check_range("--seconds", seconds, 0.001, LONGEST_S, "s")
+    from app.instrument.midi_file import MidiFileError, read_midi
+    from app.patches.library import PatchError, find_patch
+
+    try:
+        events, chosen = read_midi(midi), find_patch(patch).patch
+    except (MidiFileError, PatchError) as error:
+        raise Failure(str(error)) from error
+    loaded = arguments.open_preset(chosen.preset)
+    from app.export.recording import Recording
+    from app.export.wav import WavSettings, write_wav
+    from app.instrument.offline import LONGEST_TAIL_S, render_events
+    from app.shared.version import PROGRAM, program_version
+    from app.shared.whole_file import WriteError, whole_file
+
+    began_s = time.monotonic()
+    whole_s = seconds if seconds is not None else events[-1].time_s + LONGEST_TAIL_S / 10
+    sound = Recording(len(chosen.pickup.points))
+    try:
+        with progress(f"{midi.name} by {chosen.name}") as report:
+            told = lambda done_s: report(min(0.99, done_s / whole_s))  # noqa: E731
+            for block in render_events(chosen, loaded, events, rate, source, seconds, advanced=told):
+                sound.append(block)
+        tags = {"title": f"{midi.stem}: {chosen.name}", "software": f"{PROGRAM} {program_version()}"}
+        with whole_file(out) as file:
+            level = write_wav(file, sound, rate, WavSettings(bits, None, normalise), tags)
+    except (ValueError, WriteError) as error:
+        raise Failure(str(error)) from error
+    lasts_s, took_s = len(sound) / rate, time.monotonic() - began_s
+    say(
+        f"{out}: {lasts_s:.1f} s of {source} in {took_s:.1f} s ({lasts_s / took_s:.0f} times as fast as it sounds), "
+        f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
+    )

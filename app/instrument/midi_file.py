@@ -1,0 +1,108 @@
+"""MIDI files: read as events, and written of what was played. The format is mido's business."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, TimedEvent
+from engine.plain_text import one_line
+
+LARGEST_BYTES = 4 * 2**20
+MOST_EVENTS = 200_000
+LONGEST_S = 3_600.0
+TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
+BEND_STEPS = 8_192
+
+
+class MidiFileError(ValueError):
+    """A MIDI file cannot be read. The message names file, fault and remedy, in one line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+def event_of(message: Any) -> Event | None:
+    """A message of mido's; None for what no string answers."""
+    if message.type == "note_on":
+        if message.velocity == 0:
+            return NoteOff(message.note, message.channel)
+        return NoteOn(message.note, message.velocity, message.channel)
+    if message.type == "note_off":
+        return NoteOff(message.note, message.channel)
+    if message.type == "pitchwheel":
+        return Bend(message.pitch / BEND_STEPS if message.pitch < 0 else message.pitch / (BEND_STEPS - 1), message.channel)
+    if message.type == "control_change":
+        return Controller(message.control, message.value, message.channel)
+    return None
+
+
+def read_midi(path: Path) -> list[TimedEvent]:
+    """All tracks together, at their tempo.
+
+    Raises:
+        MidiFileError: it is missing, damaged, too large or too long, or holds no note.
+    """
+    import mido
+
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise MidiFileError(f"{path}: cannot be read ({error}); check the name") from error
+    if len(raw) > LARGEST_BYTES:
+        raise MidiFileError(f"{path}: has more than {LARGEST_BYTES // 2**20} MiB; give a smaller MIDI file")
+    found: list[TimedEvent] = []
+    time_s, messages = 0.0, 0
+    try:
+        for message in mido.MidiFile(file=io.BytesIO(raw)):
+            time_s, messages = time_s + message.time, messages + 1
+            if messages > MOST_EVENTS or not time_s <= LONGEST_S:
+                told = f"more than {MOST_EVENTS} messages" if messages > MOST_EVENTS else "more than an hour of music"
+                raise MidiFileError(f"{path}: {told}; give a shorter MIDI file")
+            if not message.is_meta and (event := event_of(message)) is not None:
+                found.append(TimedEvent(time_s, event))
+    except MidiFileError:
+        raise
+    except Exception as error:  # whatever damage makes of mido
+        raise MidiFileError(
+            f"{path}: is no MIDI file that can be read ({type(error).__name__}: {error}); save it again as .mid"
+        ) from error
+    if not any(isinstance(each.event, NoteOn) for each in found):
+        raise MidiFileError(f"{path}: holds no note; give a MIDI file with notes")
+    return found
+
+
+def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
+    """A MIDI file of what was played, of one track, 1/1920 s and finer."""
+    import mido
+
+    track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
+    tick = 0
+    for each in sorted(timed, key=lambda one: one.time_s):
+        now = round(mido.second2tick(each.time_s, TICKS, TEMPO))
+        for message in _messages(each.event):
+            track.append(message.copy(time=max(0, now - tick)))
+            tick = max(tick, now)
+    file = mido.MidiFile(type=0, ticks_per_beat=TICKS)
+    file.tracks.append(track)
+    buffer = io.BytesIO()
+    file.save(file=buffer)
+    return buffer.getvalue()
+
+
+def _messages(event: Event) -> Iterable[Any]:
+    import mido
+
+    channel = event.channel % 16
+    if isinstance(event, NoteOn):
+        yield mido.Message("note_on", note=event.key, velocity=event.velocity, channel=channel)
+    elif isinstance(event, NoteOff):
+        yield mido.Message("note_off", note=event.key, velocity=64, channel=channel)
+    elif isinstance(event, Bend):
+        steps = BEND_STEPS if event.value < 0 else BEND_STEPS - 1
+        yield mido.Message("pitchwheel", pitch=round(event.value * steps), channel=channel)
+    else:
+        yield mido.Message("control_change", control=event.number, value=event.value, channel=channel)

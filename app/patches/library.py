@@ -1,0 +1,183 @@
+"""Which patches there are: the shipped ones and the user's own, each a small JSON file; reading, saving, renaming.
+
+A patch is known by its file's name without `.json`. That name is made from the patch's own, and is never a path.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.patches.patch import CATEGORIES, Patch, explained
+from app.presets.folders import user_folder
+from app.shared.whole_file import WriteError, explain, whole_file
+from engine import bounds
+from engine.plain_text import one_line
+from engine.schema import SchemaError, parse_json
+
+SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
+SUFFIX = ".json"
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # of Windows
+
+
+class PatchError(ValueError):
+    """A patch cannot be used or saved. The message names file, field and remedy, in one line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+@dataclass(frozen=True)
+class PatchEntry:
+    """A patch that can be chosen, by its file."""
+
+    path: Path
+    patch: Patch
+
+    @property
+    def name(self) -> str:
+        """What it is known by."""
+        return self.path.stem
+
+    @property
+    def own(self) -> bool:
+        """Whether it is the user's, not shipped with the program."""
+        return self.path.parent != SHIPPED
+
+
+def own_patches() -> Path:
+    """The user's folder of patches, in that of presets. It need not be there."""
+    return user_folder() / "patches"
+
+
+def read_patch(path: Path) -> Patch:
+    """One file, checked whole.
+
+    Raises:
+        PatchError: it is missing, too large, damaged, impossible, or of a newer version.
+    """
+    try:
+        if not path.is_file():  # a pipe would be waited for
+            raise PatchError(f"{path}: no file; check the name")
+        with path.open("rb") as file:
+            raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: no path at all
+        if isinstance(error, PatchError):
+            raise
+        told = getattr(error, "strerror", None) or error
+        raise PatchError(f"{path}: cannot be read ({told}); check the name and its permissions") from error
+    try:
+        data = parse_json(raw, str(path))
+        if isinstance(data, dict) and isinstance(data.get("version"), int) and data["version"] > 1:
+            raise PatchError(f"{path}: version: made by a newer version of the program; update it")
+        return Patch.model_validate(data)
+    except SchemaError as error:
+        raise PatchError(f"{error}; give the JSON of a patch") from error
+    except PatchError:
+        raise
+    except (ValueError, OverflowError) as error:
+        told = explained(error) if isinstance(error, ValueError) else str(error)
+        raise PatchError(f"{path}: {one_line(told, 300)}; mend this field, or save the patch again") from error
+
+
+def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
+    """The usable patches by category and name, and a line for each file that cannot be used. Never raises.
+
+    By default those of the shipped and of the user's folder; of two of one name, the one of the first folder.
+    """
+    entries: dict[str, PatchEntry] = {}
+    problems = []
+    for folder in folders or (SHIPPED, own_patches()):
+        try:
+            paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith("."))
+        except OSError as error:
+            problems.append(one_line(f"{folder}: cannot be read ({error.strerror}); check its permissions"))
+            continue
+        for path in paths:
+            try:
+                patch = read_patch(path)
+                if path.stem in entries:
+                    raise PatchError(f"{path}: a patch of this name exists already; rename the file to use it")
+                entries[path.stem] = PatchEntry(path, patch)
+            except PatchError as error:
+                problems.append(str(error))
+            except Exception as error:  # whatever one file brings about, the others are listed
+                problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
+    return sorted(entries.values(), key=_order), problems
+
+
+def find_patch(name_or_path: str) -> PatchEntry:
+    """A patch by the name it is known by, by its title, or by its file's path.
+
+    Raises:
+        PatchError: there is none, or its file cannot be used; the message lists the names.
+    """
+    entries, _ = list_patches()
+    wanted = name_or_path.casefold()
+    for entry in entries:
+        if wanted in (entry.name.casefold(), entry.patch.name.casefold()):
+            return entry
+    path = Path(name_or_path)
+    if path.suffix == SUFFIX:
+        return PatchEntry(path, read_patch(path))
+    known = ", ".join(entry.name for entry in entries) or "none is installed"
+    raise PatchError(f"no patch {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
+
+
+def save_patch(patch: Patch, *, replace: bool = False) -> PatchEntry:
+    """Writes it into the user's folder, whole or not at all, and makes the folder.
+
+    Args:
+        replace: whether a patch of the user's with this name may be overwritten; a shipped one never is.
+
+    Raises:
+        PatchError: the name is that of another patch.
+        WriteError: the folder or the file cannot be written.
+    """
+    path = own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
+    if (SHIPPED / path.name).exists():
+        raise PatchError(f"{patch.name}: a shipped patch has this name; choose another")
+    if path.exists() and not replace:
+        raise PatchError(f"{patch.name}: a patch of this name exists already; choose another, or replace it")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WriteError(explain(path.parent, error)) from error
+    with whole_file(path) as file:
+        file.write((patch.model_dump_json(indent=2) + "\n").encode("utf-8"))
+    return PatchEntry(path, patch)
+
+
+def rename_patch(entry: PatchEntry, name: str) -> PatchEntry:
+    """The user's own patch under another name; its former file is removed after the new one is whole.
+
+    Raises:
+        PatchError: it is a shipped one, the name is that of another patch, or can be no name.
+        WriteError: the folder cannot be written.
+    """
+    if not entry.own:
+        raise PatchError(f"{entry.patch.name}: is shipped with the program; save it under another name instead")
+    try:
+        renamed = Patch.model_validate({**dict(entry.patch), "name": name})
+    except ValueError as error:
+        raise PatchError(explained(error)) from error
+    same = file_stem(renamed.name) == entry.name
+    saved = save_patch(renamed, replace=same)
+    if not same:
+        try:
+            entry.path.unlink(missing_ok=True)
+        except OSError as error:
+            raise WriteError(explain(entry.path, error)) from error
+    return saved
+
+
+def file_stem(name: str) -> str:
+    """The name of a patch's file, on every system: its letters and digits in lower case, the rest underscores."""
+    stem = "_".join(re.findall(r"[^\W_]+", unicodedata.normalize("NFC", name.casefold()))) or "patch"
+    return f"{stem}_" if stem in DEVICES else stem
+
+
+def _order(entry: PatchEntry) -> tuple[int, str]:
+    return CATEGORIES.index(entry.patch.category), entry.patch.name.casefold()

@@ -1,0 +1,35 @@
+"""The command that lists patches."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.patches.library import SHIPPED
+
+
+def test_shipped_patches_are_listed(run) -> None:
+    found = run("patches", "--json")
+    assert found.status == 0 and found.err == ""
+    listed = json.loads(found.out)
+    assert {each["file"] for each in listed} == {str(path) for path in SHIPPED.glob("*.json")}
+    table = run("patches").out
+    for each in listed:
+        assert set(each) == {"name", "title", "category", "own", "description", "file"} and not each["own"]
+        assert each["name"] in table and each["title"] in table
+
+
+def test_a_broken_patch_is_told_and_hides_no_other(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path))
+    own = tmp_path / "patches"
+    own.mkdir()
+    some = json.loads(next(SHIPPED.glob("*.json")).read_text(encoding="utf-8"))
+    (own / "mine.json").write_text(json.dumps({**some, "name": "Mine"}))
+    (own / "broken.json").write_text("{")
+    found = run("patches", "--json")
+    assert found.status == 0
+    assert found.err.startswith(f"learned-strings: {own / 'broken.json'}: not JSON") and found.err.count("\n") == 1
+    (mine,) = (each for each in json.loads(found.out) if each["own"])
+    assert (mine["name"], mine["title"]) == ("mine", "Mine")

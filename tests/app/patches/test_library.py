@@ -1,0 +1,156 @@
+"""Patches as files: listed, read, saved, renamed; nothing of a stranger's harms the others."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.patches import library
+from app.patches.library import (
+    SHIPPED,
+    PatchEntry,
+    PatchError,
+    file_stem,
+    find_patch,
+    list_patches,
+    own_patches,
+    read_patch,
+    rename_patch,
+    save_patch,
+)
+from app.patches.patch import Patch
+from app.shared.whole_file import WriteError
+
+Make = Callable[..., Patch]
+
+
+@pytest.fixture(autouse=True)
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's folder of patches, not made yet."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    return tmp_path / "own" / "patches"
+
+
+def write(path: Path, facts: object) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(facts))
+    return path
+
+
+def test_what_is_saved_is_listed_and_read_again(make_patch: Make, own: Path) -> None:
+    entry = save_patch(make_patch(name="Čembalo, 8′", category="keys"))
+    assert entry.path == own / "čembalo_8.json" and entry.own
+    listed, problems = list_patches()
+    assert entry in listed and not problems
+    assert find_patch("Čembalo, 8′") == find_patch("ČEMBALO_8") == find_patch(str(entry.path)) == entry
+
+
+def test_a_patch_is_replaced_only_where_that_is_meant(make_patch: Make) -> None:
+    save_patch(make_patch(name="Mine"))
+    with pytest.raises(PatchError, match=r"mine: .* exists already; choose another"):
+        save_patch(make_patch(name="mine", level_db=3))
+    assert read_patch(save_patch(make_patch(name="mine", level_db=3), replace=True).path).level_db == 3
+
+
+def test_a_shipped_patch_is_neither_overwritten_nor_renamed(make_patch: Make, own: Path) -> None:
+    shipped = list_patches(SHIPPED)[0][0]
+    for replace in (False, True):
+        with pytest.raises(PatchError, match="shipped"):
+            save_patch(make_patch(name=shipped.patch.name), replace=replace)
+    with pytest.raises(PatchError, match="shipped"):
+        rename_patch(shipped, "Other")
+    assert not own.exists()
+
+
+def test_renaming(make_patch: Make, own: Path) -> None:
+    first = save_patch(make_patch(name="First"))
+    save_patch(make_patch(name="Taken"))
+    for name, told in (("taken", "exists already"), ("../up", "name"), ("", "name"), ("a\nb", "name")):
+        with pytest.raises(PatchError, match=told):
+            rename_patch(first, name)
+    second = rename_patch(first, "Second")
+    assert sorted(path.name for path in own.iterdir()) == ["second.json", "taken.json"]
+    spelt = rename_patch(second, "SECOND")
+    assert spelt.path == second.path and read_patch(spelt.path).name == "SECOND"
+
+
+def test_a_folder_that_cannot_be_written_is_told(make_patch: Make, own: Path) -> None:
+    own.parent.parent.mkdir(exist_ok=True)
+    own.parent.write_text("a file")
+    with pytest.raises(WriteError, match="own"):
+        save_patch(make_patch())
+    assert list_patches(own) == ([], [])
+
+
+@pytest.mark.parametrize("name", ["..", "../../etc/passwd", "a/b", "a\\b", "C:x", ".hidden", "CON", "!!!", "名前"])
+def test_a_file_name_is_never_a_path(name: str) -> None:
+    stem = file_stem(name)
+    assert stem and Path(stem).name == stem and stem.casefold() not in library.DEVICES
+    assert all(c.isalnum() or c == "_" for c in stem)
+
+
+def test_one_bad_file_hides_no_other(make_patch: Make, own: Path) -> None:
+    good = save_patch(make_patch(name="Good"))
+    facts = json.loads(good.path.read_text())
+    (own / "folder.json").mkdir()
+    (own / ".hidden.json").write_text("{")
+    write(own / "newer.json", {**facts, "version": 2})
+    write(own / "colour.json", {**facts, "colour": 1})
+    write(own / "high.json", {**facts, "pluck": {"position": 3}})
+    write(own / "long.json", {**facts, "author": "x" * 5000})
+    (own / "big.json").write_bytes(b" " * (2**20 + 1))
+    (own / "deep.json").write_text("[" * 100_000)
+    (own / "number.json").write_text(good.path.read_text().replace("440.0", "9" * 5000))
+    (own / "nan.json").write_text(good.path.read_text().replace("440.0", "NaN"))
+    (own / "bytes.json").write_bytes(b"\xff\xfe{}")
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(own / "pipe.json")
+    expected = {path.name for path in own.iterdir()} - {"good.json", ".hidden.json"}
+    entries, problems = list_patches(own)
+    assert entries == [good]
+    assert all(problem.isprintable() and len(problem) <= 500 for problem in problems)
+    told = {Path(problem.split(".json: ")[0] + ".json").name: problem for problem in problems}
+    assert set(told) == expected
+    for name, words in (
+        ("newer", "version: made by a newer version"),
+        ("colour", "colour"),
+        ("high", "pluck.position: Input should be less than or equal to 0.98, found 3"),
+        ("long", "author"),
+        ("nan", "tuning.a4_hz"),
+        ("big", "KiB"),
+    ):
+        assert words in told[f"{name}.json"], told[f"{name}.json"]
+
+
+def test_of_two_patches_of_one_name_the_shipped_one_counts(own: Path) -> None:
+    shipped = list_patches(SHIPPED)[0][0]
+    write(own / shipped.path.name, json.loads(shipped.path.read_text(encoding="utf-8")))
+    entries, problems = list_patches()
+    assert [entry for entry in entries if entry.name == shipped.name] == [shipped]
+    assert len(problems) == 1 and "exists already; rename the file" in problems[0]
+
+
+def test_an_unknown_name_lists_the_known_ones(make_patch: Make) -> None:
+    save_patch(make_patch(name="Mine"))
+    with pytest.raises(PatchError, match=r"no patch 'other'; .*mine"):
+        find_patch("other")
+    with pytest.raises(PatchError, match="absent"):
+        find_patch("absent.json")
+
+
+def test_the_users_folder_lies_among_presets(own: Path) -> None:
+    assert own_patches() == own
+    assert not PatchEntry(SHIPPED / "a.json", list_patches(SHIPPED)[0][0].patch).own
+
+
+def test_patches_are_listed_without_the_engine() -> None:
+    code = (
+        "import sys; from app.patches.library import list_patches; list_patches(); assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
