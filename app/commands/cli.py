@@ -24,6 +24,7 @@ from app.commands import (
     listing,
     motion,
     patches,
+    play,
     render,
     sweep,
     tables,

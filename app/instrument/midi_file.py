@@ -33,7 +33,9 @@ def event_of(message: Any) -> Event | None:
     if message.type == "note_off":
         return NoteOff(message.note, message.channel)
     if message.type == "pitchwheel":
-        return Bend(message.pitch / BEND_STEPS if message.pitch < 0 else message.pitch / (BEND_STEPS - 1), message.channel)
+        return Bend(
+            message.pitch / BEND_STEPS if message.pitch < 0 else message.pitch / (BEND_STEPS - 1), message.channel
+        )
     if message.type == "control_change":
         return Controller(message.control, message.value, message.channel)
     return None
