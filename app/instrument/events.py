@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.patches.patch import Patch
+
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
 PEDAL_DOWN = 64  # from this value on
 
@@ -42,7 +44,14 @@ class Controller:
     channel: int = 0
 
 
-Event = NoteOn | NoteOff | Bend | Controller
+@dataclass(frozen=True)
+class PatchTurned:
+    """A knob was turned, or another patch chosen."""
+
+    patch: Patch
+
+
+Event = NoteOn | NoteOff | Bend | Controller | PatchTurned
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent
 from engine.plain_text import one_line
 
 LARGEST_BYTES = 4 * 2**20
@@ -98,6 +98,8 @@ def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
 def _messages(event: Event) -> Iterable[Any]:
     import mido
 
+    if isinstance(event, PatchTurned):
+        return
     channel = event.channel % 16
     if isinstance(event, NoteOn):
         yield mido.Message("note_on", note=event.key, velocity=event.velocity, channel=channel)
@@ -106,5 +108,5 @@ def _messages(event: Event) -> Iterable[Any]:
     elif isinstance(event, Bend):
         steps = BEND_STEPS if event.value < 0 else BEND_STEPS - 1
         yield mido.Message("pitchwheel", pitch=round(event.value * steps), channel=channel)
-    else:
+    elif isinstance(event, Controller):
         yield mido.Message("control_change", control=event.number, value=event.value, channel=channel)

@@ -143,6 +143,7 @@ class Player:
         self._hands = _Hands()
         self._ringing: dict[int, Struck] = {}
         self._all: list[Struck] = []  # those that were struck again among them, until they are over
+        self._listens: Ear | None = None
         self._take(patch)
 
     # What is played
@@ -165,6 +166,17 @@ class Player:
             self._take(patch)
             for struck in self._sounding():
                 self._retune(struck, KNOB_S)
+
+    def listen(self, ear: Ear) -> None:
+        """From elsewhere than the patch says, and loud as there; what rings is not moved."""
+        with self._lock:
+            if ear != self._ear:
+                self._listens = ear
+                self._take(self._patch)
+
+    @property
+    def rate_hz(self) -> int:
+        return self._rate_hz
 
     def set_rate(self, rate_hz: int) -> None:
         """Another rate of the device: what was struck before ends there."""
@@ -202,8 +214,10 @@ class Player:
                 for struck in self._sounding():
                     if self._bends(struck, event.channel):
                         self._retune(struck, BEND_S)
-            else:
+            elif isinstance(event, Controller):
                 self._controller(event)
+            else:
+                self.set_patch(event.patch)
         return None
 
     def stop(self, seconds: float = STOP_S) -> None:
@@ -224,7 +238,7 @@ class Player:
 
     def _take(self, patch: Patch) -> None:
         strings = Strings(patch)
-        ear = Ear(tuple(patch.pickup.points), patch.pickup.kind)
+        ear = self._listens or Ear(tuple(patch.pickup.points), patch.pickup.kind)
         rate_hz, model = self._rate_hz, self._model
 
         @lru_cache(maxsize=KEPT_KEYS)

@@ -7,6 +7,7 @@ from pathlib import Path
 from app.playing.stroke import Mix, Stroke
 from app.presets.library import Library
 from app.rendering import RenderRequest
+from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
 from app.session.ears import heard_ear
 from app.session.slots import other_preset
@@ -18,6 +19,11 @@ def mix_of(choices: Choices) -> Mix:
     return Mix(choices.source_heard, choices.level_match, choices.difference_gain_db)
 
 
+def subject_of(choices: Choices, preset: Path) -> Subject:
+    """What is plucked."""
+    return preset if choices.string is None else StringOf(preset, choices.string.parameters)
+
+
 def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
     """What is plucked, with voices for both slots."""
     others = _others(choices, library)
@@ -25,13 +31,15 @@ def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
     for held in (choices.source_heard, choices.a, choices.b):
         sources += ("model", "truth") if held == DIFFERENCE else (held,)
     known = dict.fromkeys(source for source in sources if source in ("model", "truth") or source in others)
-    return Stroke(preset, choices.pluck, heard_ear(choices), choices.seconds, tuple(known) or ("model",), others)
+    subject = subject_of(choices, preset)
+    return Stroke(subject, choices.pluck, heard_ear(choices), choices.seconds, tuple(known) or ("model",), others)
 
 
 def render_request(choices: Choices, preset: Path, library: Library) -> RenderRequest:
     """What the worker is asked for, other presets in the slots among it."""
     others = tuple(dict.fromkeys(_others(choices, library).values()))
-    return RenderRequest(preset, choices.pluck, choices.seconds, heard_ear(choices), choices.speed, others)
+    subject = subject_of(choices, preset)
+    return RenderRequest(subject, choices.pluck, choices.seconds, heard_ear(choices), choices.speed, others)
 
 
 def _others(choices: Choices, library: Library) -> dict[str, Path]:

@@ -1,4 +1,4 @@
-"""The computer's keyboard as an instrument: a row of keys plucks at ten places, others set how hard.
+"""The computer's keyboard as an instrument: keys are pitches as on a piano, or a row of them is ten places.
 
 Keys are known by where they are: the row begins right of Caps lock, whatever is printed on it. No widget here.
 """
@@ -29,6 +29,20 @@ _ROW_CODES = {
     "win32": tuple(range(0x1E, 0x28)),
 }
 _ROW_LETTERS = "ASDFGHJKL;"
+# A piano of eighteen keys: white ones in the same row, black ones above, from C on; and the letters beside it.
+_WHITE = (0, 2, 4, 5, 7, 9, 11, 12, 14, 16, 17)
+_BLACK = {1: 1, 2: 3, 4: 6, 5: 8, 6: 10, 8: 13, 9: 15}  # place in the row above -> semitones
+_UPPER_LETTERS = "QWERTYUIOP"
+_PIANO_CODES = {
+    "linux": {38 + n: s for n, s in enumerate(_WHITE)} | {24 + n: s for n, s in _BLACK.items()},
+    "win32": {0x1E + n: s for n, s in enumerate(_WHITE)} | {0x10 + n: s for n, s in _BLACK.items()},
+}
+_PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
+    _UPPER_LETTERS[n]: s for n, s in _BLACK.items()
+}
+LOWEST_C = 48  # the key of A on the keyboard, at octave 0
+OCTAVE_STEPS = {"Z": -1, "X": 1}
+LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
 
 
 @dataclass(frozen=True)
@@ -82,6 +96,30 @@ class Played:
 
     changes: dict[str, float]
     plucks: bool
+
+
+def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
+    """Semitones above the piano's C, or None for a key beside it."""
+    codes = _PIANO_CODES.get(platform)
+    if codes and press.code:
+        return codes.get(press.code)
+    return _PIANO_LETTERS.get(press.letter.upper()) if press.letter else None
+
+
+def letters_of(octave: int) -> dict[int, str]:
+    """What is printed on the computer's keys, by the keys that they play."""
+    return {LOWEST_C + 12 * octave + semitone: letter for letter, semitone in _PIANO_LETTERS.items()}
+
+
+def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
+    """Octave and velocity after a key that changes them: Z and X, 1 … 9, C and V; None for another."""
+    letter = press.letter.upper()
+    if letter in OCTAVE_STEPS:
+        return min(max(octave + OCTAVE_STEPS[letter], LOWEST_OCTAVE), HIGHEST_OCTAVE), velocity
+    if letter and letter in "123456789":
+        return octave, _ninth(int(letter))
+    step = {"C": -VELOCITY_STEP, "V": VELOCITY_STEP}.get(letter)
+    return None if step is None else (octave, min(max(velocity + step, 1), LARGEST_VELOCITY))
 
 
 def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.instrument.events import Controller, Event, NoteOn
 from app.playing.keyboard import Reach
 from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
@@ -14,7 +15,7 @@ from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 LOWEST_NOTE, HIGHEST_NOTE = 36, 96  # of a keyboard of 61 keys
 LARGEST_VALUE = 127
 
-NoteMode = Literal["position", "preset"]
+NoteMode = Literal["pitch", "position", "preset"]
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ TURNED = {  # field of `Choices` -> what it is
     "volume_db": Turned("volume", *VOLUME_RANGE_DB),
 }
 TurnedField = Literal["position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db"]
-Controller = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
+ControllerNumber = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
 
 
 class MidiChoices(BaseModel):
@@ -52,15 +53,15 @@ class MidiChoices(BaseModel):
 
     Attributes:
         port: the input's name; "": none.
-        notes: whether a note says where the string is plucked, or which preset is.
+        notes: whether a note is a pitch of the patch, says where the string is plucked, or which preset is.
         controllers: the number of the controller that turns a field; a field that was taught none is absent.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     port: str = ""
-    notes: NoteMode = "position"
-    controllers: dict[TurnedField, Controller] = {}
+    notes: NoteMode = "pitch"
+    controllers: dict[TurnedField, ControllerNumber] = {}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
         """With `controller` turning `field`, and nothing else any more."""
@@ -73,25 +74,6 @@ class MidiChoices(BaseModel):
 
 
 @dataclass(frozen=True)
-class Note:
-    """A key goes down; velocity 1 … 127."""
-
-    note: int
-    velocity: int
-
-
-@dataclass(frozen=True)
-class Control:
-    """A controller moves to 0 … 127."""
-
-    controller: int
-    value: int
-
-
-Message = Note | Control
-
-
-@dataclass(frozen=True)
 class Meaning:
     """New values of `Choices`, and whether the string is plucked then."""
 
@@ -99,23 +81,16 @@ class Meaning:
     plucks: bool = False
 
 
-def read_message(message: Any) -> Message | None:
-    """A message of mido's as one of ours; None for what the string does not answer: releases, clocks and others."""
-    if message.type == "note_on" and message.velocity > 0:
-        return Note(message.note, message.velocity)
-    if message.type == "control_change":
-        return Control(message.control, message.value)
-    return None
-
-
-def meaning_of(message: Message, choices: MidiChoices, reach: Reach, presets: list[str]) -> Meaning:
-    """What a message asks for; a controller that was taught nothing asks for nothing."""
-    if isinstance(message, Control):
-        fields = [field for field, controller in choices.controllers.items() if controller == message.controller]
-        return Meaning({field: TURNED[field].value(message.value) for field in fields})
-    changes: dict[str, Any] = {"amplitude_mm": reach.amplitude_of(message.velocity)}
-    if choices.notes == "position":
-        changes["position"] = reach.place((message.note - LOWEST_NOTE) / (HIGHEST_NOTE - LOWEST_NOTE))
-    elif presets:
-        changes["preset"] = presets[(message.note - LOWEST_NOTE) % len(presets)]
+def meaning_of(event: Event, choices: MidiChoices, reach: Reach, presets: list[str]) -> Meaning:
+    """What an event asks of the one string; a controller that was taught nothing, and a release, ask for nothing."""
+    if isinstance(event, Controller):
+        fields = [field for field, controller in choices.controllers.items() if controller == event.number]
+        return Meaning({field: TURNED[field].value(event.value) for field in fields})
+    if not isinstance(event, NoteOn):
+        return Meaning({})
+    changes: dict[str, Any] = {"amplitude_mm": reach.amplitude_of(event.velocity)}
+    if choices.notes == "preset" and presets:
+        changes["preset"] = presets[(event.key - LOWEST_NOTE) % len(presets)]
+    elif choices.notes != "preset":
+        changes["position"] = reach.place((event.key - LOWEST_NOTE) / (HIGHEST_NOTE - LOWEST_NOTE))
     return Meaning(changes, plucks=True)

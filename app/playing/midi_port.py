@@ -7,7 +7,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from app.playing.midi import Message, read_message
+from app.instrument.events import Event
+from app.instrument.midi_file import event_of
 
 
 class MidiUnavailable(Exception):
@@ -47,7 +48,7 @@ def load_backend() -> Backend:
 class MidiInput:
     """At most one open input. `on_message` is called in mido's thread."""
 
-    def __init__(self, on_message: Callable[[Message], None], load: Callable[[], Backend] = load_backend) -> None:
+    def __init__(self, on_message: Callable[[Event], None], load: Callable[[], Backend] = load_backend) -> None:
         self._on_message = on_message
         self._load = load
         self._backend: Backend | None = None
@@ -95,9 +96,9 @@ class MidiInput:
         return self._backend
 
     def _receive(self, message: Any) -> None:
-        ours = read_message(message)
-        if ours is not None:
-            self._on_message(ours)
+        event = event_of(message)
+        if event is not None:
+            self._on_message(event)
 
 
 def same_device(one: str, other: str) -> bool:

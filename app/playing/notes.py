@@ -12,7 +12,6 @@ import traceback
 from collections import OrderedDict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from app.audio.sound import Sound
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
+from app.rendering.subject import Subject
 from app.shared.thread_priority import Rank, step_back
 from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
@@ -63,6 +63,7 @@ class Note:
         self.mixer: Mixer | None = None
         self.cut = False
         self.timed = False  # its latency has been noted
+        self.adopted = False  # its voices are another's, who changes them
 
     @property
     def over(self) -> bool:
@@ -156,19 +157,47 @@ class Notes:
             begin()
         return note
 
+    def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float) -> Note:
+        """A note whose voices somebody else made, at the rate of the present mixer; it sounds with the next quantum.
+
+        It ends where the device changes its rate. Its levels are those of `stroke.gain`.
+        """
+        note = Note(stroke)
+        note.adopted, note.voices, note.match = True, dict(voices), dict.fromkeys(voices, 1.0)
+        for voice in voices.values():
+            voice.set_struck(struck_s)
+        with self._lock:
+            self._notes.append(note)
+        if not self._hand_over(note, self._sound.mixer):
+            note.cut = True
+        return note
+
+    def now_s(self) -> float:
+        """The clock by which gestures are timed."""
+        return self._sound.now_s()
+
+    @property
+    def rate_hz(self) -> int:
+        """Of the voices that are played now."""
+        return self._sound.rate_hz
+
+    def in_background(self, work: Callable[[], None]) -> None:
+        """Does it after what waits already; its faults are told."""
+        self._submit(self._guarded(work))
+
     def have(self, stroke: Stroke) -> bool:
         """Whether nothing needs to be loaded for it."""
         rate_hz = self._sound.rate_hz
-        return all(self._sources.has(stroke.path(source), rate_hz) for source in stroke.sources)
+        return all(self._sources.has(stroke.subject(source), rate_hz) for source in stroke.sources)
 
-    def prepare(self, *paths: Path) -> None:
+    def prepare(self, *subjects: Subject) -> None:
         """Loads presets in the background, so that a strike need not wait."""
         rate_hz = self._sound.rate_hz
-        for path in paths:
-            if not self._sources.has(path, rate_hz):
-                self._submit(self._guarded(lambda path=path: self._sources.prepare(path, rate_hz)))  # type: ignore[misc]
+        for subject in subjects:
+            if not self._sources.has(subject, rate_hz):
+                self._submit(self._guarded(lambda subject=subject: self._sources.prepare(subject, rate_hz)))  # type: ignore[misc]
 
-    def prepare_plucks(self, path: Path, plucks: Sequence[Pluck]) -> None:
+    def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
         """Computes in the background what voices of these plucks set out from; the latest wish counts."""
         rate_hz = self._sound.rate_hz
         wish = self._wished_plucks = object()
@@ -177,7 +206,7 @@ class Notes:
             for pluck in plucks:
                 for kind in ("model", "truth"):
                     if not self._closed and wish is self._wished_plucks:
-                        self._sources.begin(path, kind, rate_hz, pluck)
+                        self._sources.begin(subject, kind, rate_hz, pluck)
 
         self._submit(self._guarded(work))
 
@@ -209,9 +238,9 @@ class Notes:
         def work() -> Mapping[str, NDArray[np.float32]]:
             found = {}
             for source in stroke.sources:
-                path = stroke.path(source)
-                program = self._sources.program(path, "truth" if source == "truth" else "model", rate_hz)
-                loaded = self._sources.load(path)
+                subject = stroke.subject(source)
+                program = self._sources.program(subject, "truth" if source == "truth" else "model", rate_hz)
+                loaded = self._sources.load(subject)
                 found[source] = render_voice(
                     program, loaded.model, loaded.preset.info, stroke.pluck, stroke.ear, seconds
                 )
@@ -286,7 +315,7 @@ class Notes:
         """Where the device has changed its rate, the latest notes ring on in its new mixer."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
-        ringing = [note for note in left if note.seconds and not note.released][-MOST_CARRIED:]
+        ringing = [note for note in left if note.seconds and not (note.released or note.adopted)][-MOST_CARRIED:]
         for note in left:
             if note in ringing:
                 note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
@@ -321,11 +350,11 @@ class Notes:
         stroke, voices = note.stroke, {}
         ahead: list[AheadVoice] = []
         for source in stroke.sources:
-            path, kind = stroke.path(source), "truth" if source == "truth" else "model"
+            subject, kind = stroke.subject(source), "truth" if source == "truth" else "model"
             try:
-                program = self._sources.program(path, kind, rate_hz)
-                initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
-                model = self._sources.load(path).model if program.rendered else None
+                program = self._sources.program(subject, kind, rate_hz)
+                initial_m, begin = self._sources.begin(subject, kind, rate_hz, stroke.pluck)
+                model = self._sources.load(subject).model if program.rendered else None
             except (PresetError, ValueError):
                 if source not in stroke.others:
                     raise
@@ -340,7 +369,7 @@ class Notes:
                     model,
                     initial_m,
                     stroke.ear.weights(model.grid_points),
-                    (path, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
+                    (subject, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,
@@ -371,7 +400,8 @@ class Notes:
                 return True
             if mixer is not self._sound.mixer:
                 return False
-            note.match = self._matches.get(note.stroke.matching_key)
+            if not note.adopted:
+                note.match = self._matches.get(note.stroke.matching_key)
             self._apply_mix(note, at_once=note.from_s == 0)
             try:
                 mixer.add(*note.voices.values())
@@ -390,7 +420,7 @@ class Notes:
 
     def _apply_mix(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
-            gain = self._mix.gain(source, note.match)
+            gain = note.stroke.gain * self._mix.of(note.voices).gain(source, note.match)
             voice.set_gain(gain)
             if at_once:
                 voice.start_with_gain(gain)
@@ -430,13 +460,13 @@ class Notes:
     def _level(self, note: Note, source: str, seconds: float) -> float:
         """Root mean square of the first seconds; 0, so that it is left as it is, where it is not known."""
         stroke = note.stroke
-        path, kind = stroke.path(source), "truth" if source == "truth" else "model"
+        subject, kind = stroke.subject(source), "truth" if source == "truth" else "model"
         rate_hz = min(self._sound.rate_hz, 48_000)
-        program = self._sources.program(path, kind, rate_hz)
+        program = self._sources.program(subject, kind, rate_hz)
         if program.rendered:
             return note.voices[source].level_of_samples(seconds) if stroke.ear.pickup == "displacement" else 0.0
         mixer = Mixer(rate_hz, limited=False)
-        initial_m, begin = self._sources.begin(path, kind, rate_hz, stroke.pluck)
+        initial_m, begin = self._sources.begin(subject, kind, rate_hz, stroke.pluck)
         mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))
         sound = mixer.render(round(seconds * rate_hz))
         return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
 from app.rendering.loaded import Loaded
+from app.rendering.subject import StringOf, Subject
 from engine.pluck import Pluck
-from engine.presets import load_preset
+from engine.presets import Preset, load_preset
+from engine.presets.of_string import of_string
 from engine.sources import project
 from engine.voices import Program, model_program, truth_program
 
 KINDS = ("truth", "model")
-KEPT_PRESETS = 8  # the latest used
+KEPT_PRESETS = 24  # the latest used, each string of one counted
 KEPT_PLUCKS = 512
 
 Array = NDArray[np.float64]
@@ -29,23 +30,23 @@ class Sources:
     def __init__(self) -> None:
         self._lock = threading.Lock()  # of what is there, for a moment
         self._loading = threading.RLock()  # one after the other
-        self._presets: OrderedDict[Path, Loaded] = OrderedDict()
-        self._begins: OrderedDict[tuple[Path, str, int, Pluck], tuple[Tensor, tuple[Array, Array]]] = OrderedDict()
-        self._programs: dict[tuple[Path, str, int], Program] = {}
+        self._presets: OrderedDict[Subject, Loaded] = OrderedDict()
+        self._begins: OrderedDict[tuple[Subject, str, int, Pluck], tuple[Tensor, tuple[Array, Array]]] = OrderedDict()
+        self._programs: dict[tuple[Subject, str, int], Program] = {}
 
-    def has(self, path: Path, rate_hz: int) -> bool:
+    def has(self, subject: Subject, rate_hz: int) -> bool:
         """Whether a strike of it would not have to wait."""
         with self._lock:
-            return path in self._presets and all((path, kind, rate_hz) in self._programs for kind in KINDS)
+            return subject in self._presets and all((subject, kind, rate_hz) in self._programs for kind in KINDS)
 
-    def load(self, path: Path) -> Loaded:
+    def load(self, subject: Subject) -> Loaded:
         """Raises PresetError."""
-        if (found := self._known(path)) is not None:
+        if (found := self._known(subject)) is not None:
             return found
         with self._loading:
-            found = self._known(path) or Loaded(load_preset(path))
+            found = self._known(subject) or Loaded(self._read(subject))
             with self._lock:
-                self._presets[path] = found
+                self._presets[subject] = found
                 while len(self._presets) > KEPT_PRESETS:
                     oldest, _ = self._presets.popitem(last=False)
                     self._programs = {key: each for key, each in self._programs.items() if key[0] != oldest}
@@ -53,13 +54,18 @@ class Sources:
                         del self._begins[key]
             return found
 
-    def program(self, path: Path, kind: str, rate_hz: int) -> Program:
+    def _read(self, subject: Subject) -> Preset:
+        if not isinstance(subject, StringOf):
+            return load_preset(subject)
+        return of_string(self.load(subject.path).preset, subject.string)
+
+    def program(self, subject: Subject, kind: str, rate_hz: int) -> Program:
         """Of a preset's "model" or "truth" at a device's rate. Raises PresetError."""
-        key = (path, kind, rate_hz)
+        key = (subject, kind, rate_hz)
         if (found := self._programs.get(key)) is not None:
             return found
         with self._loading:
-            preset = self.load(path).preset
+            preset = self.load(subject).preset
             if (found := self._programs.get(key)) is None:
                 if kind == "truth":
                     found = truth_program(preset.info, rate_hz)
@@ -69,30 +75,30 @@ class Sources:
                     self._programs[key] = found
             return found
 
-    def begin(self, path: Path, kind: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+    def begin(self, subject: Subject, kind: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
         """A pluck's displacement (grid_points,) in m, and what a voice of the program sets out from; remembered."""
-        key = (path, kind, rate_hz, pluck)
+        key = (subject, kind, rate_hz, pluck)
         with self._lock:
             found = self._begins.pop(key, None)
         if found is None:
-            info = self.load(path).preset.info
+            info = self.load(subject).preset.info
             initial_m = project(pluck.displacement(info.grid_points), info.modes)
-            found = initial_m, self.program(path, kind, rate_hz).start(initial_m)
+            found = initial_m, self.program(subject, kind, rate_hz).start(initial_m)
         with self._lock:
             self._begins[key] = found
             while len(self._begins) > KEPT_PLUCKS:
                 self._begins.popitem(last=False)
         return found
 
-    def prepare(self, path: Path, rate_hz: int) -> None:
+    def prepare(self, subject: Subject, rate_hz: int) -> None:
         """Loads it with both programs. Raises PresetError."""
         for kind in KINDS:
-            self.program(path, kind, rate_hz)
+            self.program(subject, kind, rate_hz)
 
-    def _known(self, path: Path) -> Loaded | None:
+    def _known(self, subject: Subject) -> Loaded | None:
         """And used now."""
         with self._lock:
-            found = self._presets.get(path)
+            found = self._presets.get(subject)
             if found is not None:
-                self._presets.move_to_end(path)
+                self._presets.move_to_end(subject)
             return found

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from app.rendering.subject import Subject
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.voices.ear import Ear
@@ -19,18 +20,20 @@ class Stroke:
     Attributes:
         seconds: how long a model that is rendered ahead lasts at most; all others ring until they are silent.
         sources: voices that are wanted: "model", "truth", and others' names.
+        gain: of all its sources, beside what is chosen for each.
         others: paths of other presets by source name, `OTHER` and their name.
     """
 
-    preset: Path
+    preset: Subject
     pluck: Pluck
     ear: Ear
     seconds: float
     sources: tuple[str, ...]
     others: Mapping[str, Path] = field(default_factory=dict)
+    gain: float = 1.0
 
-    def path(self, source: str) -> Path:
-        """Of the preset that a source belongs to."""
+    def subject(self, source: str) -> Subject:
+        """What a source is the sound of."""
         return self.others.get(source, self.preset)
 
     @property
@@ -52,6 +55,10 @@ class Mix:
     heard: str = "model"
     matched: bool = False
     difference_gain_db: float = 0.0
+
+    def of(self, sources: Iterable[str]) -> Mix:
+        """Where what is heard is none of these, the model is."""
+        return self if self.heard in (DIFFERENCE, *sources) else replace(self, heard="model")
 
     def gain(self, source: str, match: Mapping[str, float] | None) -> float:
         """With which a voice sounds; 0: it is only kept ready."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
-from pathlib import Path
 
 import torch
 
@@ -13,6 +12,7 @@ from app.rendering.line import Line
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.strobe import Strobe
+from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Motion, Take, picture_stride
 from app.shared.vocabulary import OTHER
 from engine.metrics import ErrorSums
@@ -36,7 +36,7 @@ class Job:
     """
 
     def __init__(
-        self, request: RenderRequest, load: Callable[[Path], Loaded], listener: RenderListener, helper: Executor
+        self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
     ) -> None:
         self.request = request
         self._load, self._listener, self._helper = load, listener, helper

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from app.rendering.subject import Subject
 from app.rendering.take import Take
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
@@ -22,7 +23,7 @@ class RenderRequest:
         others: further presets whose models are rendered for the same pluck, each the source `OTHER` + its name.
     """
 
-    preset: Path
+    preset: Subject
     pluck: Pluck
     seconds: float
     ear: Ear

@@ -9,11 +9,11 @@ import threading
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 from app.rendering.job import Job
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
+from app.rendering.subject import Subject
 from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, step_back
 from engine.presets import PresetError
@@ -34,7 +34,7 @@ class RenderWorker:
     """
 
     def __init__(
-        self, listener: RenderListener, load: Callable[[Path], Loaded], hurried: Callable[[], bool] = lambda: False
+        self, listener: RenderListener, load: Callable[[Subject], Loaded], hurried: Callable[[], bool] = lambda: False
     ) -> None:
         self._listener, self._load, self._hurried = listener, load, hurried
         self._mailbox = threading.Condition()

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from app.patches.patch import Patch, PhysicalString
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
@@ -23,7 +24,15 @@ SPEED_RANGE = (0.001, 1.0)  # 1 is real time; a thousandth shows one period of a
 
 
 class Choices(BaseModel):
-    """Everything that is restored at the next start. Positions are in lengths of the string."""
+    """Everything that is restored at the next start. Positions are in lengths of the string.
+
+    Attributes:
+        string: which a preset of many is plucked as; None: its own.
+        patch: what keys play; None: they pluck the preset's own string.
+        keys: whether keys are pitches of the patch, or places on the string.
+        octave: by which the computer's keys are moved.
+        velocity: with which they strike.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -50,6 +59,11 @@ class Choices(BaseModel):
     right_view: str = "waveform"
     motion: bool = True  # of the string's picture
     envelope: bool = True
+    string: PhysicalString | None = None
+    patch: Patch | None = None
+    keys: Literal["pitch", "place"] = "pitch"
+    octave: int = Field(0, ge=-4, le=4)
+    velocity: int = Field(90, ge=1, le=127)
 
     @model_validator(mode="before")
     @classmethod
@@ -100,9 +114,11 @@ class Session:
             self.changed.emit(names)
 
     def _take(self, changes: dict[str, Any]) -> frozenset[str]:
-        """The fields that have new values then."""
+        """The fields that have new values then. Another preset is plucked as its own string, unless told."""
+        if changes.get("preset", self._choices.preset) != self._choices.preset:
+            changes = {"string": None, **changes}
         try:
-            new = Choices.model_validate({**self._choices.model_dump(), **changes})
+            new = Choices.model_validate({**dict(self._choices), **changes})
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

@@ -15,7 +15,7 @@ from typing import Any
 from app.session.choices import Choices, Session
 
 # Not what is only looked at or listened to: views, speed, volume, loop, model or truth.
-PLUCK = ("preset", "position", "amplitude_mm", "shape", "width", "seconds")
+PLUCK = ("preset", "string", "patch", "position", "amplitude_mm", "shape", "width", "seconds")
 EARS = ("listen", "listen_right", "stereo", "pickup")
 RECORDED = frozenset({*PLUCK, *EARS})
 GATHER_S = 0.5

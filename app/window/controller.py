@@ -19,6 +19,8 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from app.analysis.abx.subject import subject_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
+from app.instrument.events import Event
+from app.instrument.player import Struck
 from app.playing.chosen import mix_of
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices, Session
@@ -114,7 +116,7 @@ class Controller(QObject):
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session)
         self._connect_history()
-        self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike)
+        self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike, self._handle)
         self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
@@ -124,6 +126,7 @@ class Controller(QObject):
             self.window.notices.tell(problem)
         everything = frozenset(type(self.session.choices).model_fields)
         self.performance.choices_changed(everything)
+        self.instruments.choices_changed()
         self._choices_shown(everything)
         self._timer.start()
         window.closing.disconnect(self.sound.close)
@@ -187,6 +190,10 @@ class Controller(QObject):
         """A note of an instrument, in its thread."""
         if self._abx is None:
             self.performance.strike(choices)
+
+    def _handle(self, event: Event) -> Struck | None:
+        """An event of an instrument, in its thread."""
+        return self.performance.handle(event) if self._abx is None else None
 
     def play_or_stop(self) -> None:
         if self._abx is None:
@@ -286,6 +293,7 @@ class Controller(QObject):
 
     def _choices_changed(self, names: frozenset[str]) -> None:
         self.performance.choices_changed(names)
+        self.instruments.choices_changed()
         self._choices_shown(names)
 
     def _choices_shown(self, names: frozenset[str]) -> None:

@@ -1,14 +1,18 @@
-"""What plays the string besides the mouse: the computer's keys and MIDI, connected to session and window."""
+"""What plays besides the mouse: the computer's keys, MIDI and the keys on screen, connected to session and window."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 
-from app.playing.keyboard import KeyPress, Reach, play
+from app.instrument.events import Event, NoteOff, NoteOn
+from app.instrument.player import Struck
+from app.patches.patch import PhysicalString
+from app.playing.keyboard import LOWEST_C, KeyPress, Reach, play, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.presets.library import Library
 from app.session.choices import Choices, Session
@@ -16,12 +20,18 @@ from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
 
+HIGHEST_KEY = 127
+
 
 class Instruments(QObject):
     """`played` after a note was struck and the session knows it; `told` is for the user.
 
-    A note goes straight to `strike`, in the thread of its gesture; the session, and with it the window, is told when
+    A note goes straight to the sound, in the thread of its gesture; the session, and with it the window, is told when
     the window has time.
+
+    Args:
+        strike: plucks the string as it is chosen.
+        handle: plays an event through the patch; what was struck.
     """
 
     played = Signal()
@@ -36,18 +46,26 @@ class Instruments(QObject):
         library: Library,
         midi: MidiChoices,
         strike: Callable[[Choices], object],
+        handle: Callable[[Event], Struck | None],
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
-        self._strike = strike
+        self._strike, self._handle = strike, handle
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # of notes, and not in the session yet
+        self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
         self._keys.pressed.connect(self._press)
+        self._keys.released.connect(self._release)
         self.midi = MidiControl(
-            midi, lambda: self.reach, lambda: library.names, lambda changes: self.perform(changes, True), self
+            midi,
+            lambda: self.reach,
+            lambda: library.names,
+            lambda changes: self.perform(changes, True),
+            self.play,
+            self,
         )
         self.midi.performed.connect(lambda changes: self.perform(changes, False))
         self.midi.told.connect(self.told)
@@ -65,6 +83,35 @@ class Instruments(QObject):
         """Where and how hard instruments pluck: what the preset was trained on."""
         entry = self._library.find(self._session.choices.preset)
         return Reach.of(entry.info if entry else None)
+
+    @property
+    def plays_pitches(self) -> bool:
+        """Whether the computer's keys are a piano's."""
+        choices = self._session.choices
+        return choices.keys == "pitch" and choices.patch is not None
+
+    def choices_changed(self) -> None:
+        self._keys.piano = self.plays_pitches
+
+    def play(self, event: Event) -> bool:
+        """An event through the patch; False where there is none. Any thread."""
+        choices = self._session.choices
+        if choices.patch is None:
+            return False
+        struck = self._handle(event)
+        if struck is not None:
+            changes = {
+                "preset": choices.patch.preset,
+                "string": PhysicalString(**asdict(struck.key.string.parameters)),
+                "position": struck.pluck.position,
+                "amplitude_mm": struck.pluck.amplitude_mm,
+                "shape": struck.pluck.shape,
+                "width": struck.pluck.width,
+            }
+            with self._lock:
+                self._told = {**self._told, **changes}
+            self._struck.emit(changes)
+        return True
 
     def perform(self, changes: dict[str, Any], plucks: bool) -> None:
         """New values of `Choices`, and a pluck. Any thread."""
@@ -86,6 +133,24 @@ class Instruments(QObject):
             self.played.emit()
 
     def _press(self, press: KeyPress) -> None:
+        if self.plays_pitches:
+            self._press_piano(press)
+            return
         played = play(press, self.reach, self._session.choices.amplitude_mm)
         if played is not None:
             self.perform(dict(played.changes), played.plucks)
+
+    def _press_piano(self, press: KeyPress) -> None:
+        choices, semitone = self._session.choices, semitone_of(press)
+        if semitone is not None:
+            key = LOWEST_C + 12 * choices.octave + semitone
+            if 0 <= key <= HIGHEST_KEY:
+                self._down[press] = key
+                self.play(NoteOn(key, choices.velocity))
+        elif (turned := turn(press, choices.octave, choices.velocity)) is not None:
+            self._session.update(octave=turned[0], velocity=turned[1])
+
+    def _release(self, press: KeyPress) -> None:
+        key = self._down.pop(press, None)
+        if key is not None:
+            self.play(NoteOff(key))

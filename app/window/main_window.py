@@ -39,7 +39,7 @@ from engine.kernels import cache  # and not the compiler
 KEYS = (  # (key, name of the signal, what it does)
     ("Space", "play_asked", "play from the pluck, or stop"),
     ("Return", "pluck_asked", "pluck"),
-    ("X", "switch_asked", "switch between A and B at the playhead"),
+    ("B", "switch_asked", "switch between A and B at the playhead"),
     ("Esc", "all_modes_asked", "play all modes again"),
     ("Ctrl+L", "loop_asked", "loop"),
     ("PgUp", "previous_asked", "previous preset"),
@@ -48,7 +48,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
     ("Ctrl+Shift+Z", "redo_asked", "redo"),
     ("M", "motion_asked", "show or hide the string's motion"),
-    ("E", "envelope_asked", "show or hide the envelope of the motion"),
+    ("N", "envelope_asked", "show or hide the envelope of the motion"),
     ("Ctrl+E", "export_asked", "export WAV"),
     ("Ctrl+T", "abx_asked", "blind listening test (ABX)"),
     ("Ctrl+,", "audio_asked", "audio settings"),
@@ -64,10 +64,12 @@ ROOMY = 1240  # below, the controls stand closer
 FACTS_HEIGHT = 20
 TITLE_BAR = 40  # at most; how high it is, is known too late
 
-PLAYED_KEYS = (  # see `app/keyboard.py`
-    ("A S D F G H J K L ;", "pluck at ten positions, from left to right"),
-    ("1 … 9", "amplitude, from softest to loudest (not while a knob has the keyboard focus)"),
+PLAYED_KEYS = (  # see `app/playing/keyboard.py`
+    ("A S D F …  W E …", "play notes, as on a piano: white keys below, black keys above"),
+    ("Z   X", "an octave lower, higher"),
+    ("1 … 9", "velocity, from softest to loudest (not while a knob has the keyboard focus)"),
     ("C   V", "softer, harder"),
+    ("A S D F G H J K L ;", "without a patch, or where keys are places: pluck at ten positions, from left to right"),
 )
 
 

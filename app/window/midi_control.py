@@ -12,8 +12,9 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
+from app.instrument.events import Controller, Event, NoteOn
 from app.playing.keyboard import Reach
-from app.playing.midi import TURNED, Control, Message, MidiChoices, Note, meaning_of
+from app.playing.midi import TURNED, MidiChoices, meaning_of
 from app.playing.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
 from app.views.dialogs.midi_dialog import MidiDialog
 
@@ -23,6 +24,7 @@ class MidiControl(QObject):
 
     Args:
         play: plucks with new values of `Choices`; called in mido's thread.
+        handle: plays an event as a pitch; False where there is no patch to play. Called in mido's thread.
 
     Attributes:
         choices: what is to be remembered.
@@ -38,6 +40,7 @@ class MidiControl(QObject):
         reach: Callable[[], Reach],
         presets: Callable[[], list[str]],
         play: Callable[[dict[str, Any]], None],
+        handle: Callable[[Event], bool],
         parent: QObject | None = None,
         load: Callable[[], Backend] = load_backend,
     ) -> None:
@@ -45,7 +48,7 @@ class MidiControl(QObject):
         self.choices = choices
         self._reach = reach
         self._presets = presets
-        self._play = play
+        self._play, self._handle = play, handle
         self._learning: str | None = None  # the field that the next controller is taught
         self._dialog: MidiDialog | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
@@ -117,18 +120,21 @@ class MidiControl(QObject):
 
     # Messages
 
-    def _receive(self, message: Message) -> None:
-        """In mido's thread. A note is played at once; all else waits for the window."""
-        if isinstance(message, Note):
-            meaning = meaning_of(message, self.choices, self._reach(), self._presets())
-            self._play(meaning.changes)
-        else:
-            self._received.emit(message)
+    def _receive(self, event: Event) -> None:
+        """In mido's thread. What a patch plays is played at once; a controller that was taught waits."""
+        if isinstance(event, Controller) and (
+            self._learning is not None or event.number in self.choices.controllers.values()
+        ):
+            self._received.emit(event)
+        elif self.choices.notes == "pitch" and self._handle(event):
+            return
+        elif isinstance(event, NoteOn):
+            self._play(meaning_of(event, self.choices, self._reach(), self._presets()).changes)
 
-    def _answer(self, message: Message) -> None:
-        if self._learning is not None and isinstance(message, Control):
+    def _answer(self, event: Event) -> None:
+        if self._learning is not None and isinstance(event, Controller):
             field, self._learning = self._learning, None
-            self._remember(self.choices.learned(field, message.controller))
-        meaning = meaning_of(message, self.choices, self._reach(), self._presets())
+            self._remember(self.choices.learned(field, event.number))
+        meaning = meaning_of(event, self.choices, self._reach(), self._presets())
         if meaning.changes:
             self.performed.emit(meaning.changes)

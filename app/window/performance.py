@@ -9,20 +9,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
-from app.playing.chosen import mix_of, render_request, stroke_of
+from app.instrument.events import Event
+from app.instrument.player import Struck
+from app.playing.chosen import mix_of, render_request, stroke_of, subject_of
 from app.playing.keyboard import PLACES, Reach
+from app.playing.live import Live
 from app.playing.notes import Note, Notes
 from app.playing.sources import Sources
 from app.playing.stroke import Stroke
 from app.presets.library import Library, PresetEntry
 from app.presets.words import percent
 from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices, Session
 from app.session.ears import heard_ear
 from app.session.silence import why_ran_away
@@ -31,17 +36,24 @@ from app.window.panels import Panel
 from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
+from engine.resonators.string import StringParameters
 
-MotionKey = tuple[str, Pluck, float]  # the preset's name, the pluck, how long it is
+MotionKey = tuple[str, StringParameters, Pluck, float]  # the preset's name, its string, the pluck, how long it is
 LOOP_AHEAD_S = 0.5  # the next turn of a loop is handed over so long before it begins
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
-KEY_FIELDS = {"preset", "amplitude_mm", "shape", "width"}  # what the keys' plucks depend on beside their places
+KEY_FIELDS = {
+    "preset",
+    "string",
+    "amplitude_mm",
+    "shape",
+    "width",
+}  # what the keys' plucks depend on beside their places
 MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
 
 def motion_key(take: Take) -> MotionKey:
     """What tells the motion of a take from others."""
-    return take.preset_name, take.pluck, take.seconds
+    return take.preset_name, take.info.string, take.pluck, take.seconds
 
 
 @dataclass
@@ -75,6 +87,7 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, mail.refused.emit)
+        self.live = Live(self.notes, self._sources, self._path_of, mail.refused.emit)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
 
     @property
@@ -141,6 +154,14 @@ class Performance(QObject):
         self._latest = note
         return note
 
+    def handle(self, event: Event) -> Struck | None:
+        """Plays an event through the patch; what was struck. From any thread; the picture is told later."""
+        made = self.live.handle(event)
+        if made is None:
+            return None
+        struck, self._latest = made
+        return struck
+
     def pluck(self) -> None:
         """Lets the string go as it is chosen."""
         self.strike(self._session.choices)
@@ -166,6 +187,7 @@ class Performance(QObject):
         self._forget_turn()
         self._shown.parked_s = self.position_s
         self._shown.note = None
+        self.live.stop()
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
@@ -195,11 +217,16 @@ class Performance(QObject):
             self.notes.set_mix(mix_of(choices))
         if names & EAR_FIELDS:
             self.notes.listen(heard_ear(choices))
+        if "patch" in names:
+            self.live.set_patch(choices.patch, heard_ear(choices))
+        elif names & EAR_FIELDS:
+            self.live.listen(heard_ear(choices))
+        self.live.seconds = choices.seconds
         if names & KEY_FIELDS and entry is not None:
             reach = Reach.of(entry.info)
             places = (reach.place(number / (PLACES - 1)) for number in range(PLACES))
             plucks = [replace(choices.pluck, position=place) for place in places]
-            self.notes.prepare_plucks(entry.path, plucks)
+            self.notes.prepare_plucks(subject_of(choices, entry.path), plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
         if entry is not None and render_request(choices, entry.path, self._library) != self._asked:
@@ -235,7 +262,7 @@ class Performance(QObject):
         latest = self._latest
         if latest is None or not latest.waits_s:
             return ""
-        entry = self._library.find(latest.stroke.preset.stem)
+        entry = self._library.find(path_of(latest.stroke.preset).stem)
         name = entry.info.model.upper() if entry else "model"
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
@@ -312,10 +339,17 @@ class Performance(QObject):
 
     def _is_of(self, note: Note, choices: Choices) -> bool:
         entry = self._library.find(choices.preset)
-        return entry is not None and (note.stroke.preset, note.stroke.pluck) == (entry.path, choices.pluck)
+        if entry is None or note.stroke.pluck != choices.pluck or path_of(note.stroke.preset) != entry.path:
+            return False
+        return string_of(note.stroke.preset) == string_of(subject_of(choices, entry.path))
 
     def _key(self, choices: Choices) -> MotionKey | None:
         entry = self._library.find(choices.preset)
         if entry is None:
             return None
-        return entry.name, choices.pluck, choices.seconds
+        string = choices.string.parameters if choices.string is not None else entry.info.string
+        return entry.name, string, choices.pluck, choices.seconds
+
+    def _path_of(self, preset: str) -> Path | None:
+        entry = self._library.find(preset)
+        return None if entry is None else entry.path

@@ -19,6 +19,7 @@ from app.views.controls.parts import combo_box
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
+    ("Play pitches of the patch", "pitch"),
     ("Set pluck position", "position"),
     ("Select preset", "preset"),
 )
@@ -39,7 +40,7 @@ class MidiDialog(QDialog):
         self._inputs = combo_box("MIDI input", [])
         self._inputs.activated.connect(lambda row: self.port_chosen.emit(self._inputs.itemData(row)))
         self._notes = combo_box("Function of notes", NOTE_MODES)
-        self._notes.setToolTip("Velocity always sets the amplitude")
+        self._notes.setToolTip("Velocity always sets how hard the string is plucked")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
         self._problem = Label()
         self._problem.setObjectName("warning")

@@ -1,0 +1,163 @@
+"""A patch that is played in the window: events of keys and MIDI become notes, each in its gesture's thread."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from app.instrument.events import Event, NoteOn, PatchTurned, TimedEvent
+from app.instrument.player import SOURCES, Player, Struck
+from app.patches.patch import Patch
+from app.playing.notes import Note, Notes
+from app.playing.sources import Sources
+from app.playing.stroke import Stroke
+from app.rendering.subject import StringOf
+from engine.presets import PresetError
+from engine.voices import Ear
+
+SEEN_DB = 70.0  # below full scale a string is seen at rest
+LONGEST_RECORDING = 100_000  # events
+
+
+class Live:
+    """Every public method may be called from any thread.
+
+    Args:
+        find: the path of a preset by its name; None where there is none.
+        report: hears of what cannot be played: a message and its details.
+    """
+
+    def __init__(
+        self, notes: Notes, sources: Sources, find: Callable[[str], Path | None], report: Callable[[str, str], None]
+    ) -> None:
+        self._notes, self._sources, self._find, self._report = notes, sources, find, report
+        self._lock = threading.RLock()
+        self._player: Player | None = None
+        self._path = Path()
+        self._ear: Ear | None = None
+        self._struck_s = 0.0
+        self._made: tuple[Struck, Note] | None = None
+        self._recorded: list[TimedEvent] | None = None
+        self._recording_began_s = 0.0
+        self.seconds = 4.0  # that a picture of a note lasts
+
+    @property
+    def ready(self) -> bool:
+        """Whether a key would sound."""
+        return self._player is not None
+
+    def set_patch(self, patch: Patch | None, ear: Ear) -> None:
+        """What keys play from now on, and where it is heard; strings that ring take it over."""
+        with self._lock:
+            self._ear = ear
+            player = self._player
+            if patch is None:
+                self._player = None
+                return
+            self._note_down(PatchTurned(patch))
+            if player is not None and player.patch.preset == patch.preset:
+                try:
+                    player.set_patch(patch)
+                    player.listen(ear)
+                except ValueError as error:
+                    self._report(str(error), "")
+                    return
+                self._notes.in_background(player.prepare)
+                return
+            self._player = None
+        self._notes.in_background(lambda: self._begin(patch))
+
+    def listen(self, ear: Ear) -> None:
+        """Keys are heard from there."""
+        with self._lock:
+            self._ear, player = ear, self._player
+        if player is not None:
+            player.listen(ear)
+            self._notes.in_background(player.prepare)
+
+    def handle(self, event: Event) -> tuple[Struck, Note] | None:
+        """Plays an event at once; what was struck, if anything."""
+        struck_s = self._notes.now_s()
+        with self._lock:
+            player = self._player
+            if player is None:
+                return None
+            if player.rate_hz != self._notes.rate_hz:
+                player.set_rate(self._notes.rate_hz)
+            self._struck_s, self._made = struck_s, None
+            self._note_down(event)
+            try:
+                player.handle(event)
+            except (ValueError, PresetError) as error:
+                self._report(str(error), "")
+            return self._made
+
+    def stop(self) -> None:
+        """All strings fade out."""
+        with self._lock:
+            if self._player is not None:
+                self._player.stop()
+
+    def sounding(self) -> dict[int, float]:
+        """Keys whose strings ring, and how loud, 0 … 1."""
+        player = self._player
+        if player is None:
+            return {}
+        found: dict[int, float] = {}
+        for struck in player.sounding():
+            level = max(voice.level_db for voice in struck.voices.values())
+            share = min(max(1 + level / SEEN_DB, 0.0), 1.0)
+            found[struck.event.key] = max(found.get(struck.event.key, 0.0), share)
+        return found
+
+    # Recording
+
+    @property
+    def recording(self) -> bool:
+        return self._recorded is not None
+
+    def begin_recording(self) -> None:
+        """Of what is played from now on; what was recorded before is forgotten."""
+        with self._lock:
+            self._recorded, self._recording_began_s = [], time.monotonic()
+            if self._player is not None:
+                self._note_down(PatchTurned(self._player.patch))
+
+    def end_recording(self) -> list[TimedEvent]:
+        """What was played, from its first event on; empty where no key was."""
+        with self._lock:
+            events, self._recorded = self._recorded or [], None
+        first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
+        if first is None:
+            return []
+        return [TimedEvent(max(0.0, each.time_s - first), each.event) for each in events]
+
+    def _note_down(self, event: Event) -> None:
+        if self._recorded is not None and len(self._recorded) < LONGEST_RECORDING:
+            self._recorded.append(TimedEvent(time.monotonic() - self._recording_began_s, event))
+
+    # How it is done
+
+    def _begin(self, patch: Patch) -> None:
+        path = self._find(patch.preset)
+        if path is None:
+            self._report(f"{patch.name} is played by the preset {patch.preset}, which was not found.", "")
+            return
+        try:
+            player = Player(patch, self._sources.load(path).preset, self._notes.rate_hz, self._deliver, SOURCES)
+        except (ValueError, PresetError) as error:
+            self._report(str(error), "")
+            return
+        with self._lock:
+            if self._ear is not None:
+                player.listen(self._ear)
+            self._path, self._player = path, player
+        player.prepare()
+
+    def _deliver(self, struck: Struck) -> None:
+        """In the event's thread, within `handle`."""
+        subject = StringOf(self._path, struck.key.string.parameters)
+        stroke = Stroke(subject, struck.pluck, struck.ear, self.seconds, SOURCES, gain=struck.gain)
+        self._made = struck, self._notes.adopt(stroke, struck.voices, self._struck_s)
