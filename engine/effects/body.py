@@ -9,7 +9,7 @@ S. J. Richardson, "Acoustical parameters for the characterisation of classical g
 Above them single modes do not matter, only their density and loss do, as in J. Woodhouse, "On the synthesis of guitar
 plucks", Acta Acustica 90 (2004) 928. The density is that of a thin orthotropic plate, √3 S / (h √(c_x c_y)) a hertz
 (L. Cremer, M. Heckl, "Structure-Borne Sound"), with a spruce top's area, thickness and speeds of waves; spacings are
-drawn from Rayleigh's distribution (neighbours avoid one another), amplitudes from Gauss's.
+drawn from Rayleigh's distribution (neighbours avoid one another), signs at random.
 """
 
 from __future__ import annotations
@@ -68,16 +68,16 @@ class Wood:
 
 GUITAR = Wood(
     lowest=(
-        Mode(100.0, 18, 5.0),  # the air in the hole with the top
-        Mode(195.0, 25, 8.0),  # the top against the air
-        Mode(235.0, 30, 3.0, -1),  # the back
-        Mode(280.0, 30, 0.0),  # the top's halves against one another: it radiates little
-        Mode(395.0, 30, 5.0, -1),  # the top along its length
-        Mode(460.0, 35, 4.0),
+        Mode(100.0, 18, 4.0),  # the air in the hole with the top
+        Mode(195.0, 25, 6.0, -1),  # the top against the air
+        Mode(235.0, 30, 2.0),  # the back
+        Mode(280.0, 30, 0.0, -1),  # the top's halves against one another: it radiates little
+        Mode(395.0, 30, 4.0),  # the top along its length
+        Mode(460.0, 30, 3.0, -1),
     ),
-    plate=Plate(0.1, 0.0025, (5_200.0, 1_400.0), 35, 2_500.0),
+    plate=Plate(0.1, 0.0025, (5_200.0, 1_400.0), 30, 2_500.0),
     seconds=0.35,
-    seed=1,
+    seed=49,  # of 300 the most even over the keys E2 to C6, body alone and mixed
 )
 BODIES: Mapping[str, Wood] = {"guitar": GUITAR}
 SIZE = (0.5, 2.0)
@@ -141,7 +141,7 @@ def modes_of(wood: Wood, size: float, highest_hz: float) -> tuple[NDArray[np.flo
     # A mode a exp(−σt) sin ωt has its peak at a/2σ, and the power a²/8σ over frequency: n of them a hertz are n a²/8σ
     lowest = [mode.sign * 10 ** (mode.peak_db / 20) for mode in wood.lowest] * (2 * decay[: len(wood.lowest)])
     falling = 1 / np.sqrt(1 + (higher_hz / plate.bright_hz) ** 2)
-    higher = draw.standard_normal(count) * falling * np.sqrt(8 * decay[len(wood.lowest) :] * spacing_hz)
+    higher = draw.choice((-1.0, 1.0), count) * falling * np.sqrt(8 * decay[len(wood.lowest) :] * spacing_hz)
     frequency_hz, decay = frequency_hz / size, decay / size
     kept = frequency_hz < highest_hz
     return frequency_hz[kept], decay[kept], (np.concatenate([lowest, higher]) / size)[kept]

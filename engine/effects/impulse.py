@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from engine import bounds
 
-LOUDNESS_HZ = (80.0, 8_000.0)  # of the noise, with equal power in each octave, that shall keep its level
+LOUDNESS_HZ = (80.0, 3_000.0)  # of the noise that shall keep its level: most of what a plucked string has
 PEAK = (1e-6, 1e6)
 LARGEST_GAIN = 1e3  # at any frequency, of a response that is as loud as what it is given
 FADE_SHARE = 0.1  # of a response that is cut: its end
@@ -87,7 +87,7 @@ def faded(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def as_loud(samples: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
-    """The response times a factor: pink noise of `LOUDNESS_HZ` keeps its power, in the mean of both channels."""
+    """The response times a factor: noise of equal power in each octave keeps it, in the mean of both channels."""
     spectrum = np.fft.rfft(samples, room_for(max(len(samples), rate_hz // 4)), axis=0)
     frequency_hz = np.linspace(0.0, rate_hz / 2, len(spectrum))
     heard = (frequency_hz >= LOUDNESS_HZ[0]) & (frequency_hz <= LOUDNESS_HZ[1])

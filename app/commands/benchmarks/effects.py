@@ -6,6 +6,7 @@ place in two of the convolver's windows, by the median over all of them: other b
 
 from __future__ import annotations
 
+import itertools
 import statistics
 import time
 from collections.abc import Callable
@@ -30,6 +31,7 @@ CHOICES = {
     "body, room of 1.5 s": Effects(Body(0.8), Room(0.2, 1.5)),
     "body, room of 3 s": Effects(Body(0.8), Room(0.2, 3.0)),
 }
+_NEW = itertools.count(1)
 EXCHANGED = "body, room of 1.5 s"
 
 
@@ -75,7 +77,7 @@ def measure(report: Callable[[float, str], None]) -> EffectsBenchmark:
 def _cost(name: str, effects: Effects, exchanged: bool) -> EffectsCost:
     empty_us = float(np.median(_quanta_us(None, False)))
     quanta_us = _quanta_us(effects, exchanged) - empty_us
-    at_rest_us = np.median(_quanta_us(effects, False, sounding=False)) - empty_us
+    rest_us, nothing_us = (np.median(_quanta_us(choice, False, sounding=False)) for choice in (effects, None))
     quantum_us = 1e6 * at.QUANTUM / RATE_HZ
     period = 2 * at.WINDOW_QUANTA  # of an exchange: it is prepared in one window and fades in the next
     places = np.median(quanta_us[: len(quanta_us) // period * period].reshape(-1, period), axis=0)
@@ -84,7 +86,7 @@ def _cost(name: str, effects: Effects, exchanged: bool) -> EffectsCost:
         name,
         effects.tail_s(RATE_HZ),
         float(np.mean(places)) / quantum_us,
-        float(at_rest_us) / quantum_us,
+        float(rest_us - nothing_us) / quantum_us,
         float(places.max()),
         quantum_us,
         set_ms,
@@ -116,9 +118,10 @@ def _setting_ms(effects: Effects) -> tuple[float, float]:
     mixer = Mixer(RATE_HZ)
     first_ms: list[float] = []
     again_ms: list[float] = []
-    for number in range(1, REPEATS + 1):
-        body = effects.body and replace(effects.body, size=1 + number / 1000)
-        room = effects.room and replace(effects.room, t60_s=effects.room.t60_s - number / 1000)
+    for _ in range(REPEATS):
+        new = next(_NEW) / 10_000
+        body = effects.body and replace(effects.body, size=1 + new)
+        room = effects.room and replace(effects.room, t60_s=effects.room.t60_s - new)
         for times_ms in (first_ms, again_ms):
             began_s = time.thread_time()
             mixer.set_effects(Effects(body, room))
