@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from engine.effects.body import Body
 from engine.effects.impulse import as_loud, convolved
 from engine.effects.room import Room
-from engine.kernels import layout as at
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,9 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
     Give silence after the sound where the end shall ring out, `Effects.tail_s`. Samples that are no numbers, and
     those too large or too small to be sound, are taken as silence, as the mixer does.
     """
-    from scipy.signal import oaconvolve  # which takes the better part of a second
+    from scipy.signal import oaconvolve  # which takes the better part of a second to load, as Numba does
+
+    from engine.kernels import layout as at
 
     stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
     if effects is None or effects.neutral or not len(stereo):
