@@ -19,6 +19,7 @@ LARGEST_PRESET_BYTES = 64 * 2**20
 LARGEST_HEADER_BYTES = 2**20  # of safetensors: names, shapes and metadata
 LARGEST_TEXT_BYTES = 2**20  # of JSON and TOML
 LARGEST_TABLE_BYTES = 64 * 2**20  # of CSV
+LARGEST_IMPULSE_BYTES = 64 * 2**20  # of an impulse response in a sound file
 DEEPEST_NESTING = 32
 LONGEST_STRING = 10_000  # characters of one value
 MOST_ENTRIES = 1_000  # of one list
@@ -60,6 +61,11 @@ MOST_NUMBERS_A_SECOND = 100_000_000  # grid points times rate
 MOST_SUBSTEPS = 1_024  # of the truth in a sample
 MOST_FLOWS = 250_000  # modes times kinds of sub-steps: 64 MB of the truth's tables
 SUBSTEPS_IN_A_PERIOD = 36  # of the highest mode; see `default_substeps`
+
+# Impulse responses
+LONGEST_IMPULSE_S = 3.0
+IMPULSE_RATE_HZ = (8_000, 384_000)
+MOST_IMPULSE_CHANNELS = 2
 
 # Work
 MOST_RUNS = 2_000  # of a plan

@@ -1,4 +1,4 @@
-"""bench solver, render, voices, take, train, app, play, soak: what the program costs here."""
+"""bench solver, render, voices, effects, take, train, app, play, soak: what the program costs here."""
 
 from __future__ import annotations
 
@@ -131,6 +131,34 @@ def voices(json: Json = False) -> None:
         f"targets: {bench.MODEL_VOICES} model voices at {bench.MODEL_SHARE:.0%} of a core,"
         f" {bench.TRUTH_VOICES} truth voices at {bench.TRUTH_SHARE:.0%} and an error of {bench.TRUTH_ERROR:g} at most"
     )
+
+
+@bench.command()
+def effects(json: Json = False) -> None:
+    """What body and room cost: shares of a core, the dearest quantum, and what it takes to set them."""
+    from app.commands.benchmarks.effects import measure
+
+    with progress("bench effects") as report:
+        found = measure(report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    rows = [
+        (
+            cost.name,
+            f"{cost.response_s:.2f}",
+            f"{100 * cost.share:.2f}",
+            f"{100 * cost.at_rest:.2f}",
+            f"{cost.worst_us:.0f}",
+            f"{100 * cost.worst_us / cost.quantum_us:.1f}",
+            f"{cost.first_ms:.0f}",
+            f"{cost.set_ms:.0f}",
+        )
+        for cost in found.effects
+    ]
+    costs = ("of a core, %", "at rest, %", "worst quantum, µs", "of it, %", "first set, ms", "set again, ms")
+    print_table(("effects", "s", *costs), rows)
 
 
 @bench.command()

@@ -14,6 +14,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from app.shared.vocabulary import Pickup as PickupKind
 from engine import bounds
+from engine.effects.body import SIZE
+from engine.effects.room import T60_S
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
 if TYPE_CHECKING:
@@ -256,14 +258,14 @@ class Body(_Value):
 
     name: Reference = ""
     mix: Share = 0.5
-    size: Annotated[float, _number(0.25, 4)] = 1.0
+    size: Annotated[float, _number(*SIZE)] = 1.0
 
 
 class Room(_Value):
     """How much is heard of the room, and its reverberation time."""
 
     mix: Share = 0.0
-    t60_s: Annotated[float, _number(0.1, 20)] = 1.2
+    t60_s: Annotated[float, _number(*T60_S)] = 1.2
 
 
 class Target(_Value):

@@ -6,8 +6,10 @@
     truth      a voice of the solved string
     rendered   a voice that reads samples which somebody else renders
     voice      what all voices share: listening points, pick-up, gain, silence
+    fourier    a transform without memory of its own
+    convolver  the sum of all voices through an impulse response: body and room
     limiter    the safety limiter, which looks ahead
-    mixer      the sum of all voices, volume, limiter, meters; the device's callback
+    mixer      the sum of all voices, effects, volume, limiter, meters; the device's callback
     cache      where they are kept once they are compiled
     warm       compiles, or loads, all of them
 

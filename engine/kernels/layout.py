@@ -206,6 +206,10 @@ M_CHANNELS = 21  # W of the device, 1 or 2
 M_SMOOTHING = 22  # R what is left a frame of a change of volume
 M_OVERRUNS = 23  # W voices that were refused because all places were taken
 M_LIMITING = 24  # W whether the limiter is at work: not where a file is made
+M_CONVOLVER = 25  # W address of its memory, where there are effects; it stays
+M_EFFECTS = 26  # W address of the impulse response that is wanted; 0: none
+M_EFFECTS_NOW = 27  # W of the one that is heard
+M_EFFECTS_NEXT = 28  # W of the one that is being faded to; 0: none is, or to none
 M_VOICES = 32  # W addresses
 M_RING = M_VOICES + MOST_VOICES  # W addresses
 M_GAP_LIST = M_RING + RING  # R
@@ -221,3 +225,40 @@ MOST_MODES = 512
 SCRATCH_ROWS = 40
 SCRATCH_SLOTS = SCRATCH_ROWS * MOST_MODES + 4 * QUANTUM * MOST_MODES
 MIXER_SLOTS = M_SCRATCH + SCRATCH_SLOTS
+
+# An impulse response for the convolver: then its spectra, (early, channels, 2, QUANTUM + 1) and (late, channels, 2,
+# WINDOW + 1), real parts before imaginary ones, over the length of their transforms
+WINDOW = 1024  # frames of a late partition; QUANTUM times a power of 4
+WINDOW_QUANTA = WINDOW // QUANTUM
+LARGEST = 1e6  # of its input, times full scale: beyond it, or where it is no number, a frame is taken as silence
+SMALLEST = 1e-20  # and below it as well: what dies away comes to an end, and never is denormal
+EARLY = 2 * WINDOW_QUANTA  # partitions of a quantum each; what is later can wait for a window to be computed
+I_CHANNELS = 0  # W 1 or 2
+I_EARLY = 1  # W partitions
+I_LATE = 2  # W partitions
+I_HEADER = 4
+
+# Slots of a convolver: the input's spectra, and two lanes, of the response that is heard and of the next one
+C_CAPACITY = 0  # W late partitions, at most
+C_FADE_WINDOWS = 1  # W that a change of the response takes
+C_AWAKE = 2  # W whether there is any input, or an echo of it
+C_QUIET = 3  # W quanta without input
+C_PHASE = 4  # W the quantum of its window
+C_WINDOWS = 5  # W that have begun since it woke
+C_LANE = 6  # W 0 or 1: of the response that is heard
+C_STEP = 7  # W of a change: the window in which it is prepared, 0, and those in which it fades; -1: none
+C_EARLY_PLACE = 8  # W of the latest spectrum in its ring
+C_EARLY_FILLED = 9  # W spectra since it woke, at most EARLY
+C_LATE_PLACE = 10  # W
+C_LATE_FILLED = 11  # W
+C_HALF = 12  # W which half of what was computed is given now
+C_COSINES = 16  # R (2 WINDOW,)
+C_SINES = C_COSINES + 2 * WINDOW
+C_EARLY_INPUT = C_SINES + 2 * WINDOW  # R (2, 2 QUANTUM)
+C_LATE_INPUT = C_EARLY_INPUT + 4 * QUANTUM  # R (2, 2 WINDOW)
+C_WORK = C_LATE_INPUT + 4 * WINDOW  # R (4, 2 WINDOW)
+C_SUMS = C_WORK + 8 * WINDOW  # R (3, 2, 2, WINDOW + 1): a window's spectrum of either lane, a quantum's
+C_GIVEN = C_SUMS + 12 * (WINDOW + 1)  # R (2 lanes, 2 halves, 2, WINDOW)
+C_WET = C_GIVEN + 8 * WINDOW  # R (2 lanes, 2, QUANTUM)
+C_EARLY = C_WET + 4 * QUANTUM  # R (EARLY, 2, 2, QUANTUM + 1)
+C_LATE = C_EARLY + EARLY * 4 * (QUANTUM + 1)  # R (capacity, 2, 2, WINDOW + 1)

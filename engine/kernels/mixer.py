@@ -13,6 +13,7 @@ from numba import carray, cfunc, njit, types
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
 from engine.kernels.voice import add, note_gap, take_over
@@ -70,6 +71,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
             kept += 1
     fence()
     counts[at.M_ACTIVE] = kept
+    convolve(mixer)
     _finish(mixer)
 
 

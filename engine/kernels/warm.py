@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from engine.effects import Effects, Room
 from engine.kernels import cache, layout
 from engine.models import StringModel, build_model
 from engine.models.base import Physics
@@ -63,6 +64,7 @@ def voices() -> None:
             voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
             _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
+    Mixer(RATE_HZ).set_effects(Effects(room=Room()))
 
 
 def models() -> None:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.effects import Effects
+from engine.effects.partitions import convolver, partitioned
 from engine.kernels import layout as at
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.derivative import differentiator_taps
@@ -42,6 +44,10 @@ class Mixer:
         self._lock = threading.Lock()
         self._voices: list[Voice] = []  # handed over and not over yet: their memory is in use
         self._gaps_read = 0
+        self._effects_lock = threading.Lock()  # not the voices': a key never waits for a room
+        self._effects = Effects()
+        self._convolver: NDArray[np.float64] | None = None
+        self._impulses: dict[int, NDArray[np.float64]] = {}  # by address: those that may be in use
         memory[at.M_RATE] = rate_hz
         counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
         memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
@@ -81,10 +87,42 @@ class Mixer:
                 voice.refuse()
             counts[at.M_PUSHED] = pushed + min(len(voices), room)
 
+    def set_effects(self, effects: Effects | None) -> None:
+        """All voices sound through these from now on: body and room, before the volume. Any thread.
+
+        What has been played rings on in them. They are faded to within three windows of the convolver (64 ms at
+        48 kHz, of which the last is the fade), at once where nothing has been rendered yet. It takes the caller some
+        milliseconds, and tens where a body or a room has not been in use before.
+        """
+        from engine.kernels.convolver import publish
+
+        effects = effects or Effects()
+        with self._effects_lock:
+            if effects == self._effects:
+                return
+            address = 0
+            if not effects.neutral:
+                if self._convolver is None:
+                    self._convolver = convolver(self.rate_hz)
+                memory = partitioned(effects.impulse(self.rate_hz))
+                address = int(memory.ctypes.data)
+                self._impulses[address] = memory
+            if self._convolver is not None:
+                publish(self.memory, self._convolver.ctypes.data, address)
+            self._effects = effects
+            self._forget_impulses()
+
+    def _forget_impulses(self) -> None:
+        """Frees those that the kernels use no more; in the order in which none that moves up is missed."""
+        in_use = [int(self._counts[slot]) for slot in (at.M_EFFECTS, at.M_EFFECTS_NEXT, at.M_EFFECTS_NOW)]
+        self._impulses = {address: self._impulses[address] for address in in_use if address}
+
     def forget_ended(self) -> None:
         """Frees what is over. Any thread, now and then."""
         with self._lock:
             self._voices = [voice for voice in self._voices if not voice.over]
+        with self._effects_lock:
+            self._forget_impulses()
 
     @property
     def voices(self) -> list[Voice]:

@@ -17,6 +17,7 @@ import soundfile
 import torch
 
 from app.analysis.abx.record import RecordError, load_record
+from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
 from app.commands.console import Failure
 from app.export.files import SoundRequest
@@ -28,6 +29,7 @@ from app.patches.patch import TuningChoice
 from app.patches.tuning import Tuning, read_scala
 from app.presets.library import list_presets
 from app.window.settings import Settings, load_settings
+from engine.effects import Body, Effects
 from engine.pluck import Pluck
 from engine.presets import (
     SHIPPED,
@@ -173,6 +175,19 @@ def damaged_wav(whole: bytes, draw: random.Random) -> bytes:
         return damaged_bytes(whole, draw)
 
 
+def impulse(folder: Path, kind: str, subtype: str) -> bytes:
+    buffer = io.BytesIO()
+    decay = np.geomspace(1, 1e-3, 400)[:, None]
+    soundfile.write(buffer, decay * np.random.default_rng(0).uniform(-1, 1, (400, 2)), 44_100, subtype, format=kind)
+    return buffer.getvalue()
+
+
+def sounded(path: Path) -> None:
+    """Reads an impulse response and makes it what the mixer would be given."""
+    found = Effects(Body(impulse=read_impulse(path))).impulse(48_000)
+    assert bool(np.isfinite(found).all()) and len(found) <= 3 * 48_000
+
+
 def saved(value: Any) -> bytes:
     buffer = io.BytesIO()
     np.save(buffer, value)
@@ -269,6 +284,9 @@ TARGETS = (
     Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),
+    Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),
+    Target("pcm.wav", lambda p: impulse(p, "WAV", "PCM_16"), sounded, (ImpulseError,)),
+    Target("body.flac", lambda p: impulse(p, "FLAC", "PCM_24"), sounded, (ImpulseError,)),
     Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (RecordError,), json_or_bytes),
 )
 

@@ -1,0 +1,48 @@
+"""Reads an impulse response from a sound file: a stranger's, so that nothing of it is believed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import soundfile
+
+from engine import bounds
+from engine.effects import Impulse
+from engine.plain_text import one_line
+
+FORMATS = ("WAV", "WAVEX", "RF64", "FLAC", "AIFF")
+
+
+class ImpulseError(Exception):
+    """A file that is no impulse response. The message names the file, what is wrong and the remedy, in one line."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+def read_impulse(path: Path) -> Impulse:
+    """The impulse response in a WAV, FLAC or AIFF file, at its own rate; effects resample it to the mixer's.
+
+    Raises:
+        ImpulseError: it cannot be read, or is no response that can be used: see `engine.bounds`.
+    """
+    try:
+        if path.stat().st_size > bounds.LARGEST_IMPULSE_BYTES:
+            raise ImpulseError(
+                f"{path}: larger than the {bounds.LARGEST_IMPULSE_BYTES // 2**20} MiB that it may have; cut it"
+            )
+        with soundfile.SoundFile(path) as file:
+            if file.format not in FORMATS:
+                raise ImpulseError(f"{path}: is {file.format}; save it as WAV or FLAC")
+            bounds.check("its rate", file.samplerate, bounds.IMPULSE_RATE_HZ, "Hz")
+            bounds.check("its channels", file.channels, (1, bounds.MOST_IMPULSE_CHANNELS))
+            most = int(bounds.LONGEST_IMPULSE_S * file.samplerate)
+            return Impulse(file.read(most + 1, "float64", always_2d=True), file.samplerate)
+    except (OSError, soundfile.SoundFileError) as error:
+        words = error.strerror if isinstance(error, OSError) else str(error).rpartition(":")[2].strip(" .")
+        raise ImpulseError(f"{path}: no sound file that can be read ({words}); give a WAV or FLAC") from error
+    except ValueError as error:
+        raise ImpulseError(
+            f"{path}: no impulse response that can be used ({error}); give another, mono or stereo, of up to"
+            f" {bounds.LONGEST_IMPULSE_S:g} s"
+        ) from error

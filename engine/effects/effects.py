@@ -1,0 +1,59 @@
+"""Body and room together: one impulse response, for the mixer and for arrays alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.effects.body import Body
+from engine.effects.impulse import as_loud, convolved
+from engine.effects.room import Room
+
+
+@dataclass(frozen=True)
+class Effects:
+    """The strings sound through the body, and that in the room. What is None, or has a mix of 0, is not there."""
+
+    body: Body | None = None
+    room: Room | None = None
+
+    @property
+    def neutral(self) -> bool:
+        """Whether nothing is changed at all."""
+        return not any(part is not None and part.mix > 0 for part in (self.body, self.room))
+
+    def impulse(self, rate_hz: int) -> NDArray[np.float64]:
+        """(frames, 1 or 2): of pink noise the level stays, at any mix."""
+        found = np.ones((1, 1))
+        for part in (self.body, self.room):
+            if part is not None and part.mix > 0:
+                wet = part.mix * part.response(rate_hz)
+                wet[0] += 1 - part.mix
+                found = convolved(found, wet) if len(found) > 1 else wet
+        return found if self.neutral else as_loud(found, rate_hz)
+
+    def tail_s(self, rate_hz: int) -> float:
+        """For how long it sounds on after its input, at most."""
+        return (len(self.impulse(rate_hz)) - 1) / rate_hz
+
+
+def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> NDArray[np.float64]:
+    """What a mixer with these effects gives, (frames, 2), of sound (frames, 1 or 2): its first frames, as many.
+
+    Give silence after the sound where the end shall ring out, `Effects.tail_s`. Samples that are no numbers, and
+    those too large or too small to be sound, are taken as silence, as the mixer does.
+    """
+    from scipy.signal import oaconvolve  # which takes the better part of a second to load, as Numba does
+
+    from engine.kernels import layout as at
+
+    stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
+    if effects is None or effects.neutral or not len(stereo):
+        return stereo
+    wild = ~(np.abs(stereo) < at.LARGEST).all(1)
+    stereo[wild] = 0.0
+    stereo[np.abs(stereo) < at.SMALLEST] = 0.0
+    found: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
+    return found

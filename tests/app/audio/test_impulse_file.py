@@ -1,0 +1,86 @@
+"""Impulse responses from files: what is read, and how what is not is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from app.audio.impulse_file import ImpulseError, read_impulse
+from engine import bounds
+
+SAMPLES = 0.5 * np.random.default_rng(0).uniform(-1, 1, (3000, 2)) * np.geomspace(1, 1e-3, 3000)[:, None]
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+@pytest.mark.parametrize(
+    ("ending", "subtype"), [("wav", "FLOAT"), ("wav", "PCM_24"), ("flac", "PCM_24"), ("aiff", "PCM_24")]
+)
+def test_it_is_read_as_it_was_written(tmp_path: Path, ending: str, subtype: str, channels: int) -> None:
+    path = tmp_path / f"body.{ending}"
+    soundfile.write(path, SAMPLES[:, :channels], 44_100, subtype)
+    found = read_impulse(path)
+    assert found.rate_hz == 44_100
+    np.testing.assert_allclose(found.samples, SAMPLES[:, :channels], atol=2e-7)
+
+
+def written(path: Path, samples: np.ndarray, rate_hz: int = 48_000, subtype: str = "FLOAT") -> Path:
+    soundfile.write(path, samples, rate_hz, subtype)
+    return path
+
+
+def broken(name: str, folder: Path) -> Path:
+    path, wild = folder / f"{name}.wav", SAMPLES.copy()
+    wild[100, 0] = np.nan
+    match name:
+        case "missing":
+            return path
+        case "folder":
+            path.mkdir()
+            return path
+        case "text":
+            path.write_text("no sound at all")
+            return path
+        case "ogg":
+            return written(folder / "body.ogg", SAMPLES, subtype="VORBIS")
+        case "long":
+            return written(path, np.tile(SAMPLES, (49, 1)))
+        case "channels":
+            return written(path, SAMPLES[:, :1].repeat(3, 1))
+        case "rate":
+            return written(path, SAMPLES, 4_000)
+        case "silent":
+            return written(path, 0 * SAMPLES)
+        case "empty":
+            return written(path, SAMPLES[:0])
+        case "nan":
+            return written(path, wild)
+        case _:
+            with path.open("wb") as file:
+                file.truncate(bounds.LARGEST_IMPULSE_BYTES + 1)
+            return path
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("missing", "No such file"),
+        ("folder", "no sound file"),
+        ("text", "no sound file"),
+        ("ogg", "save it as WAV"),
+        ("long", "its length"),
+        ("channels", "its channels"),
+        ("rate", "its rate"),
+        ("silent", "silent"),
+        ("empty", "silent"),
+        ("nan", "no numbers"),
+        ("huge", "64 MiB"),
+    ],
+)
+def test_what_cannot_be_used_is_told_with_its_name(tmp_path: Path, name: str, told: str) -> None:
+    path = broken(name, tmp_path)
+    with pytest.raises(ImpulseError, match=told) as error:
+        read_impulse(path)
+    assert str(error.value).startswith(f"{path}: ") and str(error.value).isprintable()

@@ -1,0 +1,82 @@
+"""Body and room together, for the mixer and for arrays; how loud they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.effects import Body, Effects, Room, apply
+from engine.effects.impulse import LOUDNESS_HZ
+from engine.kernels import layout as at
+from engine.voices import Mixer, Voice, plain_program
+
+RATE_HZ = 48_000
+
+
+def pink(frames: int) -> NDArray[np.float64]:
+    """Noise of equal power in each octave, (frames, 1)."""
+    frequency_hz = np.fft.rfftfreq(frames, 1 / RATE_HZ)
+    draw = np.random.default_rng(0).standard_normal((2, len(frequency_hz)))
+    heard = (frequency_hz > LOUDNESS_HZ[0]) & (frequency_hz < LOUDNESS_HZ[1])
+    spectrum = np.where(heard, (draw[0] + 1j * draw[1]) / np.sqrt(np.maximum(frequency_hz, 1)), 0)
+    found = np.fft.irfft(spectrum, frames)[:, None]
+    return 0.1 * found / found.std()
+
+
+CHOICES = [
+    Effects(Body()),
+    Effects(Body(0.5, 0.7)),
+    Effects(room=Room(0.3, 0.4)),
+    Effects(Body(0.8), Room(0.2, 0.8)),
+    Effects(Body(0.1), Room(1.0, 3.0)),
+]
+
+
+@pytest.mark.parametrize("effects", CHOICES)
+def test_the_mixer_gives_the_same_as_arrays_are_given(effects: Effects) -> None:
+    sound = pink(60_000).astype(np.float32)
+    voice = Voice.of_samples(plain_program(RATE_HZ), sound)
+    voice.memory.view(np.int64)[at.ATTACK] = 0
+    mixer = Mixer(RATE_HZ, limited=False)
+    mixer.set_effects(effects)
+    mixer.add(voice)
+    np.testing.assert_allclose(mixer.render(60_000), apply(effects, sound, RATE_HZ), atol=1e-6)
+
+
+@pytest.mark.parametrize("effects", CHOICES)
+def test_loudness_stays(effects: Effects) -> None:
+    sound = pink(8 * RATE_HZ)
+    found = apply(effects, sound, RATE_HZ)[4 * RATE_HZ :]
+    assert 20 * np.log10(found.std() / sound.std()) == pytest.approx(0, abs=0.7)
+
+
+def test_what_has_no_mix_changes_nothing() -> None:
+    sound = pink(1000)
+    for effects in (None, Effects(), Effects(Body(0.0), Room(0.0))):
+        np.testing.assert_array_equal(apply(effects, sound, RATE_HZ), np.repeat(sound, 2, 1))
+    np.testing.assert_array_equal(Effects().impulse(RATE_HZ), [[1.0]])
+
+
+def test_a_body_of_which_nothing_is_mixed_has_no_part() -> None:
+    both, room = Effects(Body(0.0), Room(0.2, 0.5)), Effects(room=Room(0.2, 0.5))
+    np.testing.assert_array_equal(both.impulse(RATE_HZ), room.impulse(RATE_HZ))
+
+
+def test_it_rings_out_within_its_tail() -> None:
+    effects = Effects(Body(0.5), Room(0.5, 0.5))
+    tail = round(effects.tail_s(RATE_HZ) * RATE_HZ)
+    sound = np.zeros((tail + 200, 1))
+    sound[:100] = pink(100)
+    found = apply(effects, sound, RATE_HZ)
+    assert found[tail - 2000 : tail + 99].any()
+    assert np.abs(found[tail + 100 :]).max() < 1e-12
+
+
+def test_the_direct_sound_is_where_it_was() -> None:
+    found = Effects(room=Room(0.2, 0.8)).impulse(RATE_HZ)
+    assert (np.abs(found).argmax(0) == 0).all() and np.ptp(found[0]) < 0.01 * found[0].mean()
+
+
+def test_no_sound_is_no_sound() -> None:
+    assert apply(CHOICES[0], np.zeros((0, 1)), RATE_HZ).shape == (0, 2)

@@ -1,0 +1,54 @@
+"""An impulse response from anywhere: what is refused, and that another rate changes nothing that is heard."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.effects import Impulse
+from engine.effects.impulse import resampled
+
+GOOD = np.random.default_rng(0).standard_normal((4000, 2))
+
+
+def with_one(value: float) -> NDArray[np.float64]:
+    samples = GOOD.copy()
+    samples[1234, 1] = value
+    return samples
+
+
+@pytest.mark.parametrize(
+    ("samples", "rate_hz", "told"),
+    [
+        (GOOD, 4_000, "rate"),
+        (GOOD, 10**9, "rate"),
+        (GOOD[:, :1].repeat(3, 1), 48_000, "channels"),
+        (GOOD[:, :0], 48_000, "channels"),
+        (GOOD[:, 0], 48_000, "dimensions"),
+        (np.zeros((8_000 * 3 + 1, 1)), 8_000, "length"),
+        (GOOD[:0], 48_000, "silent"),
+        (np.zeros((4000, 1)), 48_000, "silent"),
+        (1e-9 * GOOD, 48_000, "silent"),
+        (with_one(np.nan), 48_000, "no numbers"),
+        (with_one(-np.inf), 48_000, "no numbers"),
+        (with_one(1e300), 48_000, "largest sample"),
+        (np.sin(np.arange(96_000) * 2 * np.pi * 8 / 48_000)[:, None] * np.hanning(96_000)[:, None], 48_000, "80"),
+    ],
+)
+def test_what_cannot_be_used_is_told(samples: NDArray[np.float64], rate_hz: int, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        Impulse(samples, rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("from_hz", "to_hz"), [(44_100, 48_000), (48_000, 44_100), (44_101, 192_000), (96_000, 8_000), (48_000, 31_337)]
+)
+def test_a_tone_is_the_same_tone_at_another_rate(from_hz: int, to_hz: int) -> None:
+    def tone(rate_hz: int) -> NDArray[np.float64]:
+        time_s = np.arange(rate_hz // 2) / rate_hz
+        return (np.hanning(len(time_s)) * np.sin(2 * np.pi * 1000 * time_s))[:, None]
+
+    found, expected = resampled(tone(from_hz), from_hz, to_hz), tone(to_hz)
+    both = min(len(found), len(expected))
+    np.testing.assert_allclose(found[:both], expected[:both], atol=5e-3)
