@@ -18,6 +18,7 @@ from queue import Empty, SimpleQueue
 from app.audio.devices import AudioDevice, default_device, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, stalled, vanished
+from engine.effects import Effects
 from engine.voices.mixer import Gap, Mixer
 
 DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
@@ -95,6 +96,7 @@ class Sound:
         self.mixer = Mixer(rate_hz)
         self._output: Output = ClockOutput(self.mixer)
         self._volume_db = 0.0
+        self._effects: Effects | None = None
         self._wish = _Wish()
         self._wishes: SimpleQueue[_Wish] = SimpleQueue()
         self._woken = threading.Event()
@@ -146,6 +148,11 @@ class Sound:
             raise ValueError(f"The volume cannot be {volume_db} dB.")
         self._volume_db = volume_db
         self.mixer.set_volume(10 ** (volume_db / 20))
+
+    def set_effects(self, effects: Effects | None) -> None:
+        """Body and room of everything from now on; see `Mixer.set_effects`. It takes milliseconds, or tens."""
+        self._effects = effects
+        self.mixer.set_effects(effects)
 
     def sound_tone(self, side: str) -> None:
         """A soft tone for a second on "left", "right" or "both" sides, whatever else is playing."""
@@ -228,6 +235,7 @@ class Sound:
         if rate_hz != mixer.rate_hz or channels != mixer.channels:
             mixer = Mixer(rate_hz, channels)
             mixer.set_volume(10 ** (self._volume_db / 20))
+            mixer.set_effects(self._effects)
         old = self._output
         old.close()
         try:

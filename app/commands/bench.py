@@ -1,4 +1,4 @@
-"""bench solver, render, voices, effects, take, train, app, play, soak: what the program costs here."""
+"""bench solver, render, voices, effects, tune, take, train, app, play, soak: what the program costs here."""
 
 from __future__ import annotations
 
@@ -159,6 +159,59 @@ def effects(json: Json = False) -> None:
     ]
     costs = ("of a core, %", "at rest, %", "worst quantum, µs", "of it, %", "first set, ms", "set again, ms")
     print_table(("effects", "s", *costs), rows)
+
+
+@bench.command()
+def tune(
+    patch: Annotated[
+        list[str] | None, typer.Argument(metavar="PATCH", help="Names or files of patches; default: all.")
+    ] = None,
+    every: Annotated[int, typer.Option(min=1, max=24, help="So many semitones between two keys.")] = 6,
+    json: Json = False,
+) -> None:
+    """Patches as they are heard: pitch and loudness over their range, chords, and the model beside the truth."""
+    from app.commands.arguments import open_preset
+    from app.commands.benchmarks.tune import measure
+    from app.commands.console import Failure
+    from app.patches.library import PatchError, find_patch, list_patches
+
+    try:
+        chosen = [find_patch(name).patch for name in patch] if patch else [e.patch for e in list_patches()[0]]
+    except PatchError as error:
+        raise Failure(str(error)) from error
+    presets = {name: open_preset(name) for name in {each.preset for each in chosen}}
+    with progress("bench tune") as report:
+        found = measure([(each, presets[each.preset]) for each in chosen], every, report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    columns = (
+        "patch",
+        "keys",
+        "worst cents",
+        "spread dB",
+        "level dB",
+        "chord dBFS",
+        "shortest s",
+        "model/truth rel. MSE",
+    )
+    print_table(
+        columns,
+        [
+            (
+                each.patch,
+                len(each.keys),
+                each.cents,
+                each.spread_db,
+                each.level_db,
+                each.chord_peak_db,
+                each.shortest_s,
+                each.hands_rel_mse,
+            )
+            for each in found.patches
+        ],
+    )
 
 
 @bench.command()

@@ -45,13 +45,13 @@ def play(
     loaded = arguments.open_preset(chosen.preset)
     from app.export.recording import Recording
     from app.export.wav import WavSettings, write_wav
-    from app.instrument.offline import LONGEST_TAIL_S, render_events
+    from app.instrument.offline import LONGEST_TAIL_S, channels_of, render_events
     from app.shared.version import PROGRAM, program_version
     from app.shared.whole_file import WriteError, whole_file
 
     began_s = time.monotonic()
     whole_s = seconds if seconds is not None else events[-1].time_s + LONGEST_TAIL_S / 10
-    sound = Recording(len(chosen.pickup.points))
+    sound = Recording(channels_of(chosen))
     try:
         with progress(f"{midi.name} by {chosen.name}") as report:
             told = lambda done_s: report(min(0.99, done_s / whole_s))  # noqa: E731

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from app.instrument.effects import Response
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.resonators.base import Resonator
 from engine.voices import Ear
@@ -35,8 +36,12 @@ def k_weight(frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.abs(shelf * high_pass) ** 2
 
 
-def level_db(resonator: Resonator, pluck: Pluck, ear: Ear) -> float:
-    """Of a quiet pluck's first 0.4 s, K-weighted, in dB of full scale; -inf for silence."""
+def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
+    """Of a quiet pluck's first 0.4 s, K-weighted, in dB of full scale; -inf for silence.
+
+    Args:
+        response: of what the string is heard through.
+    """
     q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
     weights = (resonator.shapes @ ear.weights(resonator.points)).numpy() / FULL_SCALE_M  # (modes, points)
     sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()
@@ -44,14 +49,16 @@ def level_db(resonator: Resonator, pluck: Pluck, ear: Ear) -> float:
         weights = weights * omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
     falls = 2 * sigma * PART_S
     mean = np.where(falls > 1e-6, -np.expm1(-falls) / np.maximum(falls, 1e-6), 1.0)
-    squares = 0.5 * (weights * q[:, None]) ** 2 * (mean * k_weight(omega / (2 * np.pi)))[:, None]
+    frequencies_hz = omega / (2 * np.pi)
+    heard = k_weight(frequencies_hz) * (response(frequencies_hz) if response is not None else 1.0)
+    squares = 0.5 * (weights * q[:, None]) ** 2 * (mean * heard)[:, None]
     total = float(squares.sum(0).mean())
     return 10 * float(np.log10(total)) if total > 0 else -float("inf")
 
 
-def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, level_db_: float = 0.0) -> float:
-    """The factor that brings a pluck at the reference velocity to the wanted level, `level_db_` above it."""
+def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
+    """The factor that brings a pluck at the reference velocity to the wanted level."""
     with torch.inference_mode():
-        found = level_db(resonator, pluck, ear)
+        found = level_db(resonator, pluck, ear, response)
     low, high = GAIN_RANGE_DB
-    return float(10 ** ((min(max(WANTED_DB - found, low), high) + level_db_) / 20))
+    return float(10 ** (min(max(WANTED_DB - found, low), high) / 20))

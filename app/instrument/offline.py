@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.effects import effects_of
+from app.instrument.events import Event, NoteOff, NoteOn, PatchTurned, TimedEvent
 from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from engine.kernels.layout import AHEAD
@@ -30,6 +31,8 @@ class _Stage:
         self._source = source
         self._struck: list[Struck] = []
         self.player = Player(patch, preset, rate_hz, self._take, (source,))
+        self.mixer.set_effects(effects := effects_of(patch))
+        self.tail_s = 0.0 if effects is None else effects.tail_s(rate_hz)
 
     def _take(self, struck: Struck) -> None:
         self._struck = [each for each in self._struck if not each.over]
@@ -40,11 +43,21 @@ class _Stage:
         self._struck.append(struck)
         self.mixer.add(voice)
 
+    def handle(self, event: Event) -> None:
+        self.player.handle(event)
+        if isinstance(event, PatchTurned):
+            self.mixer.set_effects(effects_of(event.patch))
+
     @property
     def silent(self) -> bool:
         """Whether nothing rings any more."""
         self.mixer.forget_ended()
         return not self.mixer.voices
+
+
+def channels_of(patch: Patch) -> int:
+    """Two where it has two listening points or a room."""
+    return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 else 1
 
 
 def render_events(
@@ -72,7 +85,7 @@ def render_events(
     if source not in ("model", "truth"):
         raise ValueError(f"source must be model or truth, not {source!r}")
     stage = _Stage(patch, preset, rate_hz, source, limited)
-    channels = len(patch.pickup.points)
+    channels = channels_of(patch)
     skipped = AHEAD if limited else 0  # what the limiter holds back at the beginning
     done, events = 0, sorted(timed, key=lambda each: each.time_s)
 
@@ -90,17 +103,20 @@ def render_events(
         if seconds is not None and each.time_s >= seconds:
             break
         yield from blocks_until(round(each.time_s * rate_hz))
-        stage.player.handle(each.event)
+        stage.handle(each.event)
     if seconds is not None:
         yield from blocks_until(round(seconds * rate_hz) + (AHEAD if limited else 0))
         return
     last = done + round(LONGEST_TAIL_S * rate_hz)
     quiet = 10 ** (SILENT_DB / 20)
-    while done < last and not stage.silent:
+    quiet_s = 0.0  # until all effects have died away as well
+    while done < last and quiet_s <= stage.tail_s:
+        before = done
+        loudest = 0.0
         for block in blocks_until(min(last, done + BLOCK_FRAMES)):
             yield block
-            if float(np.abs(block).max(initial=0.0)) < quiet:
-                return
+            loudest = max(loudest, float(np.abs(block).max(initial=0.0)))
+        quiet_s = quiet_s + (done - before) / rate_hz if stage.silent or loudest < quiet else 0.0
 
 
 def render_note(

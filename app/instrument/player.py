@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from app.instrument import events
+from app.instrument.effects import body_response
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
 from app.instrument.loudness import REFERENCE_VELOCITY, gain_of
 from app.instrument.strings import KeyString, Strings, bent, damped, slid
@@ -239,7 +240,7 @@ class Player:
     def _take(self, patch: Patch) -> None:
         strings = Strings(patch)
         ear = self._listens or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        rate_hz, model = self._rate_hz, self._model
+        rate_hz, model, response = self._rate_hz, self._model, body_response(patch)
 
         @lru_cache(maxsize=KEPT_KEYS)
         def key_of(key: int) -> Key | None:
@@ -249,7 +250,7 @@ class Player:
             modes = min(string.modes, model.configuration.grid_points - 2)
             resonator = string.parameters.resonator(modes, grid_points=model.configuration.grid_points)
             pluck = _on(string, patch.pluck.pluck(REFERENCE_VELOCITY))
-            gain = gain_of(resonator, pluck, ear, patch.level_db)
+            gain = gain_of(resonator, pluck, ear, response) * 10 ** (patch.level_db / 20)
             programs: dict[str, Program] = {}
             for source in self._sources:
                 programs[source] = (

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from app.instrument.effects import effects_of
 from app.instrument.events import Event, NoteOn, PatchTurned, TimedEvent
 from app.instrument.player import SOURCES, Player, Struck
 from app.patches.patch import Patch
@@ -14,6 +15,7 @@ from app.playing.notes import Note, Notes
 from app.playing.sources import Sources
 from app.playing.stroke import Stroke
 from app.rendering.subject import StringOf
+from engine.effects import Effects
 from engine.presets import PresetError
 from engine.voices import Ear
 
@@ -27,11 +29,18 @@ class Live:
     Args:
         find: the path of a preset by its name; None where there is none.
         report: hears of what cannot be played: a message and its details.
+        set_effects: the body and the room of what is heard.
     """
 
     def __init__(
-        self, notes: Notes, sources: Sources, find: Callable[[str], Path | None], report: Callable[[str, str], None]
+        self,
+        notes: Notes,
+        sources: Sources,
+        find: Callable[[str], Path | None],
+        report: Callable[[str, str], None],
+        set_effects: Callable[[Effects | None], None] = lambda effects: None,
     ) -> None:
+        self._set_effects = set_effects
         self._notes, self._sources, self._find, self._report = notes, sources, find, report
         self._lock = threading.RLock()
         self._player: Player | None = None
@@ -56,6 +65,7 @@ class Live:
             if patch is None:
                 self._player = None
                 return
+            self._notes.in_background(lambda: self._set_effects(effects_of(patch)))
             self._note_down(PatchTurned(patch))
             if player is not None and player.patch.preset == patch.preset:
                 try:

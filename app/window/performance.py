@@ -87,7 +87,7 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, mail.refused.emit)
-        self.live = Live(self.notes, self._sources, self._path_of, mail.refused.emit)
+        self.live = Live(self.notes, self._sources, self._path_of, mail.refused.emit, sound.set_effects)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
 
     @property

@@ -6,7 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from app.playing.keyboard import KeyPress, Reach, place_of, play
+from app.playing.keyboard import (
+    HIGHEST_OCTAVE,
+    LOWEST_C,
+    LOWEST_OCTAVE,
+    KeyPress,
+    Reach,
+    letters_of,
+    place_of,
+    play,
+    semitone_of,
+    turn,
+)
 from engine.presets import read_info
 
 REACH = Reach((0.3, 0.7), (1.0, 10.0))
@@ -74,3 +85,24 @@ def test_what_is_played_is_round_and_within_reach() -> None:
 def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
     assert Reach.of(read_info(small_preset)) == Reach((0.3, 0.7), (1.0, 10.0))
     assert Reach.of(None).position == (0.05, 0.95)
+
+
+def test_two_rows_are_a_piano() -> None:
+    played = [semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"]
+    assert played == list(range(18))
+    assert semitone_of(KeyPress("Q"), "darwin") is None
+    assert semitone_of(KeyPress("Q", 38), "linux") == 0  # AZERTY: by its place
+    assert semitone_of(KeyPress("z", 25), "linux") == 1
+    assert semitone_of(KeyPress("", 48), "linux") == 17
+    assert letters_of(1)[LOWEST_C + 12] == "A"
+
+
+def test_octave_and_velocity_keys_stay_within_bounds() -> None:
+    assert turn(KeyPress("z"), 0, 90) == (-1, 90)
+    assert turn(KeyPress("X"), HIGHEST_OCTAVE, 90) == (HIGHEST_OCTAVE, 90)
+    assert turn(KeyPress("Z"), LOWEST_OCTAVE, 90) == (LOWEST_OCTAVE, 90)
+    assert turn(KeyPress("9"), 0, 90) == (0, 127)
+    assert turn(KeyPress("1"), 0, 90) == (0, 1)
+    assert turn(KeyPress("v"), 0, 120) == (0, 127)
+    assert turn(KeyPress("c"), 0, 5) == (0, 1)
+    assert turn(KeyPress("m"), 0, 5) is None

@@ -1,0 +1,44 @@
+"""The body and the room of a patch, as the mixer takes them, and what the body does to the loudness of a key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.patches.patch import Patch
+from engine.effects import Body, Effects, Room
+
+Response = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # frequencies in Hz to squares of the gain
+_RATE_HZ, _POINTS = 48_000, 2**16
+
+
+def effects_of(patch: Patch) -> Effects | None:
+    """None where it has neither.
+
+    Raises:
+        ValueError: no body has that name; the message lists those that there are.
+    """
+    body = Body(patch.body.mix, patch.body.size, patch.body.name) if patch.body.name and patch.body.mix > 0 else None
+    room = Room(patch.room.mix, patch.room.t60_s) if patch.room.mix > 0 else None
+    return None if body is None and room is None else Effects(body, room)
+
+
+def body_response(patch: Patch) -> Response | None:
+    """Of its body alone, whose resonances favour some keys; None: it has none.
+
+    Raises:
+        ValueError: as `effects_of`.
+    """
+    effects = effects_of(patch)
+    return None if effects is None or effects.body is None else _response(effects.body)
+
+
+@lru_cache(maxsize=16)
+def _response(body: Body) -> Response:
+    impulse = Effects(body).impulse(_RATE_HZ)
+    power = (np.abs(np.fft.rfft(impulse, _POINTS, axis=0)) ** 2).mean(1)
+    frequencies_hz = np.fft.rfftfreq(_POINTS, 1 / _RATE_HZ)
+    return lambda asked_hz: np.interp(asked_hz, frequencies_hz, power)

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import mido
+import pytest
+
+from app.instrument.events import Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.midi_file import MidiFileError, event_of, midi_bytes, read_midi
+from app.patches.patch import Patch
+
+PLAYED = [
+    TimedEvent(0.0, NoteOn(60, 90, 2)),
+    TimedEvent(0.25, Bend(-0.5, 2)),
+    TimedEvent(0.5, Controller(64, 127, 2)),
+    TimedEvent(0.75, Bend(1.0, 2)),
+    TimedEvent(1.5, NoteOff(60, 2)),
+]
+
+
+def test_what_is_written_is_read_again(tmp_path: Path) -> None:
+    file = tmp_path / "played.mid"
+    file.write_bytes(midi_bytes(PLAYED))
+    found = read_midi(file)
+    assert [each.time_s for each in found] == pytest.approx([each.time_s for each in PLAYED], abs=1e-3)
+    for one, other in zip(found, PLAYED, strict=True):
+        if isinstance(other.event, Bend):
+            assert isinstance(one.event, Bend)
+            assert one.event.value == pytest.approx(other.event.value, abs=2e-4)
+        else:
+            assert one.event == other.event
+
+
+def test_another_program_reads_it(tmp_path: Path) -> None:
+    file = tmp_path / "played.mid"
+    file.write_bytes(midi_bytes(PLAYED))
+    read = mido.MidiFile(file)
+    assert read.length == pytest.approx(1.5, abs=1e-3)
+    assert [m.type for m in read.tracks[0]][1:3] == ["note_on", "pitchwheel"]
+
+
+def test_tempo_and_tracks_are_followed(tmp_path: Path) -> None:
+    file = mido.MidiFile(ticks_per_beat=480)
+    first, second = mido.MidiTrack(), mido.MidiTrack()
+    first.append(mido.MetaMessage("set_tempo", tempo=1_000_000))
+    first.append(mido.MetaMessage("set_tempo", tempo=250_000, time=480))
+    second.append(mido.Message("note_on", note=60, velocity=1, time=960))
+    second.append(mido.Message("note_on", note=60, velocity=0, time=480))
+    file.tracks.extend([first, second])
+    file.save(tmp_path / "two.mid")
+    assert read_midi(tmp_path / "two.mid") == [TimedEvent(1.25, NoteOn(60, 1)), TimedEvent(1.5, NoteOff(60))]
+
+
+def test_a_patch_that_was_turned_is_no_midi(patch: Patch) -> None:
+    assert midi_bytes([TimedEvent(0.0, PatchTurned(patch)), *PLAYED]) == midi_bytes(PLAYED)
+
+
+def test_what_strings_do_not_answer_is_left_out() -> None:
+    assert event_of(mido.Message("clock")) is None
+    assert event_of(mido.Message("program_change", program=3)) is None
+    assert event_of(mido.Message("pitchwheel", pitch=-8192)) == Bend(-1.0)
+    assert event_of(mido.Message("pitchwheel", pitch=8191)) == Bend(1.0)
+
+
+@pytest.mark.parametrize(
+    ("raw", "told"),
+    [
+        (b"", "no MIDI file"),
+        (b"RIFF....WAVE", "no MIDI file"),
+        (midi_bytes(PLAYED)[:40], "no MIDI file"),
+        (midi_bytes([]), "no note"),
+        (b"MThd\0\0\0\6\0\0\0\1\0\0MTrk\0\0\0\4\0\xff\x2f\0", "no"),
+        (midi_bytes([TimedEvent(4000.0, NoteOn(1, 1))]), "an hour"),
+    ],
+)
+def test_a_file_that_cannot_be_played_is_named(tmp_path: Path, raw: bytes, told: str) -> None:
+    file = tmp_path / "bad.mid"
+    file.write_bytes(raw)
+    with pytest.raises(MidiFileError, match=told) as caught:
+        read_midi(file)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
+    file = tmp_path / "huge.mid"
+    with file.open("wb") as out:
+        out.truncate(100 * 2**20)
+    with pytest.raises(MidiFileError, match="4 MiB"):
+        read_midi(file)
+
+
+def test_no_file_says_so(tmp_path: Path) -> None:
+    with pytest.raises(MidiFileError, match="cannot be read"):
+        read_midi(tmp_path / "none.mid")

@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import threading
+import time
+
+from app.instrument.events import NOTES_OFF, Controller, Event, NoteOff, NoteOn, TimedEvent
+from app.playing.playback import Playback
+
+
+def test_events_come_in_time_and_everything_is_let_go_in_the_end() -> None:
+    came: list[tuple[float, Event]] = []
+    ended = threading.Event()
+    playback = Playback(lambda event: came.append((time.monotonic(), event)), ended.set)
+    playback.play([TimedEvent(0.2, NoteOff(60)), TimedEvent(0.0, NoteOn(60, 90)), TimedEvent(0.1, NoteOn(64, 90))])
+    assert ended.wait(10)
+    times = [when - came[0][0] for when, _ in came]
+    assert [event for _, event in came[:3]] == [NoteOn(60, 90), NoteOn(64, 90), NoteOff(60)]
+    assert times[1] >= 0.05
+    assert times[2] >= 0.15
+    assert came[-1][1] == Controller(NOTES_OFF, 0)
+
+
+def test_it_can_be_stopped_and_lets_go() -> None:
+    came: list[Event] = []
+    playback = Playback(came.append)
+    playback.play([TimedEvent(0.0, NoteOn(60, 90)), TimedEvent(600.0, NoteOff(60))])
+    while not came:
+        time.sleep(0.01)
+    playback.stop()
+    assert not playback.playing
+    assert came[-1] == Controller(NOTES_OFF, 0)
+    playback.stop()
