@@ -43,27 +43,28 @@ def play(
     except (MidiFileError, PatchError) as error:
         raise Failure(str(error)) from error
     loaded = arguments.open_preset(chosen.preset)
-    from app.export.recording import Recording
-    from app.export.wav import WavSettings, write_wav
-    from app.instrument.offline import LONGEST_TAIL_S, channels_of, render_events
-    from app.shared.version import PROGRAM, program_version
-    from app.shared.whole_file import WriteError, whole_file
+    from app.export.played import write_played
+    from app.export.wav import WavSettings
+    from app.instrument.offline import LONGEST_TAIL_S
+    from app.shared.whole_file import WriteError
 
     began_s = time.monotonic()
     whole_s = seconds if seconds is not None else events[-1].time_s + LONGEST_TAIL_S / 10
-    sound = Recording(channels_of(chosen))
     try:
         with progress(f"{midi.name} by {chosen.name}") as report:
-            told = lambda done_s: report(min(0.99, done_s / whole_s))  # noqa: E731
-            for block in render_events(chosen, loaded, events, rate, source, seconds, advanced=told):
-                sound.append(block)
-        tags = {"title": f"{midi.stem}: {chosen.name}", "software": f"{PROGRAM} {program_version()}"}
-        with whole_file(out) as file:
-            level = write_wav(file, sound, rate, WavSettings(bits, None, normalise), tags)
+            written = write_played(
+                out,
+                chosen,
+                loaded,
+                events,
+                source,
+                WavSettings(bits, rate, normalise),
+                seconds,
+                lambda done_s: report(min(0.99, done_s / whole_s)),
+            )
     except (ValueError, WriteError) as error:
         raise Failure(str(error)) from error
-    lasts_s, took_s = len(sound) / rate, time.monotonic() - began_s
+    took_s, level = time.monotonic() - began_s, written.level
     say(
-        f"{out}: {lasts_s:.1f} s of {source} in {took_s:.1f} s ({lasts_s / took_s:.0f} times as fast as it sounds), "
-        f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
+        f"{out}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
     )

@@ -17,6 +17,8 @@ if sys.platform == "win32":
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication
 
+from app.patches.library import SHIPPED, PatchError, read_patch
+from app.session.instrument import choices_of
 from app.shared.heap import collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
 from app.views.theme import apply_theme
@@ -31,6 +33,19 @@ if TYPE_CHECKING:
 
 Alive = Callable[["Controller"], None]
 CANNOT_START = "The models cannot be loaded: the program cannot be used like this."
+
+
+FIRST_PATCH = SHIPPED / "classical_guitar.json"
+
+
+def with_patch(settings: Settings) -> Settings:
+    """Where none was ever chosen, keys play the first one: there is sound at once."""
+    if settings.choices.patch is not None:
+        return settings
+    with contextlib.suppress(PatchError):  # without it keys are places
+        choices = settings.choices.model_copy(update=choices_of(read_patch(FIRST_PATCH)))
+        return settings.model_copy(update={"choices": choices})
+    return settings
 
 
 class _Start(QObject):
@@ -119,6 +134,7 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
     check_display()
     path = settings_file()
     settings, notice = load_settings(path)
+    settings = with_patch(settings)
     if settings.look.size_percent != 100:  # Qt reads it when the application is made
         os.environ.setdefault("QT_SCALE_FACTOR", str(settings.look.size_percent / 100))
     application = QApplication.instance() or QApplication(sys.argv[:1])

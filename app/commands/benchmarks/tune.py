@@ -75,7 +75,9 @@ def loudness_db(sound: NDArray[np.floating], rate_hz: int = RATE_HZ) -> float:
     """K-weighted mean square of all of it, (frames, channels), in dB of full scale."""
     part = np.asarray(sound, np.float64)
     power = (np.abs(np.fft.rfft(part, axis=0)) ** 2).mean(1)
-    total = 2 * (power * k_weight(np.fft.rfftfreq(len(part), 1 / rate_hz))).sum() / len(part) ** 2
+    total = (
+        2 * (power * k_weight(np.asarray(np.fft.rfftfreq(len(part), 1 / rate_hz), np.float64))).sum() / len(part) ** 2
+    )
     return float(10 * np.log10(max(total, 1e-30)))
 
 

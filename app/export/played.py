@@ -1,0 +1,65 @@
+"""What is played through a patch, as files: a WAV that is rendered from its events, and the events as a MIDI file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.export.recording import Recording
+from app.export.wav import Level, WavSettings, write_wav
+from app.instrument.events import TimedEvent
+from app.instrument.midi_file import midi_bytes
+from app.instrument.offline import channels_of, render_events
+from app.patches.patch import Patch
+from app.shared.version import PROGRAM, program_version
+from app.shared.whole_file import whole_file
+from engine.presets import Preset
+
+RATE_HZ = 48_000
+
+
+@dataclass(frozen=True)
+class PlayedFile:
+    """What was written: how long it is, and its level."""
+
+    seconds: float
+    level: Level
+
+
+def write_played(
+    path: Path,
+    patch: Patch,
+    preset: Preset,
+    events: Sequence[TimedEvent],
+    source: str = "model",
+    settings: WavSettings = WavSettings("24", RATE_HZ),  # noqa: B008 - immutable
+    seconds: float | None = None,
+    advanced: Callable[[float], None] = lambda seconds: None,
+) -> PlayedFile:
+    """A WAV file, whole or not at all. Memory does not grow with its length.
+
+    Args:
+        seconds, advanced: see `render_events`.
+
+    Raises:
+        ValueError: a key has no possible string, or `source` is none.
+        WriteError: the file cannot be written; told before the work where the folder says so.
+    """
+    rate_hz = settings.rate_hz or RATE_HZ
+    with whole_file(path) as file:
+        sound = Recording(channels_of(patch))
+        for block in render_events(patch, preset, events, rate_hz, source, seconds, advanced=advanced):
+            sound.append(block)
+        tags = {"title": f"{path.stem}: {patch.name}", "software": f"{PROGRAM} {program_version()}"}
+        level = write_wav(file, sound, rate_hz, settings, tags)
+    return PlayedFile(len(sound) / rate_hz, level)
+
+
+def write_recorded(path: Path, patch: Patch, preset: Preset, events: Sequence[TimedEvent], source: str) -> str:
+    """PATH.wav and PATH.mid; what was written, in words. Raises as `write_played`."""
+    sound_file, midi_file = path.with_suffix(".wav"), path.with_suffix(".mid")
+    written = write_played(sound_file, patch, preset, events, source)
+    with whole_file(midi_file) as file:
+        file.write(midi_bytes(events))
+    return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s, peak {written.level.peak_db:.1f} dBFS"

@@ -1,0 +1,405 @@
+"""The patch that keys play: chosen, turned, saved, recorded; and what its strip in the window shows."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFileDialog, QInputDialog
+
+from app.export.played import write_recorded
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import MidiFileError, read_midi
+from app.instrument.player import Struck
+from app.instrument.strings import Strings
+from app.patches.library import (
+    PatchEntry,
+    PatchError,
+    list_patches,
+    own_patches,
+    read_patch,
+    rename_patch,
+    save_patch,
+)
+from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet
+from app.playing.keyboard import letters_of
+from app.playing.playback import Playback
+from app.presets.library import Library
+from app.session.choices import Session
+from app.session.instrument import choices_of
+from app.shared.whole_file import WriteError
+from app.views.instrument.panel import InstrumentPanel
+from app.views.instrument.patch_browser import PatchBrowser
+from app.window.instruments import Instruments
+from app.window.performance import Performance
+from engine.effects import BODIES
+from engine.presets import PresetError, PresetInfo, load_preset
+from engine.resonators.family import inharmonicity
+
+AUDITION_VELOCITY, AUDITION_S = 90, 0.6
+SHOWN_EVERY_S = 0.04
+RECORDED = "WAV and MIDI (*.wav)"
+
+
+class PatchDesk(QObject):
+    """Lives in the window's thread, as long as the window.
+
+    Attributes:
+        favourites: names of patches.
+    """
+
+    told = Signal(str)
+    _written = Signal(str)  # from a thread
+
+    def __init__(
+        self,
+        session: Session,
+        library: Library,
+        performance: Performance,
+        instruments: Instruments,
+        panel: InstrumentPanel,
+        browser: PatchBrowser,
+        favourites: Iterable[str] = (),
+    ) -> None:
+        super().__init__(panel)
+        self._session, self._library, self._performance = session, library, performance
+        self._instruments, self._panel, self.browser = instruments, panel, browser
+        self.favourites = set(favourites)
+        self._entries: list[PatchEntry] = []
+        self._shown_s = 0.0
+        self._recording_began_s = 0.0
+        self._playback = Playback(instruments.play)
+        self._written.connect(self.told, Qt.ConnectionType.QueuedConnection)
+        self.reload()
+        panel.bar.set_bodies([("", "no body"), *((name, name) for name in BODIES)])
+        self._connect()
+
+    def _connect(self) -> None:
+        panel, bar, browser = self._panel, self._panel.bar, self.browser
+        panel.pressed.connect(lambda key, velocity: self._instruments.play(NoteOn(key, velocity)))
+        panel.released.connect(lambda key: self._instruments.play(NoteOff(key)))
+        bar.previous_asked.connect(lambda: self.step(-1))
+        bar.next_asked.connect(lambda: self.step(1))
+        bar.browse_asked.connect(self.toggle)
+        bar.save_asked.connect(self.save)
+        bar.rename_asked.connect(self.rename)
+        bar.revert_asked.connect(self.revert)
+        bar.record_asked.connect(self.record)
+        bar.octave_asked.connect(self._move_octave)
+        bar.macro_turned.connect(self._turn_macro)
+        bar.changed.connect(self.change)
+        bar.body_chosen.connect(self._choose_body)
+        panel.knobs.changed.connect(self.change)
+        browser.opened.connect(self.reload)
+        browser.chosen.connect(self.choose)
+        browser.audition_asked.connect(self.audition)
+        browser.favourite_asked.connect(self._toggle_favourite)
+        browser.file_dropped.connect(lambda path: self.take_file(Path(path)))
+        browser.folder_asked.connect(self._open_folder)
+        browser.delete_asked.connect(self.delete)
+        browser.rename_asked.connect(self.rename)
+
+    # What there is
+
+    @property
+    def patch(self) -> Patch | None:
+        return self._session.choices.patch
+
+    @property
+    def entry(self) -> PatchEntry | None:
+        """The saved patch whose name the present one has."""
+        patch = self.patch
+        return next((each for each in self._entries if patch is not None and each.patch.name == patch.name), None)
+
+    def reload(self) -> None:
+        """The user may have put files into the folder meanwhile."""
+        self._entries, problems = list_patches()
+        for problem in problems:
+            self.told.emit(problem)
+        self._show_entries()
+
+    # Intents
+
+    def choose(self, name: str) -> None:
+        """A patch by the name of its entry."""
+        for entry in self._entries:
+            if entry.name == name:
+                self._session.update(**choices_of(entry.patch))
+
+    def step(self, step: int) -> None:
+        """To the next or previous of the filtered list, going round."""
+        names = list(self.browser.listed) or [entry.name for entry in self._entries]
+        entry = self.entry
+        if names:
+            here = names.index(entry.name) if entry is not None and entry.name in names else -1
+            self.choose(names[(here + step) % len(names)] if here >= 0 else names[0 if step > 0 else -1])
+
+    def toggle(self) -> None:
+        """Opens the browser, or closes it."""
+        if self.browser.isVisible():
+            self.browser.dismiss()
+        else:
+            self.browser.show_over()
+
+    def audition(self, name: str) -> None:
+        """A note of a patch in the middle of its range."""
+        self.choose(name)
+        if self.patch is not None:
+            key = sum(self.patch.range) // 2
+            self._playback.play(_note(key))
+
+    def change(self, field: str, value: float) -> None:
+        """A field of the patch by its path; a value beyond its bounds is left alone."""
+        patch = self.patch
+        if patch is None:
+            return
+        try:
+            if field in ASSIGNABLE:
+                changed = patch.with_value(field, value)
+            else:
+                part, _, name = field.partition(".")
+                inner = {**dict(getattr(patch, part)), name: value} if name else value
+                changed = Patch.model_validate({**dict(patch), part: inner})
+        except (ValueError, AttributeError):  # a knob at its end asks for a hair more
+            self._show_patch()
+            return
+        self._session.update(patch=changed)
+
+    def save(self) -> None:
+        """Under its own name where it is the user's, else under one that is asked for."""
+        patch, entry = self.patch, self.entry
+        if patch is None:
+            return
+        name = patch.name
+        replace = entry is not None and entry.own
+        if not replace:
+            name, wanted = QInputDialog.getText(self._panel, "Save patch", "Name of the patch:", text=f"{name} 2")
+            if not wanted:
+                return
+        self._save(patch, name, replace)
+
+    def _save(self, patch: Patch, name: str, replace: bool) -> None:
+        try:
+            named = Patch.model_validate({**dict(patch), "name": name})
+            save_patch(named, replace=replace)
+        except (ValueError, WriteError) as error:
+            self.told.emit(str(error).splitlines()[0])
+            return
+        self.reload()
+        self._session.update(patch=named)
+        self._show_patch()
+
+    def rename(self, name: str = "") -> None:
+        """One of the user's own, by default the present one."""
+        entry = next((each for each in self._entries if each.name == name), self.entry)
+        if entry is None or not entry.own:
+            self.told.emit("Only patches of your own can be renamed: save this one first.")
+            return
+        new, wanted = QInputDialog.getText(self._panel, "Rename patch", "New name:", text=entry.patch.name)
+        if not wanted:
+            return
+        try:
+            renamed = rename_patch(entry, new)
+        except (ValueError, WriteError) as error:
+            self.told.emit(str(error).splitlines()[0])
+            return
+        if self.patch is not None and self.patch.name == entry.patch.name:
+            self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
+        self.reload()
+
+    def delete(self, name: str) -> None:
+        """One of the user's own."""
+        entry = next((each for each in self._entries if each.name == name and each.own), None)
+        if entry is None:
+            return
+        try:
+            entry.path.unlink()
+        except OSError as error:
+            self.told.emit(f"{entry.path}: cannot be removed ({error.strerror}).")
+        self.reload()
+
+    def revert(self) -> None:
+        """As it was saved."""
+        if (entry := self.entry) is not None:
+            self._session.update(**choices_of(entry.patch))
+
+    def take_file(self, file: Path) -> None:
+        """A dropped patch is chosen, a dropped MIDI file is played."""
+        try:
+            if file.suffix.lower() in (".mid", ".midi"):
+                self._playback.play(read_midi(file))
+            else:
+                self._session.update(**choices_of(read_patch(file)))
+        except (MidiFileError, PatchError, ValueError) as error:
+            self.told.emit(str(error))
+
+    def stop(self) -> None:
+        """Of a MIDI file that is played."""
+        self._playback.stop()
+
+    @property
+    def playing(self) -> bool:
+        """Whether a MIDI file is."""
+        return self._playback.playing
+
+    # Recording
+
+    def record(self) -> None:
+        """Begins, or ends and asks for a file."""
+        live = self._performance.live
+        if not live.recording:
+            live.begin_recording()
+            self._recording_began_s = time.monotonic()
+            return
+        events = live.end_recording()
+        self._panel.bar.show_recording(None)
+        patch = self.patch
+        if not events or patch is None:
+            self.told.emit("Nothing was played, so nothing was recorded.")
+            return
+        chosen, _ = QFileDialog.getSaveFileName(self._panel, "Save what was played", f"{patch.name}.wav", RECORDED)
+        if chosen:
+            self.write(Path(chosen), events)
+
+    def write(self, path: Path, events: list[TimedEvent]) -> threading.Thread | None:
+        """What was played, as WAV and MIDI of one name, in the background."""
+        patch = self.patch
+        entry = None if patch is None else self._library.find(patch.preset)
+        if patch is None or entry is None:
+            return None
+        source = "truth" if self._session.source_heard == "truth" else "model"
+
+        def work() -> None:
+            try:
+                self._written.emit(write_recorded(path, patch, load_preset(entry.path), events, source))
+            except (ValueError, PresetError, WriteError, OSError) as error:
+                self._written.emit(str(error).splitlines()[0])
+
+        thread = threading.Thread(target=work, name="performance-writer", daemon=True)
+        thread.start()
+        return thread
+
+    # What is shown
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        if names & {"patch", "preset"}:
+            self._show_patch()
+        if names & {"octave", "keys", "patch"}:
+            choices = self._session.choices
+            self._panel.set_octave(choices.octave)
+            self._panel.show_letters(letters_of(choices.octave) if self._instruments.plays_pitches else {})
+        if names & {"heard", "a", "b"}:
+            self._panel.show_source(self._session.source_heard)
+
+    def show_struck(self, struck: Struck) -> None:
+        """What is beyond training of a note that was played."""
+        entry = self._library.find(self._session.choices.preset)
+        if entry is not None:
+            self._panel.bar.show_note("; ".join(_beyond(entry.info, struck)))
+
+    def tick(self) -> None:
+        """Now and then: which keys sound."""
+        now_s = time.monotonic()
+        if now_s - self._shown_s < SHOWN_EVERY_S or not self._panel.isVisible():
+            return
+        self._shown_s = now_s
+        self._panel.show_sounding(self._performance.live.sounding())
+        self._panel.bar.show_voices(self._performance.notes.ringing)
+        if self._performance.live.recording:
+            self._panel.bar.show_recording(now_s - self._recording_began_s)
+
+    def close(self) -> None:
+        """Ends the playback; may be called again."""
+        self._playback.stop()
+
+    def _show_entries(self) -> None:
+        entry = self.entry
+        self.browser.show_entries(self._entries, self.favourites, entry.name if entry else "")
+
+    def _show_patch(self) -> None:
+        patch, entry, panel = self.patch, self.entry, self._panel
+        if patch is None:
+            return
+        panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
+        panel.knobs.show_patch(patch)
+        panel.knobs.show_facts(facts_of(patch))
+        panel.set_range(*patch.range)
+        strings = patch.strings
+        if isinstance(strings, StringSet):
+            panel.neck.set_strings([(note_name(each.note), each.note) for each in strings.strings])
+        else:
+            panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
+        self.browser.set_chosen(entry.name if entry is not None else "")
+
+    def _toggle_favourite(self, name: str) -> None:
+        self.favourites ^= {name}
+        self._show_entries()
+
+    def _move_octave(self, octaves: int) -> None:
+        octave = min(max(self._session.choices.octave + octaves, -4), 4)
+        self._session.update(octave=octave)
+
+    def _turn_macro(self, number: int, value: float) -> None:
+        if self.patch is not None:
+            self._session.update(patch=self.patch.turned(number, value))
+
+    def _choose_body(self, name: str) -> None:
+        if self.patch is not None:
+            body = Body(**{**dict(self.patch.body), "name": name})
+            self._session.update(patch=self.patch.model_copy(update={"body": body}))
+
+    def _open_folder(self) -> None:
+        folder = own_patches()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            self.told.emit(f"{folder}: cannot be made ({error.strerror}).")
+            return
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            self.told.emit(f"No file manager was found here; your own patches are in {folder}.")
+
+
+def _note(key: int) -> list[TimedEvent]:
+    return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY)), TimedEvent(AUDITION_S, NoteOff(key))]
+
+
+def facts_of(patch: Patch) -> dict[str, str]:
+    """Of the string in the middle of the range, in physical units."""
+    key = sum(patch.range) // 2
+    try:
+        found = Strings(patch).of_key(key)
+    except ValueError as error:
+        return {"string": str(error)}
+    if found is None:
+        return {}
+    string = found.parameters
+    return {
+        "key": note_name(key),
+        "pitch": f"{found.pitch_hz:.1f} Hz",
+        "tension": f"{string.tension_n:.1f} N",
+        "length": f"{1000 * string.length_m:.0f} mm",
+        "gauge": f"{2000 * math.sqrt(string.area_m2 / math.pi):.2f} mm",
+        "inharmonicity": f"{inharmonicity(string):.1e}",
+        "decay": f"{math.log(1000) / max(string.decay_rate(1), 1e-9):.1f} s",
+    }
+
+
+def _beyond(info: PresetInfo, struck: Struck) -> list[str]:
+    """How a note is beyond what the model learned, in plain words."""
+    if info.family is None:
+        return []
+    found = info.family.outside(struck.parameters)
+    resonator = struck.key.resonator
+    rise = float(resonator.relative_tension_rise(resonator.to_modes(struck.pluck.displacement(resonator.points))))
+    limit = info.family.tension_rise[1]
+    return [*found, f"tension rise {rise:.0%} is outside the trained {limit:.0%}"] if rise > limit else found
+
+
+def note_name(key: int) -> str:
+    """As C4 for key 60."""
+    return f"{('C', 'C♯', 'D', 'D♯', 'E', 'F', 'F♯', 'G', 'G♯', 'A', 'A♯', 'B')[key % 12]}{key // 12 - 1}"
