@@ -155,6 +155,7 @@ QWidget {{ color: {TEXT}; font-size: 12px; }}
 QMainWindow, QDialog {{ background: {BACKGROUND}; }}
 QFrame#rule {{ background: {LINE}; }}
 QFrame#panel {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: 6px; }}
+QFrame#panel QScrollArea, QFrame#panel QScrollArea > QWidget > QWidget {{ background: transparent; }}
 QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius: 8px; }}
 QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
 QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
@@ -166,6 +167,9 @@ QPushButton#preset {{ text-align: left; font-weight: 600; padding: 6px 12px; }}
 QLabel {{ background: transparent; }}
 QLabel#faint {{ color: {FAINT}; }}
 QLabel#knob {{ color: {FAINT}; font-size: 10px; padding-top: 4px; }}
+QLabel#group {{ color: {FAINT}; font-size: 9px; font-weight: 600; letter-spacing: 1px; }}
+QLabel#hint {{
+    color: {TEXT}; background: {PANEL}; border: 1px solid {FAINT}; border-radius: 10px; padding: 3px 12px; }}
 QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
 QLabel#badge {{
     color: {FAINT}; background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 8px; }}
@@ -190,6 +194,9 @@ QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
 QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
 *[compact="true"] {{ padding: 6px 4px; }}
 QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 4px; }}
+QToolButton#small {{ padding: 4px 8px; }}
+QToolButton#record {{ padding: 2px 8px; }}
+QToolButton#record:checked {{ background: {WARNING}; color: {BACKGROUND}; border-color: {WARNING}; }}
 QToolButton#narrow {{ padding: 6px 5px; }}
 QToolButton::menu-indicator {{ image: none; }}
 QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}

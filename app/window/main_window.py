@@ -34,6 +34,7 @@ from app.views.controls.plain import Label
 from app.views.controls.preset_bar import PresetBar
 from app.views.controls.sideways import Sideways
 from app.views.controls.transport_bar import TransportBar
+from app.views.instrument.panel import InstrumentPanel
 from engine.kernels import cache  # and not the compiler
 
 KEYS = (  # (key, name of the signal, what it does)
@@ -54,6 +55,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("Ctrl+,", "audio_asked", "audio settings"),
     ("F8", "notices_asked", "notices since the start"),
     ("Ctrl+M", "midi_asked", "MIDI"),
+    ("Ctrl+K", "instrument_asked", "show or hide the instrument: keys and patch"),
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
@@ -92,6 +94,7 @@ class MainWindow(QMainWindow):
     audio_asked = Signal()
     notices_asked = Signal()
     midi_asked = Signal()
+    instrument_asked = Signal()
     browse_asked = Signal()
     file_dropped = Signal(str)  # a path
     help_asked = Signal()
@@ -109,6 +112,7 @@ class MainWindow(QMainWindow):
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
+        self.instrument = InstrumentPanel()
         self.notices = NoticeBar()
         self.error_label = Label()
         self.error_label.setToolTip(
@@ -122,6 +126,12 @@ class MainWindow(QMainWindow):
         self.rate_label.setObjectName("badge")
         self._audio_button = tool_button("Audio …", "Audio settings", "Audio output, sample rate and buffer (Ctrl+,)")
         self._audio_button.clicked.connect(self.audio_asked)
+        tip = "Show or hide the instrument: keys and patch (Ctrl+K)"
+        self._instrument_button = tool_button("Keys", "Instrument", tip)
+        self._instrument_button.setCheckable(True)
+        self._instrument_button.setChecked(True)
+        self._instrument_button.toggled.connect(self.show_instrument)
+        self.instrument_asked.connect(self._instrument_button.toggle)
         self.menu = AppMenu(self)
         self._menu_button = menu_button(self.menu)
         self._lay_out()
@@ -144,7 +154,8 @@ class MainWindow(QMainWindow):
         tip = "Blind listening test: can you tell A and B apart? (Ctrl+T)"
         self._test_button = test = tool_button("ABX …", "Listening test", tip)
         test.clicked.connect(self.abx_asked)
-        for widget in (test, self.rate_label, self.notices.bell, self._audio_button, self._menu_button):
+        aside = (self._instrument_button, test, self.rate_label, self.notices.bell)
+        for widget in (*aside, self._audio_button, self._menu_button):
             head.addWidget(widget)
         facts = QHBoxLayout()
         facts.setSpacing(24)
@@ -174,6 +185,7 @@ class MainWindow(QMainWindow):
         column.addWidget(self.notices)
         column.addWidget(self._stage, 1)
         column.addWidget(Sideways(self.transport))
+        column.addWidget(self.instrument)
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
@@ -194,9 +206,9 @@ class MainWindow(QMainWindow):
 
     def order_tabs(self) -> None:
         """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""
-        header = (self.presets, self.notices.bell, self._audio_button, self._menu_button)
+        header = (self.presets, self._instrument_button, self.notices.bell, self._audio_button, self._menu_button)
         chain: list[QWidget] = []
-        for part in (*header, self.notices, self._string, self.left, self.right, self.transport):
+        for part in (*header, self.notices, self._string, self.left, self.right, self.transport, self.instrument):
             inside = [part, *part.findChildren(QWidget)]
             stops = [
                 widget
@@ -213,7 +225,17 @@ class MainWindow(QMainWindow):
         for part in (self.presets, self.transport, self._test_button, self._audio_button, self._menu_button):
             part.setEnabled(alive)
         self._decks.setVisible(alive)
+        self.instrument.setEnabled(alive)
         self.rate_label.setVisible(alive)
+
+    @property
+    def shows_instrument(self) -> bool:
+        return self._instrument_button.isChecked()
+
+    def show_instrument(self, shown: bool) -> None:
+        """Folds the instrument away, or shows it."""
+        self._instrument_button.setChecked(shown)
+        self.instrument.setVisible(shown)
 
     def show_solo(self, mode: int) -> None:
         """Which mode is heard alone; 0: all are heard."""

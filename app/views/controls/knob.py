@@ -10,9 +10,11 @@ from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent,
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
 from app.views import theme
+from app.views.controls.plain import plain_tip
 
 SWEEP_DEGREES = 270
 WIDTH, NARROW_WIDTH = 62, 52
+HEIGHT, LOW_HEIGHT = 82, 60
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
@@ -79,13 +81,19 @@ class Knob(QWidget):
         self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
         self._editor: QLineEdit | None = None
         self._width = WIDTH
+        self._low = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(name)
         self.setAccessibleDescription(limits.text.format(self._value))
-        self.setToolTip(
-            f"{tip or name}\nDrag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
-        )
+        self.set_name(name, tip)
+
+    def set_name(self, name: str, tip: str = "") -> None:
+        """Both may come from a file."""
+        self._name = name
+        self.setAccessibleName(name)
+        told = "Drag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
+        self.setToolTip(plain_tip(f"{tip or name}\n{told}"))
+        self.update()
 
     @property
     def value(self) -> float:
@@ -103,16 +111,21 @@ class Knob(QWidget):
         return self.limits.text.format(self._value)
 
     def sizeHint(self) -> QSize:
-        return QSize(self._width, 82)
+        return QSize(self._width, LOW_HEIGHT if self._low else HEIGHT)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(self._width, 82)
+        return QSize(self._width, LOW_HEIGHT if self._low else HEIGHT)
 
     def set_narrow(self, narrow: bool) -> None:
         """For a window with little room."""
         self._width = NARROW_WIDTH if narrow else WIDTH
         self.updateGeometry()
         self.update()
+
+    def set_low(self, low: bool) -> None:
+        """Smaller, for rows of many knobs; as narrow as can be."""
+        self._low = low
+        self.set_narrow(low)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -217,7 +230,7 @@ class Knob(QWidget):
         if self.hasFocus():
             painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
-        middle, radius = QPointF(self.width() / 2, 38), 18.0
+        middle, radius = (QPointF(self.width() / 2, 29), 13.0) if self._low else (QPointF(self.width() / 2, 38), 18.0)
         ring = QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
         start = 90 + SWEEP_DEGREES / 2
         share = self.limits.share(self._value)
@@ -235,11 +248,9 @@ class Knob(QWidget):
         width = self.width()
         painter.setFont(theme.small_font(9 if self._width == NARROW_WIDTH else 10))
         painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
-        painter.drawText(QRectF(0, 3, width, 14), Qt.AlignmentFlag.AlignCenter, self._name.upper())
+        name = painter.fontMetrics().elidedText(self._name.upper(), Qt.TextElideMode.ElideRight, width)
+        painter.drawText(QRectF(0, 0 if self._low else 3, width, 14), Qt.AlignmentFlag.AlignCenter, name)
         painter.setPen(ink)
-        painter.setFont(theme.small_font(12))
-        painter.drawText(
-            QRectF(0, self.height() - 23, width, 18),
-            Qt.AlignmentFlag.AlignCenter,
-            self.text,
-        )
+        painter.setFont(theme.small_font(10 if self._low else 12))
+        foot = 17 if self._low else 23
+        painter.drawText(QRectF(0, self.height() - foot, width, 18), Qt.AlignmentFlag.AlignCenter, self.text)

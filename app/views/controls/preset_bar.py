@@ -7,39 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.name_button import NameButton
 from app.views.controls.parts import tool_button
 
 if TYPE_CHECKING:
     from app.presets.library import PresetEntry
-
-PADDING = 26  # of the style sheet, with the borders
-
-
-class _Name(QPushButton):
-    """Cut in the middle where there is little room: presets of one string differ at their ends."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.setObjectName("preset")
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setText(text)
-
-    def setText(self, text: str) -> None:
-        self._whole = text
-        self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        cut, room = Qt.TextElideMode.ElideMiddle, self.width() - PADDING
-        super().setText(self.fontMetrics().elidedText(self._whole, cut, room, Qt.TextFlag.TextShowMnemonic))
 
 
 class PresetBar(QWidget):
@@ -57,7 +33,7 @@ class PresetBar(QWidget):
             button.setObjectName("narrow")
         previous.clicked.connect(lambda: self.step_asked.emit(-1))
         following.clicked.connect(lambda: self.step_asked.emit(1))
-        self.name = _Name("Reading presets …")
+        self.name = NameButton("Reading presets …")
         self.name.setMinimumWidth(100)
         self.name.setMaximumWidth(420)
         self.name.clicked.connect(self.browse_asked)

@@ -1,0 +1,218 @@
+"""The strings as they lie: a neck with frets, or a fan of many strings. What sounds is seen where it is held.
+
+A few strings are rows, the highest above, with frets where a string of equal tension needs them, 1 - 2^(-n/12) of its
+length from the nut. Many strings, or one that is shortened for every key, stand side by side, each as long as its key
+leaves it (drawn as the square root, or the highest would be a hair).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.views import theme
+from app.views.instrument.playable import Playable, note_name
+
+HEIGHT = 104
+MOST_ROWS, MOST_FRETS = 8, 24
+NAMES_WIDTH = 40  # open strings, left of the nut
+FOOT = 15  # numbers of frets, names of octaves
+SHORTEST = 0.14  # of the fan's height
+INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
+TIP = (
+    "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
+    "Right button or Shift: the note stays down. With the keyboard: arrows and Enter"
+)
+
+
+def fret_share(fret: float, frets: int) -> float:
+    """Where a fret lies between the nut, 0, and the last of `frets`, 1."""
+    return (1 - 2 ** (-fret / 12)) / (1 - 2 ** (-frets / 12))
+
+
+class Neck(Playable):
+    """A key is played on the highest string at or below it, as patches do."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Strings", TIP, parent)
+        self._strings: tuple[tuple[str, int], ...] = ()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._set_cursor(60)
+
+    def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
+        """Name and open key of each; none or one that is fretted for every key is shown as a fan."""
+        ordered = tuple(sorted(strings, key=lambda string: string[1]))
+        if ordered != self._strings:
+            self.let_go()
+            self._strings = ordered
+            self.update()
+
+    @property
+    def in_rows(self) -> bool:
+        """Whether it is a neck, not a fan."""
+        return 1 < len(self._strings) <= MOST_ROWS
+
+    def sizeHint(self) -> QSize:
+        return QSize(720, HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(480, HEIGHT)
+
+    # Where keys are
+
+    @property
+    def frets(self) -> int:
+        """How many a neck has: to the highest key, and two octaves at most."""
+        highest = self._strings[-1][1] if self._strings else self._low
+        return min(max(self._high - highest, 12), MOST_FRETS)
+
+    def string_of(self, key: int) -> int:
+        """Which string sounds a key, counted from the lowest."""
+        below = [number for number, (_, open_key) in enumerate(self._strings) if open_key <= key]
+        return below[-1] if below else 0
+
+    def fret_x(self, fret: float) -> float:
+        """In pixels."""
+        return NAMES_WIDTH + fret_share(fret, self.frets) * (self.width() - NAMES_WIDTH - 6)
+
+    def cell(self, string: int, fret: int) -> QRectF:
+        """What a finger stops: from the fret before to this one; of an open string, its name."""
+        height = (self.height() - FOOT) / len(self._strings)
+        top = (len(self._strings) - 1 - string) * height
+        left = 0.0 if fret <= 0 else self.fret_x(fret - 1)
+        return QRectF(left, top, self.fret_x(max(fret, 0)) - left, height)
+
+    def key_rect(self, key: int) -> QRectF:
+        if self.in_rows:
+            string = self.string_of(key)
+            fret = key - self._strings[string][1]
+            return self.cell(string, min(fret, self.frets)).adjusted(-6, -3, 6, 3)
+        return self._column(key)
+
+    def _column(self, key: int) -> QRectF:
+        width = self.width() / (self._high - self._low + 1)
+        return QRectF((key - self._low) * width, 0, width, self.height())
+
+    def key_at(self, at: QPointF) -> int | None:
+        if not (0 <= at.x() < self.width() and 0 <= at.y() < self.height()):
+            return None
+        if not self.in_rows:
+            return self._low + int(at.x() / self.width() * (self._high - self._low + 1))
+        string = self._row_at(at)
+        fret = next((n for n in range(self.frets + 1) if at.x() < self.fret_x(n)), None)
+        return None if fret is None or at.y() >= self.height() - FOOT else self._strings[string][1] + fret
+
+    def _row_at(self, at: QPointF) -> int:
+        height = (self.height() - FOOT) / len(self._strings)
+        return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
+
+    def share_at(self, key: int, at: QPointF) -> float:
+        if not self.in_rows:
+            return at.y() / (self.height() - FOOT)
+        rect = self.cell(self._row_at(at), 0)
+        return (at.y() - rect.top()) / rect.height()
+
+    # How it looks
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self.in_rows:
+            self._paint_neck(painter)
+        else:
+            self._paint_fan(painter, QRectF(event.rect()))
+
+    def _paint_neck(self, painter: QPainter) -> None:
+        bottom = self.height() - FOOT
+        board = QRectF(NAMES_WIDTH, 1, self.fret_x(self.frets) - NAMES_WIDTH, bottom - 2)
+        painter.setPen(QPen(QColor(theme.LINE), 1))
+        painter.setBrush(QColor(theme.RAISED))
+        painter.drawRoundedRect(board, 3, 3)
+        painter.setFont(theme.small_font(9))
+        for fret in range(1, self.frets + 1):
+            x, before = self.fret_x(fret), self.fret_x(fret - 1)
+            if fret in INLAYS:
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(theme.blended(theme.LINE, theme.RAISED, 0.55))
+                painter.drawRect(QRectF(before, 2, x - before, bottom - 4))
+                painter.setPen(QColor(theme.FAINT))
+                painter.drawText(
+                    QRectF(before - 10, bottom + 2, x - before + 20, 12), Qt.AlignmentFlag.AlignCenter, str(fret)
+                )
+        for fret in range(self.frets + 1):
+            x = self.fret_x(fret)
+            painter.setPen(QPen(QColor(theme.FAINT if fret == 0 else theme.LINE), 3 if fret == 0 else 1.5))
+            painter.drawLine(QPointF(x, 2), QPointF(x, bottom - 2))
+        for number, (name, open_key) in enumerate(self._strings):
+            row = self.cell(number, 0)
+            y = row.center().y()
+            painter.setFont(theme.small_font(11, bold=True))
+            painter.setPen(QColor(theme.TEXT if self.sounds(open_key) else theme.DISABLED))
+            painter.drawText(
+                QRectF(0, row.top(), NAMES_WIDTH - 8, row.height()),
+                Qt.AlignmentFlag.AlignCenter,
+                _short(painter, name),
+            )
+            thick = 1 + 1.6 * (len(self._strings) - 1 - number) / max(1, len(self._strings) - 1)
+            painter.setPen(QPen(theme.blended(theme.FAINT, theme.RAISED, 0.9), thick))
+            painter.drawLine(QPointF(NAMES_WIDTH, y), QPointF(board.right(), y))
+        self._paint_dots(painter, board.right())
+
+    def _paint_dots(self, painter: QPainter, right: float) -> None:
+        size = min(15.0, (self.height() - FOOT) / len(self._strings) - 2)
+        for key in sorted({*self._levels, *self._held, *(k for k in (self._down, self._typed) if k is not None)}):
+            string = self.string_of(key)
+            cell = self.cell(string, min(key - self._strings[string][1], self.frets))
+            level = self.level(key)
+            middle = QPointF(
+                cell.right() - min(size, cell.width() / 2) if cell.left() else NAMES_WIDTH, cell.center().y()
+            )
+            if level > 0:
+                painter.setPen(QPen(theme.blended(self.colour.name(), theme.RAISED, 0.35 + 0.65 * level), 2.2))
+                painter.drawLine(middle, QPointF(right, middle.y()))
+            painter.setPen(QPen(QColor(theme.PANEL), 1))
+            painter.setBrush(theme.blended(self.colour.name(), theme.FAINT, level))
+            painter.drawEllipse(middle, size / 2, size / 2)
+        if self.hasFocus():
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
+            string = self.string_of(self._cursor)
+            rect = self.cell(string, min(self._cursor - self._strings[string][1], self.frets))
+            painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), 3, 3)
+
+    def _paint_fan(self, painter: QPainter, dirty: QRectF) -> None:
+        open_keys = {open_key for _, open_key in self._strings}
+        bottom = self.height() - FOOT
+        painter.setFont(theme.small_font(9))
+        for key in range(self._low, self._high + 1):
+            column = self._column(key)
+            if not column.adjusted(-14, 0, 14, 0).intersects(dirty):
+                continue
+            length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (bottom - 6)
+            x, level = column.center().x(), self.level(key)
+            ink = theme.blended(
+                theme.TEXT if key in open_keys else theme.FAINT, theme.PANEL, 0.9 if key in open_keys else 0.5
+            )
+            if level > 0:
+                ink = theme.blended(self.colour.name(), theme.PANEL, 0.35 + 0.65 * level)
+            thick = 2.4 - 1.4 * (key - self._low) / max(1, self._high - self._low)
+            painter.setPen(QPen(ink, thick + (1 if level > 0 else 0)))
+            painter.drawLine(QPointF(x, 3), QPointF(x, 3 + length))
+            if level > 0 or self.is_down(key):
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(theme.blended(self.colour.name(), theme.FAINT, level))
+                painter.drawEllipse(QPointF(x, 3 + length), 4, 4)
+            if key % 12 == 0:
+                painter.setPen(QColor(theme.FAINT))
+                painter.drawText(QRectF(x - 16, bottom + 1, 32, 12), Qt.AlignmentFlag.AlignCenter, note_name(key))
+            if self.hasFocus() and key == self._cursor:
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.setPen(QPen(QColor(theme.TEXT), 1.5))
+                painter.drawRoundedRect(column.adjusted(0.5, 1, -0.5, -FOOT), 3, 3)
+
+
+def _short(painter: QPainter, name: str) -> str:
+    return painter.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, NAMES_WIDTH - 8)

@@ -1,0 +1,146 @@
+"""The strip that is played: the patch above, keys or a neck below; between them the string's knobs, if wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+
+from app.views.controls.parts import tool_button
+from app.views.controls.plain import Label
+from app.views.controls.segments import Segments
+from app.views.controls.sideways import Sideways
+from app.views.instrument.neck import Neck
+from app.views.instrument.patch_bar import PatchBar
+from app.views.instrument.piano_keys import PianoKeys
+from app.views.instrument.string_knobs import StringKnobs
+
+HINT = "Press A … L, or click the keys"
+_SURFACES = (
+    ("keys", "Keys", "Show a piano's keyboard"),
+    ("neck", "Strings", "Show the strings and where they are stopped"),
+)
+
+
+class InstrumentPanel(QFrame):
+    """Its parts are reached by name: `bar`, `keys`, `neck`, `knobs`."""
+
+    pressed = Signal(int, int)  # key, velocity
+    released = Signal(int)
+    surface_changed = Signal()  # another one is shown, or the knobs; see `surface`, `unfolded`
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("panel")
+        self.setAccessibleName("Instrument")
+        self.bar = PatchBar()
+        self.keys = PianoKeys()
+        self.neck = Neck()
+        self.knobs = StringKnobs()
+        for played in (self.keys, self.neck):
+            played.pressed.connect(self._press)
+            played.released.connect(self.released)
+        self._choice = Segments("Surface", _SURFACES)
+        self._choice.chosen.connect(self.show_surface)
+        self._fold = tool_button("String …", "Knobs of the string", "Show or hide the knobs of the string")
+        self._fold.setCheckable(True)
+        self._fold.toggled.connect(self.set_unfolded)
+        self._hint = Label(HINT, self)
+        self._hint.setObjectName("hint")
+        self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self.keys)
+        self._stack.addWidget(self.neck)
+        self._stack.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._knobs_row = Sideways(self.knobs)
+        self._knobs_row.hide()
+        side = QVBoxLayout()
+        side.setSpacing(4)
+        side.addWidget(self._choice)
+        side.addWidget(self._fold)
+        side.addStretch(1)
+        below = QHBoxLayout()
+        below.setSpacing(8)
+        below.addLayout(side)
+        below.addWidget(self._stack, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(12, 8, 12, 10)
+        column.setSpacing(8)
+        column.addWidget(Sideways(self.bar))
+        column.addWidget(self._knobs_row)
+        column.addLayout(below)
+        self._stack.installEventFilter(self)
+
+    # What is shown
+
+    @property
+    def surface(self) -> str:
+        """ "keys" or "neck"."""
+        return self._choice.key
+
+    def show_surface(self, surface: str) -> None:
+        self._choice.show_key(surface)
+        self._stack.setCurrentWidget(self.keys if surface == "keys" else self.neck)
+        self.surface_changed.emit()
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether the string's knobs are shown."""
+        return self._fold.isChecked()
+
+    def set_unfolded(self, unfolded: bool) -> None:
+        self._fold.setChecked(unfolded)
+        self._knobs_row.setVisible(unfolded)
+        self.surface_changed.emit()
+
+    def set_range(self, low: int, high: int) -> None:
+        """The lowest and the highest key that have a string."""
+        self.keys.set_range(low, high)
+        self.neck.set_range(low, high)
+
+    def set_octave(self, octave: int) -> None:
+        """Of the computer's keys."""
+        self.bar.show_octave(octave)
+
+    def show_letters(self, letters: Mapping[int, str]) -> None:
+        """The computer's keys, by the key that each plays."""
+        self.keys.show_letters(letters)
+
+    def show_sounding(self, levels: Mapping[int, float]) -> None:
+        """How loud each key sounds, 0 … 1. The first one takes the hint away."""
+        if levels:
+            self.hide_hint()
+        self.keys.show_sounding(levels)
+        self.neck.show_sounding(levels)
+
+    def show_source(self, source: str) -> None:
+        """Who is heard."""
+        self.keys.show_source(source)
+        self.neck.show_source(source)
+
+    def hide_hint(self) -> None:
+        self._hint.hide()
+
+    def let_go(self) -> None:
+        """Releases what the mouse holds."""
+        self.keys.let_go()
+        self.neck.let_go()
+
+    def _press(self, key: int, velocity: int) -> None:
+        self.hide_hint()
+        self.pressed.emit(key, velocity)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show):
+            self._place_hint()
+        return super().eventFilter(watched, event)
+
+    def _place_hint(self) -> None:
+        self._hint.adjustSize()
+        place = self._stack.geometry()
+        self._hint.move(place.center().x() - self._hint.width() // 2, place.top() + 8)
+        self._hint.raise_()

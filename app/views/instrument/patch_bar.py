@@ -1,0 +1,241 @@
+"""Which patch: previous, next, its name, which opens the browser; save, rename, revert; its macros, body and room.
+
+Beside them is told what the instrument does: the octave of the computer's keys, how many voices ring, recording, and
+what lies beyond the model's training.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+
+from app.views.controls.knob import Knob, KnobRange
+from app.views.controls.name_button import NameButton
+from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
+from app.views.controls.plain import Label, plain_tip
+
+if TYPE_CHECKING:
+    from app.patches.patch import Macro, Patch
+
+MOST_MACROS = 8
+SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
+_MIXES = {  # field of a patch -> (label, range, tip)
+    "body.mix": ("body", SHARE, "How much is heard of the body that the strings stand on"),
+    "room.mix": ("room", KnobRange(0, 1, 0, 0.02, "{:.0%}"), "How much is heard of the room"),
+    "level_db": ("level", KnobRange(-60, 24, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
+}
+
+
+class PatchBar(QFrame):
+    """Asks with signals, shows with setters."""
+
+    previous_asked = Signal()
+    next_asked = Signal()
+    browse_asked = Signal()
+    save_asked = Signal()
+    rename_asked = Signal()
+    revert_asked = Signal()
+    record_asked = Signal()  # begin or end
+    octave_asked = Signal(int)  # up or down by so many
+    macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
+    changed = Signal(str, float)  # a field of a patch and its new value
+    body_chosen = Signal(str)  # its name; "": none
+    drag_started = Signal()
+    drag_ended = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Patch")
+        self._macros: tuple[Macro, ...] = ()
+        self.knobs = {field: Knob(name, limits, tip) for field, (name, limits, tip) in _MIXES.items()}
+        for field, knob in self.knobs.items():
+            knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
+        self.macros = [Knob(f"macro {number + 1}", SHARE) for number in range(MOST_MACROS)]
+        for number, knob in enumerate(self.macros):
+            knob.value_asked.connect(lambda value, number=number: self.macro_turned.emit(number, value))
+            knob.hide()
+        for knob in (*self.macros, *self.knobs.values()):
+            knob.set_low(True)
+            knob.drag_started.connect(self.drag_started)
+            knob.drag_ended.connect(self.drag_ended)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        row.addLayout(self._build_words(), 1)
+        row.addWidget(vertical_rule())
+        turned = QHBoxLayout()
+        turned.setSpacing(0)
+        for knob in self.macros:
+            turned.addWidget(knob)
+        row.addLayout(turned)
+        row.addWidget(vertical_rule())
+        row.addLayout(self._build_sound())
+
+    def _build_words(self) -> QVBoxLayout:
+        previous = tool_button("◀", "Previous patch", "Previous patch in the browser's list")
+        following = tool_button("▶", "Next patch", "Next patch in the browser's list")
+        for button in (previous, following):
+            button.setObjectName("narrow")
+        previous.clicked.connect(self.previous_asked)
+        following.clicked.connect(self.next_asked)
+        self.name = NameButton("No patch")
+        self.name.setToolTip("Browse the patches")
+        self.name.setMinimumWidth(130)
+        self.name.setMaximumWidth(320)
+        self.name.clicked.connect(self.browse_asked)
+        self.category = Label()
+        self.category.setObjectName("badge")
+        self.category.setToolTip("The patch's category")
+        self.save = tool_button("Save", "Save the patch", "Save the patch; a shipped one under a name of your own")
+        self.rename = tool_button("Rename …", "Rename the patch", "Give your patch another name")
+        self.revert = tool_button("Revert", "Revert the patch", "As it was saved; your changes are given up")
+        for button, signal in (
+            (self.save, self.save_asked),
+            (self.rename, self.rename_asked),
+            (self.revert, self.revert_asked),
+        ):
+            button.setObjectName("small")
+            button.clicked.connect(signal)
+        above = QHBoxLayout()
+        above.setSpacing(6)
+        for widget in (previous, self.name, following, self.category):
+            above.addWidget(widget, 1000 if widget is self.name else 0)
+        above.addStretch(1)
+        for button in (self.save, self.rename, self.revert):
+            above.addWidget(button)
+        column = QVBoxLayout()
+        column.setSpacing(4)
+        column.addLayout(above)
+        column.addLayout(self._build_state())
+        return column
+
+    def _build_state(self) -> QHBoxLayout:
+        self.note = words_label()
+        lower = tool_button("−", "Octave down", "The computer's keys play an octave lower")
+        higher = tool_button("+", "Octave up", "The computer's keys play an octave higher")
+        lower.clicked.connect(lambda: self.octave_asked.emit(-1))
+        higher.clicked.connect(lambda: self.octave_asked.emit(1))
+        self.octave = faint()
+        self.octave.setToolTip("Where the computer's keys play; C4 is middle C")
+        self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.voices = faint("0 voices")
+        self.voices.setToolTip("How many strings ring now")
+        self.voices.setMinimumWidth(62)
+        self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.record = QToolButton()
+        self.record.setCheckable(True)
+        self.record.setObjectName("record")
+        self.record.clicked.connect(self.record_asked)
+        for button in (lower, higher):
+            button.setObjectName("chip")
+        row = QHBoxLayout()
+        row.setSpacing(4)
+        row.addWidget(self.note, 1)
+        for widget in (lower, self.octave, higher, self.voices, self.record):
+            row.addWidget(widget)
+        self.show_octave(4)
+        self.show_recording(None)
+        self.show_note("")
+        return row
+
+    def _build_sound(self) -> QHBoxLayout:
+        self.body = combo_box("Body", [("No body", "")])
+        self.body.setToolTip("What the strings stand on")
+        self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.body.setMinimumWidth(104)
+        self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
+        head = Label("BODY")
+        head.setObjectName("knob")
+        column = QVBoxLayout()
+        column.setSpacing(3)
+        column.addWidget(head, alignment=Qt.AlignmentFlag.AlignHCenter)
+        column.addWidget(self.body)
+        column.addStretch(1)
+        row = QHBoxLayout()
+        row.setSpacing(0)
+        row.addLayout(column)
+        for knob in self.knobs.values():
+            row.addWidget(knob)
+        return row
+
+    # What is shown
+
+    def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
+        """Name and title of each; none is always there."""
+        chosen = self.body.currentData()
+        with QSignalBlocker(self.body):
+            self.body.clear()
+            for name, title in (("", "No body"), *bodies):
+                self.body.addItem(title, name)
+            self._show_body(chosen or "")
+
+    def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
+        """`own`: it is the user's, so that it can be renamed; `changed`: it is not as it was saved."""
+        mark = "●  " if changed else ""
+        self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
+        self.name.setAccessibleName(f"Patch: {patch.name}{', changed' if changed else ''}")
+        told = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
+        self.name.setToolTip(plain_tip(f"{told}\nClick to browse the patches"))
+        self.category.setText(patch.category)
+        self.save.setEnabled(changed)
+        self.revert.setEnabled(changed)
+        self.rename.setEnabled(own)
+        self._show_macros(patch.macros)
+        self.knobs["body.mix"].set_value(patch.body.mix)
+        self.knobs["body.mix"].setEnabled(bool(patch.body.name))
+        self.knobs["room.mix"].set_value(patch.room.mix)
+        self.knobs["level_db"].set_value(patch.level_db)
+        with QSignalBlocker(self.body):
+            self._show_body(patch.body.name)
+
+    def _show_macros(self, macros: tuple[Macro, ...]) -> None:
+        for number, knob in enumerate(self.macros):
+            knob.setVisible(number < len(macros))
+            if number >= len(macros):
+                continue
+            macro = macros[number]
+            if number >= len(self._macros) or self._macros[number].name != macro.name:
+                fields = ", ".join(target.field for target in macro.targets)
+                knob.set_name(macro.name, f"{macro.name}: turns {fields}")
+            knob.set_value(macro.value)
+        self._macros = macros
+
+    def _show_body(self, name: str) -> None:
+        row = self.body.findData(name)
+        if row < 0:  # a body that is not there any more
+            self.body.addItem(name, name)
+            row = self.body.count() - 1
+        self.body.setCurrentIndex(row)
+
+    def show_voices(self, voices: int, most: int | None = None) -> None:
+        """How many ring, of how many at most."""
+        of = f" of {most}" if most is not None else ""
+        self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
+
+    def show_octave(self, octave: int) -> None:
+        """Of the computer's lower row of keys, from its C."""
+        self.octave.setText(f"C{octave}")
+        self.octave.setAccessibleName(f"Octave of the computer's keys: C{octave}")
+
+    def show_recording(self, seconds: float | None) -> None:
+        """For how long it has been recording; None: it is not."""
+        on = seconds is not None
+        self.record.setChecked(on)
+        self.record.setText(
+            f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}" if seconds is not None else "●  Record"
+        )
+        self.record.setAccessibleName("End recording" if on else "Record what is played")
+        self.record.setToolTip("End the recording and save it" if on else "Record what is played")
+
+    def show_note(self, text: str) -> None:
+        """What is beyond the model's training, or "" where nothing is."""
+        if text == self.note.text():
+            return
+        self.note.setObjectName("warning" if text else "faint")
+        self.note.style().unpolish(self.note)
+        self.note.style().polish(self.note)
+        self.note.say(text)
+        self.note.setToolTip(plain_tip(text))

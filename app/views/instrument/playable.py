@@ -1,0 +1,242 @@
+"""What the keys and the neck have in common: a surface of places that sound when they are touched."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QFocusEvent, QHideEvent, QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import QWidget
+
+from app.views import theme
+from app.views.controls.parts import ENTER_KEYS
+
+SOFTEST, HARDEST = 16, 127  # velocities of a click at the top and at the bottom of a place
+TYPED = 96  # velocity of the Enter key
+LEVEL_STEPS = 24  # that can be told apart; finer changes are not painted
+NAMES = ("C", "C♯", "D", "E♭", "E", "F", "F♯", "G", "A♭", "A", "B♭", "B")
+_MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
+
+
+def note_name(key: int) -> str:
+    """With its octave; key 60 is C4."""
+    return f"{NAMES[key % 12]}{key // 12 - 1}"
+
+
+class Playable(QWidget):
+    """Keys that are pressed with the mouse or with Enter, and lit by what sounds.
+
+    Left button: plays while it is down; moved to other keys it plays these (glissando).
+    Right button, or Shift: the key stays down until it is clicked so again.
+    Arrows and Enter: choose a key and play it.
+    """
+
+    pressed = Signal(int, int)  # key, velocity
+    released = Signal(int)
+
+    def __init__(self, name: str, tip: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._low, self._high = 28, 88
+        self._source = "model"
+        self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
+        self._down: int | None = None  # by the mouse
+        self._typed: int | None = None  # by Enter
+        self._held: set[int] = set()
+        self._cursor = 60
+        theme.changes.face_changed.connect(self.update)
+
+    # What a surface is
+
+    @abstractmethod
+    def key_at(self, at: QPointF) -> int | None:
+        """The key under a point, whether it can sound or not."""
+
+    @abstractmethod
+    def key_rect(self, key: int) -> QRectF:
+        """All that changes when a key sounds."""
+
+    @abstractmethod
+    def share_at(self, key: int, at: QPointF) -> float:
+        """How far down on a key a point lies, 0 … 1."""
+
+    # What is shown
+
+    def set_range(self, low: int, high: int) -> None:
+        """The lowest and the highest key that have a string."""
+        if (low, high) != (self._low, self._high):
+            self.let_go()
+            self._low, self._high = low, high
+            self._set_cursor(self._cursor)
+            self.lay_out()
+            self.update()
+
+    def lay_out(self) -> None:
+        """Called where the range or the size has changed."""
+
+    def show_sounding(self, levels: Mapping[int, float]) -> None:
+        """How loud each key sounds, 0 … 1; keys that are left out are silent."""
+        steps = {key: round(min(max(level, 0.0), 1.0) * LEVEL_STEPS) for key, level in levels.items()}
+        steps = {key: step for key, step in steps.items() if step > 0}
+        if steps == self._levels:
+            return
+        for key in self._levels.keys() | steps.keys():
+            if self._levels.get(key) != steps.get(key):
+                self._repaint(key)
+        self._levels = steps
+
+    def show_source(self, source: str) -> None:
+        """Who is heard: keys are lit in its colour."""
+        if source != self._source:
+            self._source = source
+            self.update()
+
+    @property
+    def held(self) -> frozenset[int]:
+        """Keys that stay down by themselves."""
+        return frozenset(self._held)
+
+    def let_go(self) -> None:
+        """Releases whatever is down."""
+        if self._typed is not None:
+            typed, self._typed = self._typed, None
+            self._release(typed)
+        if self._down is not None:
+            down, self._down = self._down, None
+            if down not in self._held:
+                self._release(down)
+        for key in sorted(self._held):
+            self._held.discard(key)
+            self._release(key)
+
+    def sounds(self, key: int | None) -> bool:
+        """Whether a key has a string."""
+        return key is not None and self._low <= key <= self._high
+
+    # For painting
+
+    def level(self, key: int) -> float:
+        return self._levels.get(key, 0) / LEVEL_STEPS
+
+    def is_down(self, key: int) -> bool:
+        return key in (self._down, self._typed) or key in self._held
+
+    @property
+    def colour(self) -> QColor:
+        return QColor(theme.SOURCE_COLOURS[theme.source_kind(self._source)])
+
+    # Hands
+
+    def velocity_at(self, key: int, at: QPointF) -> int:
+        """Harder further down."""
+        return round(SOFTEST + min(max(self.share_at(key, at), 0.0), 1.0) * (HARDEST - SOFTEST))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        key = self.key_at(event.position())
+        if key is None or not self.sounds(key) or self._down is not None:
+            return
+        holding = event.button() == Qt.MouseButton.RightButton or (
+            event.button() == Qt.MouseButton.LeftButton and event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        )
+        if holding:
+            if key in self._held:
+                self._held.discard(key)
+                self._release(key)
+            else:
+                self._held.add(key)
+                self._press(key, self.velocity_at(key, event.position()))
+        elif event.button() == Qt.MouseButton.LeftButton:
+            self._down = key
+            self._press(key, self.velocity_at(key, event.position()))
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.mousePressEvent(event)  # fast repeats are notes too
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._down is None:
+            return
+        key = self.key_at(event.position())
+        if key is None or key == self._down or not self.sounds(key):
+            return
+        before, self._down = self._down, key
+        if before not in self._held:
+            self._release(before)
+        self._press(key, self.velocity_at(key, event.position()))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and self._down is not None:
+            down, self._down = self._down, None
+            if down not in self._held:
+                self._release(down)
+
+    def event(self, event: QEvent) -> bool:
+        """Enter plays while the surface has the keyboard, though the window has a shortcut of it."""
+        if (
+            event.type() == QEvent.Type.ShortcutOverride
+            and isinstance(event, QKeyEvent)
+            and event.key() in ENTER_KEYS
+        ):
+            event.accept()
+            return True
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        step = _MOVES.get(Qt.Key(event.key()))
+        if step is not None:
+            self._set_cursor(self._cursor + step)
+        elif event.key() in ENTER_KEYS:
+            if not event.isAutoRepeat() and self._typed is None:
+                self._typed = self._cursor
+                self._press(self._cursor, TYPED)
+        else:
+            super().keyPressEvent(event)
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        if event.key() in ENTER_KEYS and not event.isAutoRepeat():
+            if self._typed is not None:
+                typed, self._typed = self._typed, None
+                self._release(typed)
+        else:
+            super().keyReleaseEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        if self._typed is not None:
+            typed, self._typed = self._typed, None
+            self._release(typed)
+        super().focusOutEvent(event)
+        self.update()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.update()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self.let_go()
+        super().hideEvent(event)
+
+    @property
+    def cursor_key(self) -> int:
+        """The key that Enter plays."""
+        return self._cursor
+
+    def _set_cursor(self, key: int) -> None:
+        if not self._low <= key <= self._high:
+            key = min(max(key, self._low), self._high)
+        before, self._cursor = self._cursor, key
+        self.setAccessibleDescription(f"{note_name(key)}; arrows choose a key, Enter plays it")
+        self._repaint(before)
+        self._repaint(key)
+
+    def _press(self, key: int, velocity: int) -> None:
+        self._repaint(key)
+        self.pressed.emit(key, velocity)
+
+    def _release(self, key: int) -> None:
+        self._repaint(key)
+        self.released.emit(key)
+
+    def _repaint(self, key: int) -> None:
+        self.update(self.key_rect(key).toAlignedRect().adjusted(-1, -1, 1, 1))

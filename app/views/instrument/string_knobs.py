@@ -1,0 +1,215 @@
+"""Knobs of the string itself, of how it is plucked, heard and damped; and what they make of it, in physical units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from app.views.controls.knob import Knob, KnobRange
+from app.views.controls.parts import faint, vertical_rule, words_label
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+
+if TYPE_CHECKING:
+    from app.patches.patch import Patch
+
+TIMES = "× {:.2f}"
+WHOLE = "tuning.transpose"  # turned by whole keys
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """A field of a patch as a knob."""
+
+    field: str
+    name: str
+    limits: KnobRange
+    tip: str
+
+
+def _times(low: float = 0.05, high: float = 20.0) -> KnobRange:
+    return KnobRange(low, high, 1.0, 1.03, TIMES, logarithmic=True)
+
+
+_PLACE = "0 and 1 are the ends of the string, 0.5 its middle"
+GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
+    (
+        "PITCH",
+        (
+            _Turned(
+                "tuning.a4_hz", "A4", KnobRange(220, 880, 440, 2 ** (1 / 1200), "{:.1f} Hz", True), "Pitch of A4"
+            ),
+            _Turned(
+                WHOLE, "transpose", KnobRange(-48, 48, 0, 1, "{:+.0f}"), "Semitones that everything sounds higher"
+            ),
+        ),
+    ),
+    (
+        "STRING",
+        (
+            _Turned(
+                "knobs.gauge", "gauge", _times(0.25, 4), "Thickness: thick strings are stiffer and ring otherwise"
+            ),
+            _Turned("knobs.density", "density", _times(), "Mass of the material: gut is light, steel heavy"),
+            _Turned(
+                "knobs.modulus",
+                "modulus",
+                _times(),
+                "Stiffness of the material (Young's modulus): how much a hard pluck glides in pitch",
+            ),
+            _Turned(
+                "knobs.stiffness",
+                "stiffness",
+                _times(),
+                "Bending stiffness alone: how far partials are spread (inharmonicity)",
+            ),
+        ),
+    ),
+    (
+        "DECAY",
+        (
+            _Turned("knobs.decay", "decay", _times(), "Damping of all partials alike: above 1 the sound is shorter"),
+            _Turned(
+                "knobs.brightness_decay",
+                "dulling",
+                _times(),
+                "Damping that grows with frequency: above 1 the sound darkens sooner",
+            ),
+            _Turned(
+                "damping.release_t60_s",
+                "release",
+                KnobRange(0.01, 60, 0.3, 1.1, "{:.2f} s", True),
+                "How long a key that is let go takes to fall by 60 dB",
+            ),
+        ),
+    ),
+    (
+        "PLUCK",
+        (
+            _Turned(
+                "pluck.position", "position", KnobRange(*POSITION_RANGE, 0.2, 0.01), f"Where it is plucked; {_PLACE}"
+            ),
+            _Turned(
+                "pluck.width",
+                "soft width",
+                KnobRange(*WIDTH_RANGE, 0.12, 1.05, "{:.3f}", True),
+                "Width of the softest pluck, in lengths of the string: wide is mellow",
+            ),
+            _Turned(
+                "pluck.width_hard",
+                "hard width",
+                KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", True),
+                "Width of the hardest pluck, in lengths of the string: narrow is bright",
+            ),
+            _Turned(
+                "pluck.softest_mm",
+                "softest",
+                KnobRange(0.001, LARGEST_AMPLITUDE_MM, 0.1, 1.1, "{:.2f} mm", True),
+                "How far the softest key pulls the string",
+            ),
+            _Turned(
+                "pluck.hardest_mm",
+                "hardest",
+                KnobRange(0.001, LARGEST_AMPLITUDE_MM, 3.0, 1.1, "{:.2f} mm", True),
+                "How far the hardest key pulls the string",
+            ),
+            _Turned(
+                "pluck.curve",
+                "curve",
+                KnobRange(-1, 1, 0, 0.05, "{:+.2f}"),
+                "Velocity curve: above 0 middle velocities are louder, below 0 softer",
+            ),
+        ),
+    ),
+    (
+        "PICK-UP",
+        (
+            _Turned("pickup.points.0", "place", KnobRange(0, 1, 0.37, 0.01), f"Where the string is heard; {_PLACE}"),
+            _Turned(
+                "pickup.points.1",
+                "right",
+                KnobRange(0, 1, 0.63, 0.01),
+                "Where the right channel hears the string; a patch in mono has none",
+            ),
+        ),
+    ),
+)
+SHAPED = ("pluck.width", "pluck.width_hard")  # a triangle has no width
+
+
+class StringKnobs(QWidget):
+    """Asks with `changed`, shows with `show_patch`."""
+
+    changed = Signal(str, float)  # a field of a patch and its new value
+    drag_started = Signal()
+    drag_ended = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Knobs of the string")
+        self.knobs: dict[str, Knob] = {}
+        self.facts = words_label()
+        self.facts.setFixedHeight(16)
+        self.facts.setToolTip("The string under one key, as the knobs make it")
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        for number, (title, turned) in enumerate(GROUPS):
+            if number:
+                row.addWidget(vertical_rule())
+            row.addLayout(self._group(title, turned))
+        row.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(row)
+        column.addWidget(self.facts)
+
+    def _group(self, title: str, turned: tuple[_Turned, ...]) -> QVBoxLayout:
+        head = faint(title)
+        head.setObjectName("group")
+        row = QHBoxLayout()
+        row.setSpacing(0)
+        for each in turned:
+            knob = Knob(each.name, each.limits, each.tip)
+            knob.set_low(True)
+            knob.value_asked.connect(lambda value, field=each.field: self._ask(field, value))
+            knob.drag_started.connect(self.drag_started)
+            knob.drag_ended.connect(self.drag_ended)
+            self.knobs[each.field] = knob
+            row.addWidget(knob)
+        column = QVBoxLayout()
+        column.setSpacing(0)
+        column.addWidget(head, alignment=Qt.AlignmentFlag.AlignHCenter)
+        column.addLayout(row)
+        return column
+
+    def _ask(self, field: str, value: float) -> None:
+        self.changed.emit(field, float(round(value)) if field == WHOLE else value)
+
+    def show_patch(self, patch: Patch) -> None:
+        for field, knob in self.knobs.items():
+            value = _value(patch, field)
+            knob.setEnabled(value is not None)
+            if value is not None:
+                knob.set_value(value)
+        for field in SHAPED:
+            self.knobs[field].setEnabled(patch.pluck.shape != "triangular")
+        self.knobs["damping.release_t60_s"].setEnabled(not patch.damping.let_ring)
+
+    def show_facts(self, facts: Mapping[str, str]) -> None:
+        """What the knobs make of a string: words and values with their units ("tension": "72.3 N"), in order."""
+        parts = [f"{name} {value}" for name, value in facts.items()]
+        self.facts.say("     ".join(parts), *("     ".join(parts[:n]) for n in range(len(parts) - 1, 0, -1)))
+
+
+def _value(patch: Patch, field: str) -> float | None:
+    """None where the patch has no such field: a second pick-up point."""
+    if field.startswith("tuning."):
+        return float(getattr(patch.tuning, field.removeprefix("tuning.")))
+    if field == "pickup.points.1" and len(patch.pickup.points) < 2:
+        return None
+    return patch.value(field)
