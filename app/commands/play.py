@@ -66,5 +66,6 @@ def play(
         raise Failure(str(error)) from error
     took_s, level = time.monotonic() - began_s, written.level
     say(
-        f"{out}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
+        f"{out}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
+        f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
     )

@@ -50,6 +50,10 @@ class Live:
         self._made: tuple[Struck, Note] | None = None
         self._recorded: list[TimedEvent] | None = None
         self._recording_began_s = 0.0
+        self._wished: object = None
+        self._effects: object = None  # body, room, and whether they are left out
+        self._dry = False
+        self._preparing: object = None
         self.seconds = 4.0  # that a picture of a note lasts
 
     @property
@@ -65,7 +69,7 @@ class Live:
             if patch is None:
                 self._player = None
                 return
-            self._notes.in_background(lambda: self._set_effects(effects_of(patch)))
+            self._wish_effects(patch)
             self._note_down(PatchTurned(patch))
             if player is not None and player.patch.preset == patch.preset:
                 try:
@@ -74,7 +78,7 @@ class Live:
                 except ValueError as error:
                     self._report(str(error), "")
                     return
-                self._notes.in_background(player.prepare)
+                self._prepare(player)
                 return
             self._player = None
         self._notes.in_background(lambda: self._begin(patch))
@@ -85,7 +89,7 @@ class Live:
             self._ear, player = ear, self._player
         if player is not None:
             player.listen(ear)
-            self._notes.in_background(player.prepare)
+            self._prepare(player)
 
     def handle(self, event: Event) -> tuple[Struck, Note] | None:
         """Plays an event at once; what was struck, if anything."""
@@ -121,6 +125,37 @@ class Live:
             share = min(max(1 + level / SEEN_DB, 0.0), 1.0)
             found[struck.event.key] = max(found.get(struck.event.key, 0.0), share)
         return found
+
+    def hear_dry(self, dry: bool) -> None:
+        """Without body and room, as long as models are compared with the truth."""
+        with self._lock:
+            self._dry = dry
+            if self._player is not None:
+                self._wish_effects(self._player.patch)
+
+    def _wish_effects(self, patch: Patch) -> None:
+        """In the background: to make an impulse response takes milliseconds. The latest wish counts."""
+        wish = self._wished = (patch.body, patch.room, self._dry)
+
+        def work() -> None:
+            if wish is self._wished and wish != self._effects:
+                self._effects = wish
+                self._set_effects(None if wish[2] else effects_of(patch))
+
+        self._notes.in_background(work)
+
+    def _prepare(self, player: Player) -> None:
+        """Computes keys before they are struck; another wish ends it."""
+        wish = self._preparing = object()
+
+        def work() -> None:
+            low, high = player.patch.range
+            for key in range(low, high + 1):
+                if wish is not self._preparing:
+                    return
+                player.prepare([key])
+
+        self._notes.in_background(work)
 
     # Recording
 
@@ -164,7 +199,7 @@ class Live:
             if self._ear is not None:
                 player.listen(self._ear)
             self._path, self._player = path, player
-        player.prepare()
+        self._prepare(player)
 
     def _deliver(self, struck: Struck) -> None:
         """In the event's thread, within `handle`."""

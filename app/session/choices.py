@@ -29,7 +29,7 @@ class Choices(BaseModel):
     Attributes:
         string: which a preset of many is plucked as; None: its own.
         patch: what keys play; None: they pluck the preset's own string.
-        keys: whether keys are pitches of the patch, or places on the string.
+        keys_play: whether keys are pitches of the patch, or places on the string.
         octave: by which the computer's keys are moved.
         velocity: with which they strike.
     """
@@ -61,7 +61,7 @@ class Choices(BaseModel):
     envelope: bool = True
     string: PhysicalString | None = None
     patch: Patch | None = None
-    keys: Literal["pitch", "place"] = "pitch"
+    keys_play: Literal["pitch", "place"] = "pitch"
     octave: int = Field(0, ge=-4, le=4)
     velocity: int = Field(90, ge=1, le=127)
 

@@ -33,6 +33,7 @@ from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.help_dialog import HelpDialog
 from app.views.dialogs.preset_browser import PresetBrowser
+from app.views.instrument.patch_browser import PatchBrowser
 from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
@@ -42,10 +43,11 @@ from app.window.instruments import Instruments
 from app.window.main_window import KEYS, PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
 from app.window.panels.rack import fill
+from app.window.patch_desk import PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
-from app.window.settings import Settings
+from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
 FRAME_MS = 16
@@ -120,6 +122,23 @@ class Controller(QObject):
         self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
+        self.patches = PatchDesk(
+            self.session,
+            self.library,
+            self.performance,
+            self.instruments,
+            window.instrument,
+            PatchBrowser(window),
+            settings.patch_favourites,
+        )
+        self.patches.told.connect(window.notices.tell)
+        self.instruments.struck.connect(self.patches.show_struck)
+        window.show_instrument(settings.instrument.shown)
+        window.instrument.show_surface(settings.instrument.surface)
+        window.instrument.set_unfolded(settings.instrument.unfolded)
+        for dragged in (window.instrument.bar, window.instrument.knobs):
+            dragged.drag_started.connect(self.history.hold)
+            dragged.drag_ended.connect(self.history.let_go)
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -197,6 +216,7 @@ class Controller(QObject):
 
     def play_or_stop(self) -> None:
         if self._abx is None:
+            self.patches.stop()
             self.performance.play_or_stop()
             self.window.transport.show_playing(self.performance.playing)
 
@@ -229,12 +249,14 @@ class Controller(QObject):
             return
         self.performance.stop()
         render = partial(self.performance.render_sound, self.session.choices)
+        self.performance.live.hear_dry(True)
         self._abx = AbxDialog(self.sound, subject, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
         dialog, self._abx = self._abx, None
+        self.performance.live.hear_dry(False)
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
         dialog.deleteLater()
@@ -247,7 +269,10 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """A dropped preset is taken in and chosen; a dropped WAV's recipe is restored."""
+        """A dropped preset is taken in and chosen, a WAV's recipe restored, a patch chosen, a MIDI file played."""
+        if file.suffix.lower() in (".mid", ".midi", ".json"):
+            self.patches.take_file(file)
+            return
         dropped = receive(file, self.library)
         notice = dropped.notice
         try:
@@ -269,6 +294,7 @@ class Controller(QObject):
         self._timer.stop()
         self._deck_timer.stop()
         self.keeper.close()
+        self.patches.close()
         self.instruments.close()
         for panel in self.panels:
             panel.close()
@@ -285,6 +311,12 @@ class Controller(QObject):
                 "look": self.appearance.look,
                 "midi": self.instruments.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
+                "patch_favourites": tuple(sorted(self.patches.favourites)),
+                "instrument": InstrumentChoice(
+                    shown=self.window.shows_instrument,
+                    surface=self.window.instrument.surface,
+                    unfolded=self.window.instrument.unfolded,
+                ),
                 "window_geometry": self.window.geometry_text(),
             }
         )
@@ -306,6 +338,7 @@ class Controller(QObject):
         for panel in self.panels:
             panel.choices_changed(names)
         window.show_solo(choices.solo)
+        self.patches.choices_changed(names)
         if "volume_db" in names:
             self.sound.set_volume_db(choices.volume_db)
         self._wake()
@@ -337,6 +370,7 @@ class Controller(QObject):
             if isinstance(panel, StringPanel) and panel.view.isVisible():
                 panel.show_moment(moment)
         self._deck_timer.start()
+        self.patches.tick()
         if playing or performance.moving or self._peak_db > METER_FLOOR_DB or not performance.settled:
             self._lively_until_s = now_s + LIVELY_S
         wanted_ms = FRAME_MS if now_s < self._lively_until_s else IDLE_MS

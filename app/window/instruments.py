@@ -37,6 +37,8 @@ class Instruments(QObject):
     played = Signal()
     told = Signal(str)
 
+    struck = Signal(object)  # the latest `Struck`, in the window's thread
+
     _struck = Signal(dict)  # from any thread
 
     def __init__(
@@ -54,6 +56,7 @@ class Instruments(QObject):
         self._strike, self._handle = strike, handle
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # of notes, and not in the session yet
+        self._latest: Struck | None = None  # not told yet
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
@@ -88,7 +91,7 @@ class Instruments(QObject):
     def plays_pitches(self) -> bool:
         """Whether the computer's keys are a piano's."""
         choices = self._session.choices
-        return choices.keys == "pitch" and choices.patch is not None
+        return choices.keys_play == "pitch" and choices.patch is not None
 
     def choices_changed(self) -> None:
         self._keys.piano = self.plays_pitches
@@ -110,6 +113,7 @@ class Instruments(QObject):
             }
             with self._lock:
                 self._told = {**self._told, **changes}
+                self._latest = struck
             self._struck.emit(changes)
         return True
 
@@ -128,9 +132,12 @@ class Instruments(QObject):
         """Once for all notes that were struck meanwhile."""
         with self._lock:
             told, self._told = self._told, {}
+            latest, self._latest = self._latest, None
         if told:
             self._session.play(**told)
             self.played.emit()
+        if latest is not None:
+            self.struck.emit(latest)
 
     def _press(self, press: KeyPress) -> None:
         if self.plays_pitches:

@@ -27,7 +27,7 @@ from app.patches.library import (
     save_patch,
 )
 from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet
-from app.playing.keyboard import letters_of
+from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
@@ -289,9 +289,9 @@ class PatchDesk(QObject):
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & {"patch", "preset"}:
             self._show_patch()
-        if names & {"octave", "keys", "patch"}:
+        if names & {"octave", "keys_play", "patch"}:
             choices = self._session.choices
-            self._panel.set_octave(choices.octave)
+            self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
             self._panel.show_letters(letters_of(choices.octave) if self._instruments.plays_pitches else {})
         if names & {"heard", "a", "b"}:
             self._panel.show_source(self._session.source_heard)
@@ -341,7 +341,7 @@ class PatchDesk(QObject):
         self._show_entries()
 
     def _move_octave(self, octaves: int) -> None:
-        octave = min(max(self._session.choices.octave + octaves, -4), 4)
+        octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)
         self._session.update(octave=octave)
 
     def _turn_macro(self, number: int, value: float) -> None:

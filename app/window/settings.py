@@ -28,6 +28,16 @@ from engine.whole_file import whole_file
 FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
 
 
+class InstrumentChoice(BaseModel):
+    """How the instrument's strip is shown: at all, as keys or strings, with the string's knobs."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    shown: bool = True
+    surface: Literal["keys", "neck"] = "keys"
+    unfolded: bool = False
+
+
 class Settings(BaseModel):
     """The whole file."""
 
@@ -42,6 +52,8 @@ class Settings(BaseModel):
     look: Look = Look()
     midi: MidiChoices = MidiChoices()
     favourites: tuple[str, ...] = FIRST_FAVOURITES  # names of presets
+    patch_favourites: tuple[str, ...] = ()
+    instrument: InstrumentChoice = InstrumentChoice()
     window_geometry: str = ""  # Qt's, in base64
 
 
