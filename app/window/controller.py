@@ -144,6 +144,7 @@ class Controller(QObject):
         for problem in problems:
             self.window.notices.tell(problem)
         everything = frozenset(type(self.session.choices).model_fields)
+        self.session.changed.connect(self._choices_changed)
         self.performance.choices_changed(everything)
         self.instruments.choices_changed()
         self._choices_shown(everything)
@@ -155,7 +156,6 @@ class Controller(QObject):
 
     def _connect(self) -> None:
         window, session = self.window, self.session
-        session.changed.connect(self._choices_changed)
         for panel in self.panels:
             panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)

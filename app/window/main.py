@@ -43,8 +43,9 @@ def with_patch(settings: Settings) -> Settings:
     if settings.choices.patch is not None:
         return settings
     with contextlib.suppress(PatchError):  # without it keys are places
-        choices = settings.choices.model_copy(update=choices_of(read_patch(FIRST_PATCH)))
-        return settings.model_copy(update={"choices": choices})
+        patch = read_patch(FIRST_PATCH)
+        update = {"patch": patch} if settings.choices.preset else choices_of(patch)
+        return settings.model_copy(update={"choices": settings.choices.model_copy(update=update)})
     return settings
 
 
