@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 from pydantic import ValidationError
 
+from app.instrument.events import Controller, NoteOff, NoteOn
 from app.playing.keyboard import Reach
 from app.playing.midi import (
     HIGHEST_NOTE,
     LOWEST_NOTE,
     TURNED,
-    Control,
     Meaning,
     MidiChoices,
-    Note,
     meaning_of,
-    read_message,
 )
 from app.session.choices import Choices
 
@@ -26,9 +22,9 @@ PRESETS = ["a", "b", "c"]
 
 
 def test_notes_go_along_the_string_and_velocity_is_amplitude() -> None:
-    low = meaning_of(Note(LOWEST_NOTE, 1), MidiChoices(), REACH, PRESETS)
-    high = meaning_of(Note(HIGHEST_NOTE, 127), MidiChoices(), REACH, PRESETS)
-    beyond = meaning_of(Note(127, 127), MidiChoices(), REACH, PRESETS)
+    low = meaning_of(NoteOn(LOWEST_NOTE, 1), MidiChoices(), REACH, PRESETS)
+    high = meaning_of(NoteOn(HIGHEST_NOTE, 127), MidiChoices(), REACH, PRESETS)
+    beyond = meaning_of(NoteOn(127, 127), MidiChoices(), REACH, PRESETS)
     assert low == Meaning({"position": pytest.approx(0.3), "amplitude_mm": pytest.approx(1)}, True)
     assert high == Meaning({"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}, True)
     assert beyond == high
@@ -36,10 +32,10 @@ def test_notes_go_along_the_string_and_velocity_is_amplitude() -> None:
 
 def test_notes_choose_presets_where_the_user_wants_that() -> None:
     choices = MidiChoices(notes="preset")
-    chosen = [meaning_of(Note(LOWEST_NOTE + n, 64), choices, REACH, PRESETS).changes["preset"] for n in (0, 2, 3)]
+    chosen = [meaning_of(NoteOn(LOWEST_NOTE + n, 64), choices, REACH, PRESETS).changes["preset"] for n in (0, 2, 3)]
     assert chosen == ["a", "c", "a"]
-    assert "position" not in meaning_of(Note(60, 64), choices, REACH, PRESETS).changes
-    assert meaning_of(Note(60, 64), choices, REACH, []).plucks
+    assert "position" not in meaning_of(NoteOn(60, 64), choices, REACH, PRESETS).changes
+    assert meaning_of(NoteOn(60, 64), choices, REACH, []).plucks
 
 
 def test_a_taught_controller_goes_through_all_of_its_field() -> None:
@@ -48,7 +44,7 @@ def test_a_taught_controller_goes_through_all_of_its_field() -> None:
         choices = choices.learned(field, number)
     for number, (field, turned) in enumerate(TURNED.items()):
         for value, expected in ((0, turned.low), (127, turned.high)):
-            meaning = meaning_of(Control(number, value), choices, REACH, PRESETS)
+            meaning = meaning_of(Controller(number, value), choices, REACH, PRESETS)
             assert meaning == Meaning({field: pytest.approx(expected)})
             Choices(**meaning.changes)  # allowed to the last bit
     assert TURNED["speed"].value(64) == pytest.approx(0.001**0.5, rel=0.05)
@@ -59,18 +55,11 @@ def test_learn_and_forget() -> None:
     assert choices.controllers == {"width": 74, "listen": 1}
     assert choices.learned("listen", 74).controllers == {"listen": 74}  # one controller turns one thing
     assert choices.forgotten("width").controllers == {"listen": 1}
-    assert meaning_of(Control(74, 3), choices.forgotten("width"), REACH, PRESETS) == Meaning({})
+    assert meaning_of(Controller(74, 3), choices.forgotten("width"), REACH, PRESETS) == Meaning({})
     for field, number in (("colour", 1), ("width", 128)):
         with pytest.raises(ValidationError):
             choices.learned(field, number)
 
 
-def test_what_is_no_business_of_the_string_is_left_out() -> None:
-    def message(kind: str, **facts: int) -> SimpleNamespace:
-        return SimpleNamespace(type=kind, **facts)
-
-    assert read_message(message("note_on", note=60, velocity=100)) == Note(60, 100)
-    assert read_message(message("note_on", note=60, velocity=0)) is None  # a release, as many keyboards send it
-    assert read_message(message("note_off", note=60, velocity=64)) is None
-    assert read_message(message("clock")) is None
-    assert read_message(message("control_change", control=7, value=12)) == Control(7, 12)
+def test_a_release_asks_nothing_of_the_one_string() -> None:
+    assert meaning_of(NoteOff(60), MidiChoices(), REACH, PRESETS) == Meaning({})

@@ -17,7 +17,7 @@ MATCH = {"model": 2.0, "truth": 1.0}
 
 
 def test_a_source_belongs_to_its_preset() -> None:
-    assert [STROKE.path(source) for source in STROKE.sources] == [Path("a"), Path("a"), Path("b")]
+    assert [STROKE.subject(source) for source in STROKE.sources] == [Path("a"), Path("a"), Path("b")]
 
 
 @pytest.mark.parametrize(

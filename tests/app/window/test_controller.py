@@ -11,8 +11,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
+from app.instrument.events import NoteOn as MidiNote
 from app.playing.chosen import mix_of
-from app.playing.midi import Note as MidiNote
 from app.playing.notes import Note
 from app.session.choices import Choices
 from app.session.ears import heard_ear
@@ -142,7 +142,7 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: controller.performance.playing, timeout=5_000)
-    qtbot.keyClick(window, Qt.Key.Key_X)
+    qtbot.keyClick(window, Qt.Key.Key_B)
     assert session.source_heard == "truth"
     qtbot.waitUntil(lambda: gains(controller) == {"model": 0.0, "truth": 1.0}, timeout=5_000)
     qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
@@ -452,7 +452,7 @@ def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -
     assert session.source_heard == "preset:second"
     assert gains(controller) == {"model": 0.0, "preset:second": 1.0}
     assert slots._buttons["b"].objectName() == "other"
-    qtbot.keyClick(controller.window, Qt.Key.Key_X)
+    qtbot.keyClick(controller.window, Qt.Key.Key_B)
     assert gains(controller) == {"model": 1.0, "preset:second": 0.0}
     session.update(a="difference", difference_gain_db=30, level_match=False)
     controller.pluck()

@@ -13,8 +13,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
 from app.playing.keyboard import Reach
-from app.playing.midi import Control, Message, MidiChoices
+from app.playing.midi import MidiChoices
 from app.playing.midi_port import MidiInput, MidiUnavailable, load_backend, same_device
 from app.window.midi_control import MidiControl
 
@@ -49,13 +50,13 @@ class FakeBackend:
 
 
 def test_an_input_is_found_again_under_new_numbers() -> None:
-    backend, heard = FakeBackend(), list[Message]()
+    backend, heard = FakeBackend(), list[Event]()
     midi = MidiInput(heard.append, lambda: backend)
     midi.open("Pads:Pads 31:0")
     assert (midi.name, backend.open_name) == ("Pads:Pads 24:0", "Pads:Pads 24:0")
-    backend.send("control_change", control=1, value=2)
+    backend.send("control_change", control=1, value=2, channel=0)
     backend.send("clock")
-    assert heard == [Control(1, 2)]
+    assert heard == [Controller(1, 2)]
     midi.close()
     midi.close()
     assert (midi.name, backend.open_name) == ("", "")
@@ -93,11 +94,17 @@ def played() -> Played:
     return []
 
 
-def control(choices: MidiChoices, presets: list[str], played: Played, load: Callable[[], FakeBackend]) -> MidiControl:
+def control(
+    choices: MidiChoices,
+    presets: list[str],
+    played: Played,
+    load: Callable[[], FakeBackend],
+    handle: Callable[[Event], bool] = lambda event: False,
+) -> MidiControl:
     def play(changes: dict[str, Any]) -> None:
         played.append((changes, threading.current_thread()))
 
-    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: presets, play, load=load)
+    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: presets, play, handle, load=load)
 
 
 @pytest.fixture
@@ -111,13 +118,38 @@ def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
     """The window may be busy with anything; it hears nothing of it here."""
     midi.start()
     with qtbot.assertNotEmitted(midi.performed, wait=50):
-        backend.send("note_on", note=96, velocity=127)
+        backend.send("note_on", note=96, velocity=127, channel=0)
         ((changes, thread),) = played
         assert changes == {"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}
         assert thread is not threading.main_thread()
-        backend.send("note_on", note=96, velocity=0)  # a key is let go
-        backend.send("note_off", note=96, velocity=64)
+        backend.send("note_on", note=96, velocity=0, channel=0)  # a key is let go
+        backend.send("note_off", note=96, velocity=64, channel=0)
     assert len(played) == 1
+
+
+def test_pitches_are_played_by_the_patch_with_bends_pedals_and_releases(
+    qtbot: QtBot, backend: FakeBackend, played: Played
+) -> None:
+    came: list[tuple[Event, bool]] = []
+
+    def handle(event: Event) -> bool:
+        came.append((event, threading.current_thread() is threading.main_thread()))
+        return True
+
+    midi = control(MidiChoices(port="Keys"), ["a"], played, lambda: backend, handle)
+    backend.names = ["Keys"]
+    midi.start()
+    midi._remember(midi.choices.learned("width", 74))
+    backend.send("note_on", note=60, velocity=90, channel=3)
+    backend.send("pitchwheel", pitch=-8192, channel=3)
+    backend.send("control_change", control=64, value=127, channel=3)
+    backend.send("note_off", note=60, velocity=0, channel=3)
+    with qtbot.waitSignal(midi.performed, timeout=5_000):
+        backend.send("control_change", control=74, value=0, channel=3)  # taught: it turns what it was taught
+    assert came == [
+        (event, False) for event in (NoteOn(60, 90, 3), Bend(-1.0, 3), Controller(64, 127, 3), NoteOff(60, 3))
+    ]
+    assert played == []
 
 
 def test_controllers_reach_the_windows_thread(
@@ -128,7 +160,7 @@ def test_controllers_reach_the_windows_thread(
     threads = []
     midi.performed.connect(lambda changes: threads.append(threading.current_thread()))
     with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
-        backend.send("control_change", control=74, value=0)
+        backend.send("control_change", control=74, value=0, channel=0)
     assert performed.args == [{"width": pytest.approx(0.02)}]
     assert threads == [threading.main_thread()]
     assert played == []
@@ -147,11 +179,11 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
     assert "Move" in taught.text()
     with qtbot.waitSignal(midi.performed, timeout=5_000):
-        backend.send("control_change", control=74, value=127)
+        backend.send("control_change", control=74, value=127, channel=0)
     assert midi.choices.controllers == {"width": 74}
     assert taught.text() == "Controller 74"
     with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
-        backend.send("control_change", control=74, value=0)
+        backend.send("control_change", control=74, value=0, channel=0)
     assert performed.args == [{"width": pytest.approx(0.02)}]
     qtbot.mouseClick(forget, Qt.MouseButton.LeftButton)
     assert midi.choices.controllers == {}
