@@ -277,6 +277,9 @@ def play(
         typer.Option("--busy/--alone", help="Only beside a process that keeps a core busy, or only without one."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    patch: Annotated[
+        str, typer.Option(metavar="PATCH", help="What is played; the default rings on when a key is let go.")
+    ] = "concert_harp",
 ) -> None:
     """What its user hears: the app on a private screen, played by keys from outside, and its sound recorded.
 
@@ -286,20 +289,27 @@ def play(
 
     from app.audio.choices import SoundChoice
     from app.commands.benchmarks.play.measure import measure
+    from app.commands.console import Failure
+    from app.patches.library import PatchError, find_patch
 
     try:
         chosen = SoundChoice.model_validate({"buffer": int(buffer) if buffer.isdecimal() else buffer}).buffer
     except ValidationError:
         raise typer.BadParameter("low, medium, high, 128, 256, 512, 1024 or 2048", param_hint="--buffer") from None
+    try:
+        found_patch = find_patch(patch).patch
+    except PatchError as error:
+        raise Failure(str(error)) from error
     with progress("bench play") as report:
-        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, report)
+        beside = (False, True) if busy is None else (busy,)
+        found = measure(seconds, rate, chosen, beside, seed, found_patch, report)
     if json:
         print_json(asdict(found))
         return
     _print_machine(found.machine)
     width, height = found.size
     print(
-        f"{found.buffer} buffer; {found.rate_hz:g} plucks/s for {found.phases[0].seconds:.0f} s, seed {found.seed}; "
+        f"{found.patch}; {found.buffer} buffer; {found.rate_hz:g} notes/s for {found.phases[0].seconds:.0f} s, seed {found.seed}; "
         f"{width} × {height}; views: string, {', '.join(found.views)}; "
         f"load before: {', '.join(f'{phase.load_before[0]:.1f}' for phase in found.phases)}"
     )

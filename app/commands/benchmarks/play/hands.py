@@ -1,4 +1,4 @@
-"""Keys as a player presses them: ten letters that pluck, in a random but repeatable order."""
+"""Keys as a player presses them: the letters of a piano's two rows, in a random but repeatable order."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from random import Random
 
 from app.commands.benchmarks.play.screen import Screen
 
-KEYS = ("a", "s", "d", "f", "g", "h", "j", "k", "l", "semicolon")
+KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
 HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 

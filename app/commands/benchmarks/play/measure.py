@@ -32,7 +32,9 @@ from app.commands.benchmarks.play.picture import picture_lags
 from app.commands.benchmarks.play.recording import CardClock, Recording, recording
 from app.commands.benchmarks.play.screen import Screen, private_screen
 from app.commands.benchmarks.play.sound_server import RATE_HZ, SoundServer, sound_server
+from app.patches.patch import Patch
 from app.session.choices import Choices
+from app.session.instrument import choices_of
 from app.window.settings import Settings, save_settings
 
 TITLE = "Learned Strings"
@@ -112,6 +114,7 @@ class PlayBenchmark:
 
     machine: Machine
     seed: int
+    patch: str
     rate_hz: float
     buffer: Buffer
     buffer_ms: float | None
@@ -139,9 +142,15 @@ class _Played:
 
 
 def measure(
-    seconds: float, rate_hz: float, buffer: Buffer, busy: tuple[bool, ...], seed: int, report: Callable[..., None]
+    seconds: float,
+    rate_hz: float,
+    buffer: Buffer,
+    busy: tuple[bool, ...],
+    seed: int,
+    patch: Patch,
+    report: Callable[..., None],
 ) -> PlayBenchmark:
-    """Plays for `seconds` at `rate_hz` plucks a second, once for each entry of `busy`.
+    """Plays a patch for `seconds` at `rate_hz` notes a second, once for each entry of `busy`.
 
     Raises:
         Missing: A program or library is not there.
@@ -167,7 +176,7 @@ def measure(
         tell("clicks")
         clicks = click_through(server)
         tell("start")
-        choices = Choices()
+        choices = Choices.model_validate(choices_of(patch))
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         control = stack.enter_context(steady_tone(server, folder, buffer))
         started_s = time.monotonic()
@@ -195,6 +204,7 @@ def measure(
         return PlayBenchmark(
             Machine.here(),
             seed,
+            patch.name,
             rate_hz,
             buffer,
             1000 * buffer / RATE_HZ if isinstance(buffer, int) else None,
