@@ -309,7 +309,8 @@ def play(
     _print_machine(found.machine)
     width, height = found.size
     print(
-        f"{found.patch}; {found.buffer} buffer; {found.rate_hz:g} notes/s for {found.phases[0].seconds:.0f} s, seed {found.seed}; "
+        f"{found.patch}; {found.buffer} buffer; {found.rate_hz:g} notes/s for {found.phases[0].seconds:.0f} s, "
+        f"seed {found.seed}; "
         f"{width} × {height}; views: string, {', '.join(found.views)}; "
         f"load before: {', '.join(f'{phase.load_before[0]:.1f}' for phase in found.phases)}"
     )
