@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import random
 import struct
@@ -53,14 +54,19 @@ def damaged_value(value: Any, draw: random.Random) -> Any:
         if kind == 0 and len(holder) > 1:
             del holder[key]
         elif kind == 1 and isinstance(holder, dict) and holder is not whole:
-            holder[draw.choice(("colour", "depth", "\x1b[2J", "y" * 5_000))] = draw.choice(HOSTILE)
+            holder[draw.choice(("colour", "depth", "\x1b[2J", "y" * 5_000))] = _hostile(draw)
         elif kind == 2 and isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
             holder[key] = min(holder[key], 1e18) * draw.choice((-1, 0, 2, 10, 1e3, 1e6, 10**9, 1e-9))
         elif kind == 3:
             holder[key] = _nested(draw.choice((3, 40, 400)))
         else:
-            holder[key] = draw.choice(HOSTILE)
+            holder[key] = _hostile(draw)
     return whole[""]
+
+
+def _hostile(draw: random.Random) -> Any:
+    """A value of its own: the next change may be within it."""
+    return copy.deepcopy(draw.choice(HOSTILE))
 
 
 def _nested(depth: int) -> list[Any]:

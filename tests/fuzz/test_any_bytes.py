@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.export.recipe import Recipe
+from app.patches.patch import Patch, explained
 from app.session.choices import Choices
 from app.window.settings import Settings, load_settings
 from engine import bounds
@@ -74,6 +75,16 @@ def test_any_settings_file_lets_the_app_start(
     path.write_text(json.dumps({**facts, "choices": choices}))
     settings, notice = load_settings(path)
     assert isinstance(settings, Settings) and notice.isprintable() and len(notice) <= LONGEST_MESSAGE
+
+
+@given(facts=fields_of(Patch))
+def test_any_patch_is_checked(facts: dict[str, Any]) -> None:
+    try:
+        patch = Patch.model_validate(facts)
+    except ValueError as error:
+        assert explained(error)
+    else:
+        assert Patch.model_validate_json(patch.model_dump_json()) == patch
 
 
 @given(facts=fields_of(Recipe))

@@ -43,7 +43,7 @@ from engine.presets import (
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource, Runaway, TruthSource, project
 from engine.voices import Ear, model_program, render_voice, truth_program
-from tests.fuzz.mutations import attacked, damaged_bytes, damaged_preset, damaged_text
+from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
 from training.by_name import load
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
@@ -322,6 +322,14 @@ def test_recipes(small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> 
             in_one_line(error, path)
 
     attacked("recipes", rounds // 4, seed, attack)
+
+
+def test_damage_depends_on_its_seed_alone() -> None:
+    """Or a failure could not be repeated: values that were put into one file were damaged for the next."""
+    before = repr(HOSTILE)
+    for number in range(400):
+        damaged_value({"a": [1, 2], "b": {"c": 3}}, random.Random(number))
+        assert repr(HOSTILE) == before, number
 
 
 def test_a_whole_file_of_each_kind_is_read(small_preset: Path, tmp_path: Path) -> None:
