@@ -43,6 +43,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
         yield f"// All of it is {lowered:.2f} dB softer than the patch, so that no note clips."
     yield "<control>"
     yield f"default_path={folder}/"
+    yield ""  # sfzlint reads a value that ends with a slash on into the next line
     yield "<global>"
     # one_shot: letting go damps nothing; the damping is still what ends a string that is plucked again
     yield f"loop_mode={'one_shot' if patch.damping.let_ring else 'no_loop'}"

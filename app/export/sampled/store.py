@@ -65,7 +65,7 @@ class SampleStore:
         self.folder = folder
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            others = any(path.name != LOCK for path in folder.iterdir())
+            others = any(not path.name.startswith(".") for path in folder.iterdir())  # a lock, or a file cut short
         except OSError as error:
             raise ExportError(explain(folder, error)) from error
         found = _read(folder / INDEX)
@@ -111,6 +111,7 @@ class SampleStore:
             ExportCancelled: `cancelled` said so; whole files and the index stay.
             ExportError: a file cannot be written, or a note is not finite.
         """
+        self._write_index()  # before any sample: it says whose they are
         wanted = [zone for zone in plan.zones if not self._keeps(plan, zone)]
         started = time.monotonic()
         for done, zone in enumerate(wanted):
