@@ -42,11 +42,6 @@ class SampledReport:
     lowered_db: float
 
 
-def default_name(patch_name: str, suffix: str) -> str:
-    """Of an instrument's file: one plain name, never a path, whatever the patch is called."""
-    return plain_stem(patch_name) + suffix
-
-
 def plain_stem(text: str) -> str:
     """Letters, digits and `_.+-` of ASCII: what every player takes within an SFZ file, on every system."""
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", text[:LONGEST_STEM]).strip("._-") or "patch"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.patches.patch import VELOCITIES, Patch
+from app.patches.tuning import Tuning
 from app.shared.version import program_version
 
 SampleFormat = Literal["flac", "wav"]
@@ -29,7 +30,8 @@ UNHEARD_FIELDS = {"name", "category", "description", "author", "macros"}  # a ma
 class NoteRenderer(Protocol):
     """Renders one note of a patch, struck at the first frame and let go after `held_s`.
 
-    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples.
+    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. Raises
+    ValueError where there is no such note.
     """
 
     def __call__(
@@ -97,6 +99,8 @@ class SampledPlan:
                 "every must be 1: transposed by semitones, samples would leave the patch's own tuning; "
                 "sample every key, or remove the scale"
             )
+        if not self.zones:
+            raise ValueError("keys: the patch's tuning leaves all of them out; choose others")
 
     @property
     def key_range(self) -> tuple[int, int]:
@@ -104,7 +108,7 @@ class SampledPlan:
 
     @property
     def zones(self) -> tuple[Zone, ...]:
-        """By key, then by velocity."""
+        """By key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
         return tuple(
             Zone(low + (high - low) // 2, velocities[1], (low, high), velocities)
             for low, high in self._key_spans()
@@ -139,7 +143,11 @@ class SampledPlan:
 
     def _key_spans(self) -> list[tuple[int, int]]:
         low, high = self.key_range
-        return [(first, min(first + self.every - 1, high)) for first in range(low, high + 1, self.every)]
+        spans = [(first, min(first + self.every - 1, high)) for first in range(low, high + 1, self.every)]
+        if self.every > 1:  # of an equal tuning, which has all keys
+            return spans
+        tuning = Tuning(self.patch.tuning)
+        return [span for span in spans if tuning.mapped(span[0])]
 
     def _layers(self) -> list[tuple[int, int]]:
         most = VELOCITIES[1]

@@ -145,9 +145,9 @@ class SampleStore:
 
     def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer) -> None:
         name = plan.file_name(zone)
-        rendered = render(plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
         try:
-            sample = sample_of(rendered, plan.rate_hz)
+            note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
+            sample = sample_of(render(*note), plan.rate_hz)
         except ValueError as error:
             raise ExportError(f"{self.path(name)}: {error}") from error
         data = encoded(sample, plan.rate_hz, plan.format, plan.bits)

@@ -93,3 +93,12 @@ def test_the_digest_is_of_what_is_heard(patch: Patch) -> None:
     digests = {plan.digest(zone), plan.digest(Zone(51, 64, (51, 51), (1, 64))), *(one.digest(zone) for one in others)}
     assert len(digests) == 2 + len(others)
     assert SampledPlan(patch, layers=7, every=2).digest(zone) == plan.digest(zone)  # the same note, other neighbours
+
+
+def test_keys_that_the_tuning_leaves_out_have_no_sample(patch_of: Callable[..., Patch]) -> None:
+    white = ["0", "x", "2", "x", "4", "5", "x", "7", "x", "9", "x", "11"]
+    keymap = "\n".join(["12", "0", "127", "60", "69", "440.0", "12", *white]) + "\n"
+    tuned = patch_of(tuning={"keymap": keymap})
+    assert {zone.key for zone in SampledPlan(tuned, (48, 59)).zones} == {48, 50, 52, 53, 55, 57, 59}
+    with pytest.raises(ValueError, match="keys: the patch's tuning leaves all of them out"):
+        SampledPlan(tuned, (49, 49))

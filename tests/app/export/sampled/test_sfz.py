@@ -11,7 +11,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
-from app.export.sampled.job import default_name, export_sampled, plain_stem, sample_folder
+from app.export.sampled.job import export_sampled, plain_stem, sample_folder
 from app.export.sampled.plan import SampledPlan
 from app.patches.patch import Patch
 
@@ -179,10 +179,14 @@ def test_strings_that_ring_on_end_where_they_are_plucked_again(
     ],
 )
 def test_no_name_becomes_a_path_or_an_opcode(name: str, patch: Patch, render: Render, tmp_path: Path) -> None:
-    assert re.fullmatch(r"[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,59}\.sfz", default_name(name, ".sfz"))
+    assert re.fullmatch(r"[A-Za-z0-9+][A-Za-z0-9_.+-]{0,59}", plain_stem(name))
     hostile = patch.model_copy(update={"name": name, "description": f"{name}\n#include"})
     plan = short(hostile, keys=(60, 60), layers=1)
-    out = tmp_path / default_name(name, ".sfz")
+    out = (
+        tmp_path / f"{name}.sfz"
+        if name.isprintable() and re.fullmatch(r"[^/\\:<>]{1,50}", name)
+        else tmp_path / "a.sfz"
+    )
     export_sampled(plan, out, render)
     assert sorted(tmp_path.iterdir()) == sorted([out, sample_folder(out)])
     assert lint(out) == ""

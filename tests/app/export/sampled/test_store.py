@@ -198,6 +198,14 @@ def test_a_note_that_is_not_finite_is_told(patch: Patch, tmp_path: Path) -> None
     assert not (tmp_path / "a.sfz").exists()
 
 
+def test_a_key_without_a_note_is_told(patch: Patch, tmp_path: Path) -> None:
+    def none(*_: object) -> np.ndarray:
+        raise ValueError("key 50 has no string")
+
+    with pytest.raises(ExportError, match="key 50 has no string"):
+        export_sampled(small(patch), tmp_path / "a.sfz", none)
+
+
 def test_a_place_that_cannot_be_written_is_told(patch: Patch, render: Render, tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(ExportError, match="choose another"):
