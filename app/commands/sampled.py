@@ -99,8 +99,11 @@ def sampled(
         made = export_sampled(plan, out, render, progress=report)
     if made.cut:
         say(f"note: {made.cut} samples still rang after {seconds:g} s and were faded out")
-    if made.lowered_db:
-        say(f"note: all of it is {made.lowered_db:.1f} dB softer than the patch, so that no note clips")
+    if abs(made.gain_db) >= 0.05:
+        words = "softer than the patch, so that no note clips"
+        if made.gain_db > 0:
+            words = "louder than the patch, at the full level of 16 bits"
+        say(f"note: all of it is {abs(made.gain_db):.1f} dB {words}")
     kept = made.samples - made.rendered
     print(f"{out}: {made.rendered} samples rendered, {kept} kept, {_megabytes(made.size_bytes)}")
 

@@ -14,7 +14,7 @@ import soundfile
 from app.export.files import ExportError
 from app.export.sampled.plan import NoteRenderer, SampledPlan
 from app.export.sampled.sf2 import check_sf2, write_sf2
-from app.export.sampled.sfz import sfz_lowered_db, sfz_text
+from app.export.sampled.sfz import sfz_gain_db, sfz_text
 from app.export.sampled.store import SampledProgress, SampleStore
 from app.export.sound import Cancelled
 from app.shared.whole_file import WriteError, explain, whole_file
@@ -31,7 +31,8 @@ class SampledReport:
         samples: of the instrument; rendered: those of them that were not there yet.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        lowered_db: how much softer than the patch all of it is, so that no note clips.
+        gain_db: what all of it is louder than the patch: an SFZ is softer where a note would clip, a SoundFont is
+            raised to full level.
     """
 
     path: Path
@@ -39,7 +40,7 @@ class SampledReport:
     rendered: int
     size_bytes: int
     cut: int
-    lowered_db: float
+    gain_db: float
 
 
 def plain_stem(text: str) -> str:
@@ -90,9 +91,9 @@ def export_sampled(
             with whole_file(out) as file:
                 if out.suffix.lower() == ".sfz":
                     file.write(sfz_text(plan, samples, store.folder.name).encode())
-                    lowered = sfz_lowered_db(samples)
+                    gain_db = sfz_gain_db(samples)
                 else:
-                    lowered = write_sf2(file, plan, samples, store.folder)
+                    gain_db = write_sf2(file, plan, samples, store.folder)
             size = out.stat().st_size
             if out.suffix.lower() == ".sfz":
                 size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)
@@ -105,4 +106,4 @@ def export_sampled(
     if out.suffix.lower() == ".sf2":
         store.remove()
     cut = sum(sample.cut for sample in samples.values())
-    return SampledReport(out, len(samples), rendered, size, cut, lowered)
+    return SampledReport(out, len(samples), rendered, size, cut, gain_db)

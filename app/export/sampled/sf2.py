@@ -17,7 +17,7 @@ import numpy as np
 import soundfile
 
 from app.export.sampled.plan import SampledPlan, Zone
-from app.export.sampled.store import StoredSample, lowered_db
+from app.export.sampled.store import StoredSample
 from app.export.wav import quantised
 from app.patches.patch import VELOCITIES, Patch
 from app.shared.version import PROGRAM, program_version
@@ -77,7 +77,7 @@ def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSa
     """Writes the whole file; the stored samples are read one after the other.
 
     Returns:
-        How many dB all of it is softer than the patch, so that no note clips.
+        What all of it was raised by, in dB: the loudest sample, which has 16 bits here, is at full level.
 
     Raises:
         OSError, soundfile.LibsndfileError: a sample cannot be read, or the file not written.
@@ -90,15 +90,15 @@ def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSa
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
     file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
     levels_db = {zone: -stored.gain_db + _raised_db(plan.patch, zone) for zone, stored in samples.items()}
-    lowered = lowered_db(levels_db.values())
+    gain_db = -max(levels_db.values())
     for zone in samples:
         sound, _ = soundfile.read(folder / plan.file_name(zone), dtype="float64", always_2d=True)
-        steps, _ = quantised(sound * 10 ** ((levels_db[zone] - lowered) / 20), "16")
+        steps, _ = quantised(sound * 10 ** ((levels_db[zone] + gain_db) / 20), "16")
         silence = bytes(2 * ZEROS_BEHIND)
         for column in steps.T:
             file.write((column.astype(np.int32) >> 16).astype("<i2").tobytes() + silence)
     file.write(tables)
-    return lowered
+    return gain_db
 
 
 def _attenuation_cb(patch: Patch, zone: Zone) -> int:

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping
 
 from app.export.sampled.plan import SampledPlan, Zone
-from app.export.sampled.store import StoredSample, lowered_db
+from app.export.sampled.store import StoredSample
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from engine.plain_text import one_line
@@ -23,9 +23,9 @@ def sfz_text(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: st
     return "\n".join(_lines(plan, samples, folder)) + "\n"
 
 
-def sfz_lowered_db(samples: Mapping[Zone, StoredSample]) -> float:
-    """How many dB all of it is softer than the patch, so that no note clips and no volume is above 0 dB."""
-    return lowered_db(-sample.gain_db for sample in samples.values())
+def sfz_gain_db(samples: Mapping[Zone, StoredSample]) -> float:
+    """What all of it is raised by: 0, or below where a note would clip. No volume is above 0 dB then."""
+    return min(0.0, *(sample.gain_db for sample in samples.values()))
 
 
 def release_s(patch: Patch) -> float:
@@ -34,13 +34,13 @@ def release_s(patch: Patch) -> float:
 
 
 def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str) -> Iterator[str]:
-    patch, lowered = plan.patch, sfz_lowered_db(samples)
+    patch, gain_db = plan.patch, sfz_gain_db(samples)
     yield f"// {one_line(patch.name)}, by {PROGRAM} {program_version()}"
     yield f"// {one_line(patch.description)}" if patch.description else "//"
     if plan.every > 1:
         yield f"// A sample for every {plan.every} keys; those between are transposed."
-    if lowered:
-        yield f"// All of it is {lowered:.2f} dB softer than the patch, so that no note clips."
+    if gain_db:
+        yield f"// All of it is {-gain_db:.2f} dB softer than the patch, so that no note clips."
     yield "<control>"
     yield f"default_path={folder}/"
     yield ""  # sfzlint reads a value that ends with a slash on into the next line
@@ -65,7 +65,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
             yield f"group={keys[0] + 1} off_by={keys[0] + 1}"
         for zone in layers:
             low, high = zone.velocities
-            volume_db = -samples[zone].gain_db - lowered
+            volume_db = gain_db - samples[zone].gain_db
             yield (f"<region> sample={plan.file_name(zone)} lovel={low} hivel={high} volume={volume_db:.2f}")
 
 

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import re
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -191,8 +191,3 @@ def _read(path: Path) -> _Index | None:
         return _Index.model_validate_json(path.read_bytes())
     except (OSError, ValidationError, ValueError):
         return None
-
-
-def lowered_db(levels_db: Iterable[float]) -> float:
-    """How much softer a whole instrument is made so that none of its samples, played at these levels, clips."""
-    return max(0.0, *levels_db)

@@ -114,6 +114,21 @@ def test_it_sounds_as_the_patch_in_pitch_and_level(
     assert np.ptp(offsets) < 0.05  # of one level for all: the player's own
 
 
+@pytest.mark.parametrize(("patch_db", "gain_db"), [(-30.0, 0.0), (20.0, -21.0)])
+def test_a_loud_patch_is_lowered_as_a_whole(
+    patch_db: float, gain_db: float, patch_of: PatchOf, render: Render, tmp_path: Path, level_db: Callable[..., float]
+) -> None:
+    pluck = {"softest_mm": 1.0, "hardest_mm": 10.0}
+    levels = []
+    for name, level in (("a", 0.0), ("b", patch_db)):
+        report = export_sampled(short(patch_of(level_db=level, pluck=pluck)), tmp_path / f"{name}.sfz", render)
+        player = Sfizz(tmp_path / f"{name}.sfz")
+        player.press(60, 30)
+        levels.append(level_db(player.play(0.1)[0]) - report.gain_db)
+    assert report.gain_db == pytest.approx(gain_db, abs=0.1)
+    assert levels[1] - levels[0] == pytest.approx(patch_db, abs=0.02)
+
+
 def test_neighbours_of_a_sampled_key_are_transposed(
     patch: Patch, render: Render, tmp_path: Path, pitch_cents: Callable[..., float]
 ) -> None:
