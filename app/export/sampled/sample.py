@@ -18,6 +18,7 @@ INAUDIBLE_DBFS = -120.0  # a note without a sample above this is silence
 PEAK_DBFS = -1.0  # of every stored sample: players interpolate, and overshoot
 END_FADE_S = 0.02  # where a note is silent
 CUT_FADE_S = 0.5  # where it still rings; no more than a quarter of the sample
+LEVEL_PART_S = 0.4  # of the note, whose level is told: a loudness meter's block
 FEWEST_FRAMES = 64  # of a sample that every player takes
 _SUBTYPES: dict[SampleBits, str] = {"16": "PCM_16", "24": "PCM_24"}
 
@@ -29,11 +30,13 @@ class Sample:
     Attributes:
         sound: float64 (frames, channels), its peak at PEAK_DBFS.
         gain_db: what it was raised by; taken off again, it has the level that it was rendered with.
+        level_db: root mean square of its first 0.4 s, of all channels, as it was rendered.
         cut: it still rang at its last frame.
     """
 
     sound: NDArray[np.float64]
     gain_db: float
+    level_db: float
     cut: bool
 
 
@@ -51,16 +54,18 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
     level = np.abs(sound).max(axis=1)
     peak = float(level.max())
     if peak <= 10 ** (INAUDIBLE_DBFS / 20):
-        return Sample(np.zeros((FEWEST_FRAMES, sound.shape[1])), 0.0, False)
+        return Sample(np.zeros((FEWEST_FRAMES, sound.shape[1])), 0.0, INAUDIBLE_DBFS, False)
     heard = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
     end = heard + round(END_FADE_S * rate_hz)
     cut = end > len(sound)
     sound = sound[:end]
     fade = min(round(CUT_FADE_S * rate_hz), len(sound) // 4) if cut else round(END_FADE_S * rate_hz)
+    part = sound[: math.ceil(LEVEL_PART_S * rate_hz)]
+    level_db = max(INAUDIBLE_DBFS, 10 * math.log10(float(np.mean(part**2))))
     gain_db = math.floor(100 * (PEAK_DBFS - 20 * math.log10(peak))) / 100
     sound = faded_out(sound, fade) * 10 ** (gain_db / 20)
     missing = max(0, FEWEST_FRAMES - len(sound))
-    return Sample(np.pad(sound, ((0, missing), (0, 0))), gain_db, cut)
+    return Sample(np.pad(sound, ((0, missing), (0, 0))), gain_db, level_db, cut)
 
 
 def encoded(sample: Sample, rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:

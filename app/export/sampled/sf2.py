@@ -16,10 +16,11 @@ from typing import BinaryIO
 import numpy as np
 import soundfile
 
+from app.export.sampled.levels import by_key, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
 from app.export.wav import quantised
-from app.patches.patch import VELOCITIES, Patch
+from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from engine.plain_text import one_line
 
@@ -38,7 +39,7 @@ ATTENUATION, FILTER_CUTOFF = 48, 8
 # Default modulators that are switched off, as (source, destination, amount's source) (8.4.1, 8.4.2): velocity to
 # attenuation, which is not the patch's; velocity to the filter, in the forms of 2.01 and of 2.04.
 SWITCHED_OFF = ((0x0502, ATTENUATION, 0), (0x0102, FILTER_CUTOFF, 0x0D02), (0x0102, FILTER_CUTOFF, 0))
-MOST_RAISED_CB = 5  # of a layer above the hardest
+MOST_RAISED_DB = 0.5  # of a layer above the hardest
 FALLING_VELOCITY = 0x0102  # 1 - velocity / 128, linear (8.2)
 # Kinds of samples (7.10)
 MONO, RIGHT, LEFT = 1, 2, 4
@@ -83,13 +84,14 @@ def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSa
         OSError, soundfile.LibsndfileError: a sample cannot be read, or the file not written.
     """
     channels = _channels(samples)
-    tables = _tables(plan, channels)
+    attenuations_cb = _attenuations_cb(plan.patch, samples)
+    tables = _tables(plan, channels, attenuations_cb)
     size = 2 * sum(one.frames + ZEROS_BEHIND for one in channels)
     info = _list(b"INFO", _information(plan))
     body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
     file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
-    levels_db = {zone: -stored.gain_db + _raised_db(plan.patch, zone) for zone, stored in samples.items()}
+    levels_db = {zone: _raised_db(attenuations_cb[zone], zone) - stored.gain_db for zone, stored in samples.items()}
     gain_db = -max(levels_db.values())
     for zone in samples:
         sound, _ = soundfile.read(folder / plan.file_name(zone), dtype="float64", always_2d=True)
@@ -101,21 +103,26 @@ def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSa
     return gain_db
 
 
-def _attenuation_cb(patch: Patch, zone: Zone) -> int:
-    """By how many cB a velocity of 0 would be softer than one of 128: within a layer the level follows the patch.
+def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
+    """By how many cB a velocity of 0 would be softer than one of 128, by zone.
 
-    It follows less where a soft layer, raised for it, would be louder than the hardest.
+    So the level goes on within a layer as it does from layer to layer; less where a soft layer, which has to be
+    raised for it, would be louder than the hardest.
     """
-    low, high = zone.velocities
-    softest, hard, hardest = (200 * math.log10(patch.pluck.pluck(v).amplitude_mm) for v in (low, high, VELOCITIES[1]))
-    step = (hard - softest) / max(1, high - low)
-    most = (hardest - hard + MOST_RAISED_CB) / (128 - zone.velocity)
-    return round(128 * min(step, most))
+    found = {}
+    for layers, stored in by_key(samples):
+        levels_db = velocity_levels(patch, layers, stored)
+        for zone in layers:
+            below = max(1, zone.velocities[0] - 1)  # the velocity of the layer before
+            step = (levels_db[zone.velocity] - levels_db[below]) / max(1, zone.velocity - below)
+            most = (levels_db[-1] - levels_db[zone.velocity] + MOST_RAISED_DB) / (128 - zone.velocity)
+            found[zone] = round(10 * 128 * max(0.0, min(step, most)))
+    return found
 
 
-def _raised_db(patch: Patch, zone: Zone) -> float:
+def _raised_db(attenuation_cb: int, zone: Zone) -> float:
     """What the velocity's attenuation takes at the velocity that the zone is rendered at: its level is kept there."""
-    return _attenuation_cb(patch, zone) / 10 * (1 - zone.velocity / 128)
+    return attenuation_cb / 10 * (1 - zone.velocity / 128)
 
 
 def release_timecents(patch: Patch) -> int:
@@ -158,7 +165,7 @@ def _information(plan: SampledPlan) -> bytes:
     )
 
 
-def _tables(plan: SampledPlan, channels: Sequence[_Channel]) -> bytes:
+def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Mapping[Zone, int]) -> bytes:
     """The nine tables (7.1); each ends with a row of its own that closes it."""
     patch = plan.patch
     name = _name(patch.name)
@@ -177,8 +184,8 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel]) -> bytes:
     for channel, zone in zip(channels, zones[1:], strict=True):
         bags.append(struct.pack("<HH", len(generators), len(modulators)))
         generators += [struct.pack("<HH", *one) for one in zone]
-        amount = _attenuation_cb(patch, channel.zone)
-        modulators.append(struct.pack("<HHhHH", FALLING_VELOCITY, ATTENUATION, amount, 0, 0))
+        amount_cb = attenuations_cb[channel.zone]
+        modulators.append(struct.pack("<HHhHH", FALLING_VELOCITY, ATTENUATION, amount_cb, 0, 0))
     bags.append(struct.pack("<HH", len(generators), len(modulators)))
     return _list(
         b"pdta",

@@ -6,9 +6,11 @@ Source: https://sfzformat.com
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
+import numpy as np
+
+from app.export.sampled.levels import Levels, by_key, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
 from app.patches.patch import Patch
@@ -56,23 +58,27 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
     bend = round(100 * patch.bend_semitones)
     yield f"bend_up={bend}"
     yield f"bend_down={-bend}"
-    yield from _velocity_curve(patch, samples)
-    for keys, zones in itertools.groupby(samples, lambda zone: zone.keys):
-        layers = list(zones)
+    for layers, stored in by_key(samples):
+        low, high = layers[0].keys
         yield "<group>"
-        yield f"lokey={keys[0]} hikey={keys[1]} pitch_keycenter={layers[0].key}"
-        if keys[0] == keys[1]:
-            yield f"group={keys[0] + 1} off_by={keys[0] + 1}"
-        for zone in layers:
-            low, high = zone.velocities
-            volume_db = gain_db - samples[zone].gain_db
-            yield (f"<region> sample={plan.file_name(zone)} lovel={low} hivel={high} volume={volume_db:.2f}")
+        yield f"lokey={low} hikey={high} pitch_keycenter={layers[0].key}"
+        if low == high:
+            yield f"group={low + 1} off_by={low + 1}"
+        levels_db = velocity_levels(patch, layers, stored)
+        for zone, sample in zip(layers, stored, strict=True):
+            softest, hardest = zone.velocities
+            yield (
+                f"<region> sample={plan.file_name(zone)} lovel={softest} hivel={hardest}"
+                f" volume={gain_db - sample.gain_db:.2f} {_velocity_curve(zone, levels_db)}"
+            )
 
 
-def _velocity_curve(patch: Patch, zones: Iterable[Zone]) -> Iterator[str]:
-    """Within a layer the level follows the patch: it is 1 at the velocity that was rendered."""
-    for (low, high), velocity in sorted({(zone.velocities, zone.velocity) for zone in zones}):
-        rendered_mm = patch.pluck.pluck(velocity).amplitude_mm
-        for played in range(low, high + 1):
-            gain = patch.pluck.pluck(played).amplitude_mm / rendered_mm
-            yield f"amp_velcurve_{played}={gain:.5f}"
+def _velocity_curve(zone: Zone, levels_db: Levels) -> str:
+    """Within a layer the level goes on as between layers: 1 at the velocity that was rendered.
+
+    Players draw straight lines between these points: with four, a layer of 10 dB is right to 0.1 dB.
+    """
+    low, high = zone.velocities
+    points = sorted({low + (high - low) * part // 3 for part in range(4)})
+    gains = np.minimum(1, 10 ** ((levels_db - levels_db[zone.velocity]) / 20))
+    return " ".join(f"amp_velcurve_{velocity}={gains[velocity]:.5f}" for velocity in points)

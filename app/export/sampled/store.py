@@ -33,7 +33,7 @@ class StoredSample(BaseModel):
     Attributes:
         made_from: digest of all that decides how it sounds (`SampledPlan.digest`).
         sha256: of the file.
-        gain_db, cut: as in `Sample`.
+        gain_db, level_db, cut: as in `Sample`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -43,6 +43,7 @@ class StoredSample(BaseModel):
     frames: int = Field(ge=1, le=bounds.MOST_FRAMES)
     channels: int = Field(ge=1, le=2)
     gain_db: float = Field(ge=-200, le=200)
+    level_db: float = Field(ge=-200, le=200)
     cut: bool = False
 
 
@@ -118,7 +119,9 @@ class SampleStore:
             if cancelled():
                 raise ExportCancelled
             share = done / len(wanted)
-            left_s = (time.monotonic() - started) * (1 - share) / share if share else None
+            if done == 1:
+                started = time.monotonic()  # the first note also loads and compiles
+            left_s = (time.monotonic() - started) * (len(wanted) - done) / (done - 1) if done > 1 else None
             progress(share, f"key {zone.key}, velocity {zone.velocity}", left_s)
             self._add(plan, zone, render)
         self._remove_all_but({plan.file_name(zone) for zone in plan.zones})
@@ -159,6 +162,7 @@ class SampleStore:
             frames=len(sample.sound),
             channels=sample.sound.shape[1],
             gain_db=sample.gain_db,
+            level_db=round(sample.level_db, 3),
             cut=sample.cut,
         )
         self._write_index()

@@ -35,7 +35,7 @@ def patch(patch_of: Callable[..., Patch]) -> Patch:
 
 @pytest.fixture
 def render() -> Callable[..., NDArray[np.float32]]:
-    """A sine of the key's pitch, of the pluck's amplitude; the right channel, where there is one, is 6 dB softer."""
+    """A sine of the key's pitch, and the softer the wider the pluck; a right channel is 6 dB softer."""
 
     def rendered(
         patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
@@ -44,7 +44,8 @@ def render() -> Callable[..., NDArray[np.float32]]:
         decay = 10 ** (-3 * time_s / T60_S)
         if held_s < seconds:
             decay *= 10 ** (-3 * np.maximum(0, time_s - held_s) / patch.damping.release_t60_s)
-        level = patch.pluck.pluck(velocity).amplitude_mm / 10 * 10 ** (patch.level_db / 20)
+        pluck = patch.pluck.pluck(velocity)
+        level = pluck.amplitude_mm / 10 * 10 ** (patch.level_db / 20) * 1.6 / (1 + 10 * pluck.width)
         sound = level * decay * np.sin(2 * math.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
         return np.stack([sound / 2**side for side in range(len(patch.pickup.points))], axis=1).astype(np.float32)
 

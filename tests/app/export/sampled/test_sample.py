@@ -42,6 +42,7 @@ def test_the_peak_is_full_and_the_gain_says_by_how_much(level: float) -> None:
     peak_db = 20 * np.log10(np.abs(sample.sound).max())
     assert PEAK_DBFS - 0.011 < peak_db <= PEAK_DBFS
     assert sample.gain_db == pytest.approx(peak_db - 20 * np.log10(np.abs(rendered).max()), abs=1e-3)
+    assert sample.level_db == pytest.approx(10 * np.log10(np.mean(rendered[:19_200].astype(float) ** 2)), abs=1e-6)
     assert round(sample.gain_db, 2) == sample.gain_db  # as an SFZ file says it
 
 
@@ -49,7 +50,7 @@ def test_silence_is_a_sample_too() -> None:
     sample = sample_of(np.zeros((1000, 2), np.float32), RATE_HZ)
     assert sample.sound.shape == (FEWEST_FRAMES, 2)
     assert not sample.sound.any()
-    assert (sample.gain_db, sample.cut) == (0.0, False)
+    assert (sample.gain_db, sample.level_db, sample.cut) == (0.0, -120.0, False)
     assert len(sample_of(np.ones((5, 1), np.float32), RATE_HZ).sound) == FEWEST_FRAMES
 
 

@@ -111,7 +111,7 @@ def test_it_sounds_as_the_patch_in_pitch_and_level(
         heard, direct = player.play(0.12), render(patch, key, velocity, 0.17, 0.17, RATE_HZ)[: round(0.12 * RATE_HZ)]
         assert abs(pitch_cents(heard[0], RATE_HZ, key)) < 0.1 + abs(pitch_cents(direct[:, 0], RATE_HZ, key))
         offsets += [level_db(side) - level_db(own) for side, own in zip(heard, direct.T, strict=True)]
-    assert np.ptp(offsets) < 0.05  # of one level for all: the player's own
+    assert np.ptp(offsets) < 0.4  # of one level for all: the player's own
 
 
 @pytest.mark.parametrize(("patch_db", "gain_db"), [(-30.0, 0.0), (20.0, -21.0)])
