@@ -1,16 +1,13 @@
 from __future__ import annotations
 
 import io
-import shutil
 import struct
-import subprocess
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-import soundfile
 from numpy.typing import NDArray
 
 from app.export.sampled.job import export_sampled, planned
@@ -60,54 +57,6 @@ class SoundFont:
         bags = [struct.unpack("<HH", row) for row in self.rows["ibag"]]
         generators = [struct.unpack("<HH", row) for row in self.rows["igen"]]
         return [generators[first:last] for (first, _), (last, _) in pairwise(bags)]
-
-
-def midi(events: list[tuple[float, int, int]], seconds: float) -> bytes:
-    """A file of one track at a tick a millisecond: (time in s, key, velocity; 0 lets go), at full volume."""
-
-    def count(ticks: int) -> bytes:
-        return bytes([ticks >> 14 | 0x80, ticks >> 7 & 0x7F | 0x80, ticks & 0x7F])
-
-    track, now = b"\x00\xb0\x07\x7f", 0
-    for time_s, key, velocity in events:
-        track += count(round(1000 * time_s) - now) + bytes([0x90, key, velocity])
-        now = round(1000 * time_s)
-    track += count(round(1000 * seconds) - now) + b"\xff\x2f\x00"
-    head = b"MThd" + struct.pack(">IHHH", 6, 0, 1, 500)
-    return head + b"MTrk" + struct.pack(">I", len(track)) + track
-
-
-@pytest.fixture
-def play(tmp_path: Path) -> Callable[..., NDArray[np.float64]]:
-    """Plays events by FluidSynth, without its effects: (2, frames)."""
-    program = shutil.which("fluidsynth")
-    if program is None:
-        pytest.skip("needs FluidSynth, as Debian's package fluidsynth brings it")
-
-    def played(path: Path, events: list[tuple[float, int, int]], seconds: float) -> NDArray[np.float64]:
-        song, out = tmp_path / "song.mid", tmp_path / "song.wav"
-        song.write_bytes(midi(events, seconds))
-        effects = ["-R", "0", "-C", "0", "-g", "1"]
-        words = [
-            program,
-            "-ni",
-            "-q",
-            *effects,
-            "-r",
-            str(RATE_HZ),
-            "-O",
-            "float",
-            "-T",
-            "wav",
-            "-F",
-            out,
-            path,
-            song,
-        ]
-        subprocess.run(words, check=True, capture_output=True)
-        return soundfile.read(out)[0].T
-
-    return played
 
 
 def small(patch: Patch, **choices: object) -> SampledPlan:
