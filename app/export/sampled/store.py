@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.export.files import ExportError
 from app.export.sampled.plan import NoteRenderer, SampledPlan, Zone
@@ -19,6 +19,7 @@ from app.export.sampled.sample import encoded, sample_of
 from app.export.sound import Cancelled, ExportCancelled
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
+from engine.plain_text import one_line
 
 INDEX = "index.json"
 LOCK = ".index.lock"
@@ -47,11 +48,13 @@ class StoredSample(BaseModel):
     cut: bool = False
 
 
-class _Index(BaseModel):
+class SampleIndex(BaseModel):
+    """What a folder of samples holds, by file name, and the name of the file that plays them."""
+
     model_config = ConfigDict(extra="forbid")
 
     format: int = Field(1, ge=1, le=1)
-    instrument: str  # the file that plays these samples
+    instrument: str = Field(max_length=255)
     samples: dict[str, StoredSample] = {}
 
 
@@ -69,14 +72,14 @@ class SampleStore:
             others = any(not path.name.startswith(".") for path in folder.iterdir())  # a lock, or a file cut short
         except OSError as error:
             raise ExportError(explain(folder, error)) from error
-        found = _read(folder / INDEX)
+        found = read_index(folder / INDEX)
         if found is None and others:
             raise ExportError(f"{folder}: holds other files; remove it, or choose another name for {instrument}")
         if found is not None and found.instrument != instrument:
             raise ExportError(
-                f"{folder}: holds the samples of {found.instrument}; choose another name for {instrument}"
+                f"{folder}: holds the samples of {one_line(found.instrument)}; choose another name for {instrument}"
             )
-        self._index = found or _Index(instrument=instrument)
+        self._index = found or SampleIndex(instrument=instrument)
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -187,11 +190,23 @@ class SampleStore:
             raise ExportError(str(error)) from error
 
 
-def _read(path: Path) -> _Index | None:
-    """None where there is no index, or one that is not ours."""
+def read_index(path: Path) -> SampleIndex | None:
+    """None where there is no file.
+
+    Raises:
+        ExportError: there is one that is not the index of samples, or one of another version.
+    """
     try:
-        if path.stat().st_size > bounds.LARGEST_TABLE_BYTES:
-            return None
-        return _Index.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError, ValueError):
+        with path.open("rb") as file:
+            raw = file.read(bounds.LARGEST_TABLE_BYTES + 1)
+        if len(raw) > bounds.LARGEST_TABLE_BYTES:
+            raise ValueError("too large")
+        return SampleIndex.model_validate_json(raw)
+    except FileNotFoundError:
         return None
+    except OSError as error:
+        raise ExportError(explain(path, error)) from error
+    except ValueError as error:
+        raise ExportError(
+            f"{path}: no index of samples that this version reads; remove its folder, or choose another name"
+        ) from error

@@ -14,8 +14,8 @@ from filelock import FileLock
 
 from app.export.files import ExportCancelled, ExportError
 from app.export.sampled.job import export_sampled, sample_folder
-from app.export.sampled.plan import SampledPlan
-from app.export.sampled.store import INDEX, LOCK
+from app.export.sampled.plan import MOST_LAYERS, SampledPlan
+from app.export.sampled.store import INDEX, LOCK, SampleIndex, StoredSample, read_index
 from app.patches.patch import Patch
 
 Render = Callable[..., np.ndarray]
@@ -27,7 +27,7 @@ KILLED = """
     from pathlib import Path
     import numpy as np
     from app.export.sampled.job import export_sampled
-    from app.export.sampled.plan import SampledPlan
+    from app.export.sampled.plan import MOST_LAYERS, SampledPlan
     from app.patches.patch import Patch
 
     from app.export.sampled import store
@@ -188,8 +188,24 @@ def test_a_broken_index_is_told(text: str, patch: Patch, render: Render, tmp_pat
     out = tmp_path / "a.sfz"
     export_sampled(small(patch), out, render)
     (sample_folder(out) / INDEX).write_text(text)
-    with pytest.raises(ExportError, match="holds other files; remove it"):
+    with pytest.raises(ExportError, match=r"index\.json: no index of samples that this version reads; remove its"):
         export_sampled(small(patch), out, render)
+
+
+def test_the_index_of_the_largest_instrument_is_read(patch_of: Callable[..., Patch], tmp_path: Path) -> None:
+    plan = SampledPlan(patch_of(range=(0, 127)), layers=MOST_LAYERS)
+    entry = StoredSample(
+        made_from="0" * 64,
+        sha256="1" * 64,
+        frames=2_880_000,
+        channels=2,
+        gain_db=-100.25,
+        level_db=-100.125,
+        cut=True,
+    )
+    index = SampleIndex(instrument="a" * 250 + ".sfz", samples={plan.file_name(zone): entry for zone in plan.zones})
+    (tmp_path / INDEX).write_text(index.model_dump_json(indent=1))
+    assert read_index(tmp_path / INDEX) == index
 
 
 def test_a_note_that_is_not_finite_is_told(patch: Patch, tmp_path: Path) -> None:
