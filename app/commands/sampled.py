@@ -41,6 +41,9 @@ def sampled(
         Literal["16", "24"] | None, typer.Option(help="Of an SFZ's samples; default 24. A SoundFont has 16.")
     ] = None,
     source: Annotated[Literal["model", "truth"], typer.Option(help="What plays the patch.")] = "model",
+    dry: Annotated[
+        bool, typer.Option("--dry", help="Without the patch's room, which would end with each key that is let go.")
+    ] = False,
     size_only: Annotated[bool, typer.Option("--size-only", help="Tell the size, and render nothing.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Go on, however large it is.")] = False,
 ) -> None:
@@ -60,6 +63,8 @@ def sampled(
             "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
         )
     chosen = find_patch(patch).patch
+    if dry:
+        chosen = chosen.with_value("room.mix", 0.0)
     preset_path = find_preset(chosen.preset, usable_files())
     try:
         plan = SampledPlan(

@@ -64,6 +64,20 @@ def test_format_and_bits(run, notes: list[tuple], folder: Path) -> None:
         assert size == 44 + 2 * sample["channels"] * sample["frames"]
 
 
+def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rooms = []
+    whole = sys.modules["app.instrument.offline"].render_note
+    monkeypatch.setattr(
+        sys.modules["app.instrument.offline"],
+        "render_note",
+        lambda patch, *words: rooms.append(patch.room.mix) or whole(patch, *words),
+    )
+    assert run("sampled", PATCH, folder / "a.sfz", *SMALL).status == 0
+    assert run("sampled", PATCH, folder / "a.sfz", *SMALL, "--dry").status == 0
+    assert rooms == [find_patch(PATCH).patch.room.mix] * 6 + [0.0] * 6
+    assert rooms[0] > 0
+
+
 def test_the_size_alone(run, notes: list[tuple], folder: Path) -> None:
     found = run("sampled", PATCH, folder / "a.sfz", *SMALL, "--size-only")
     assert (found.status, found.err) == (0, "")
