@@ -102,6 +102,8 @@ def sampled(
 
     with progress("sampled") as report:
         made = export_sampled(plan, out, render, progress=report)
+    if chosen.room.mix > 0 and not chosen.damping.let_ring:
+        say("note: a key that is let go ends the room's tail as well; --dry leaves the room to the sampler")
     if made.cut:
         say(f"note: {made.cut} samples still rang after {seconds:g} s and were faded out")
     if abs(made.gain_db) >= 0.05:

@@ -39,7 +39,7 @@ ATTENUATION, FILTER_CUTOFF = 48, 8
 # Default modulators that are switched off, as (source, destination, amount's source) (8.4.1, 8.4.2): velocity to
 # attenuation, which is not the patch's; velocity to the filter, in the forms of 2.01 and of 2.04.
 SWITCHED_OFF = ((0x0502, ATTENUATION, 0), (0x0102, FILTER_CUTOFF, 0x0D02), (0x0102, FILTER_CUTOFF, 0))
-MOST_RAISED_DB = 0.5  # of a layer above the hardest
+MOST_RAISED_DB = 6.0  # of a layer above the hardest: a bit of resolution
 FALLING_VELOCITY = 0x0102  # 1 - velocity / 128, linear (8.2)
 # Kinds of samples (7.10)
 MONO, RIGHT, LEFT = 1, 2, 4
@@ -107,7 +107,7 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
     """By how many cB a velocity of 0 would be softer than one of 128, by zone.
 
     So the level goes on within a layer as it does from layer to layer; less where a soft layer, which has to be
-    raised for it, would be louder than the hardest.
+    raised for it, would be much louder than the hardest.
     """
     found = {}
     for layers, stored in by_key(samples):
