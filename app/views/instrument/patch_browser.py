@@ -178,6 +178,8 @@ class PatchBrowser(QFrame):
 
     def set_chosen(self, name: str) -> None:
         """Which one is loaded."""
+        if name == self._chosen:
+            return
         self._chosen = name
         with QSignalBlocker(self.list):
             self._mark(name)
