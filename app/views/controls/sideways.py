@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QWidget
 
@@ -27,11 +27,6 @@ class Sideways(QScrollArea):
         if event.type() in (QEvent.Type.LayoutRequest, QEvent.Type.Polish):
             self._fit()
         return super().event(event)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self.widget() and event.type() == QEvent.Type.LayoutRequest:
-            self._fit()  # the style's fonts have come to what was hidden until now
-        return super().eventFilter(watched, event)
 
     def _fit(self) -> None:
         part = self.widget()

@@ -121,7 +121,7 @@ class InstrumentPanel(QFrame):
         self.neck.set_range(low, high)
 
     def set_octave(self, octave: int) -> None:
-        """By which the computer's keys are moved."""
+        """Of the lowest of the computer's keys."""
         self.bar.show_octave(octave)
 
     def show_letters(self, letters: Mapping[int, str]) -> None:

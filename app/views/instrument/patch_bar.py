@@ -125,7 +125,7 @@ class PatchBar(QFrame):
         lower.clicked.connect(lambda: self.octave_asked.emit(-1))
         higher.clicked.connect(lambda: self.octave_asked.emit(1))
         self.octave = faint()
-        self.octave.setToolTip("By how many octaves the computer's keys are moved (Z, X)")
+        self.octave.setToolTip("From which C on the computer's keys play; C4 is middle C (Z, X)")
         self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.voices = faint("0 voices")
         self.voices.setToolTip("How many strings ring now")
@@ -142,7 +142,7 @@ class PatchBar(QFrame):
         row.addWidget(self.note, 1)
         for widget in (lower, self.octave, higher, self.voices, self.record):
             row.addWidget(widget)
-        self.show_octave(0)
+        self.show_octave(3)
         self.show_recording(None)
         self.show_note("")
         return row
@@ -225,8 +225,8 @@ class PatchBar(QFrame):
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
     def show_octave(self, octave: int) -> None:
-        """By which the computer's keys are moved."""
-        self.octave.setText(f"octave {octave:+d}" if octave else "octave 0")
+        """Of the lowest of the computer's keys."""
+        self.octave.setText(f"from C{octave}")
 
     def show_recording(self, seconds: float | None) -> None:
         """For how long it has been recording; None: it is not."""

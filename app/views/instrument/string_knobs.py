@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.views import theme
-from app.views.controls.knob import Knob, KnobRange
+from app.views.controls.knob import LOW_HEIGHT, Knob, KnobRange
 from app.views.controls.parts import faint, vertical_rule
 from app.views.controls.plain import plain_tip
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
@@ -19,6 +19,7 @@ from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 if TYPE_CHECKING:
     from app.patches.patch import Patch
 
+HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 TIMES = "× {:.2f}"
 WHOLE = "tuning.transpose"  # turned by whole keys
 
@@ -149,7 +150,7 @@ class Facts(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._facts: dict[str, str] = {}
-        self.setFixedHeight(16)
+        self.setFixedHeight(FACTS_HEIGHT)
         self.setAccessibleName("The string under one key, as the knobs make it")
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
@@ -197,13 +198,15 @@ class StringKnobs(QWidget):
         row.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
+        column.setSpacing(SPACING)
         column.addLayout(row)
         column.addWidget(self.facts)
+        self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # whatever its surroundings try
 
     def _group(self, title: str, turned: tuple[_Turned, ...]) -> QVBoxLayout:
         head = faint(title)
         head.setObjectName("group")
+        head.setFixedHeight(HEAD_HEIGHT)
         row = QHBoxLayout()
         row.setSpacing(0)
         for each in turned:
