@@ -1,0 +1,179 @@
+"""The instrument in the window: keys, patches and what they show."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import soundfile
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QInputDialog
+from pytestqt.qtbot import QtBot
+
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import midi_bytes, read_midi
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import own_patches, read_patch
+from app.window.controller import Controller
+from engine.presets.finding import SHIPPED
+
+
+@pytest.fixture
+def played(
+    qtbot: QtBot, preset_folder: Path, controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Controller:
+    """With a patch, and the preset that plays it."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
+    controller.library.refresh()
+    controller.patches.choose("steel_string_acoustic")
+    qtbot.waitUntil(lambda: controller.performance.live.ready, timeout=20_000)
+    controller.window.setFocus()
+    return controller
+
+
+def press(qtbot: QtBot, controller: Controller, key: Qt.Key) -> None:
+    qtbot.keyPress(controller.window, key)
+
+
+def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, played: Controller) -> None:
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding().keys() == {48}
+    qtbot.waitUntil(lambda: played.session.choices.string is not None, timeout=5_000)
+    assert played.session.choices.preset == "studio_any_string"
+    wanted_hz = 440 * 2 ** ((48 - 69) / 12)
+
+    def shown() -> bool:
+        take = played.performance.take
+        return take is not None and take.complete and abs(take.fundamental_hz / wanted_hz - 1) < 1e-3
+
+    qtbot.waitUntil(shown, timeout=20_000)
+    qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1, timeout=5_000)
+    assert "error of this pluck" in played.window.error_label.text()
+    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    assert not struck.damped
+    qtbot.keyRelease(played.window, Qt.Key.Key_A)
+    assert struck.damped
+
+
+def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
+    press(qtbot, played, Qt.Key.Key_X)
+    press(qtbot, played, Qt.Key.Key_9)
+    assert (played.session.choices.octave, played.session.choices.velocity) == (1, 127)
+    press(qtbot, played, Qt.Key.Key_K)
+    assert played.performance.live.sounding().keys() == {72}
+    qtbot.keyRelease(played.window, Qt.Key.Key_K)
+
+
+def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller) -> None:
+    played.session.update(keys_play="place")
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding() == {}
+    assert played.performance.notes.ringing == 1
+
+
+def test_keys_on_the_screen_play(qtbot: QtBot, played: Controller) -> None:
+    played.window.instrument.pressed.emit(60, 100)
+    assert played.performance.live.sounding().keys() == {60}
+    played.window.instrument.released.emit(60)
+    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    assert struck.damped
+
+
+def test_a_knob_changes_the_patch_and_undo_takes_it_back(played: Controller) -> None:
+    before = played.session.choices.patch
+    assert before is not None
+    played.window.instrument.knobs.changed.emit("knobs.stiffness", 2.0)
+    changed = played.session.choices.patch
+    assert changed is not None
+    assert changed.knobs.stiffness == 2.0
+    played.window.instrument.knobs.changed.emit("knobs.stiffness", 99.0)
+    assert played.session.choices.patch == changed
+    played.history.undo()
+    assert played.session.choices.patch == before
+    played.history.redo()
+    played.patches.revert()
+    assert played.session.choices.patch == before
+
+
+def test_previous_and_next_go_through_the_list(played: Controller) -> None:
+    names = [entry.patch.name for entry in played.patches._entries]
+    first = played.session.choices.patch
+    assert first is not None
+    played.patches.step(1)
+    second = played.session.choices.patch
+    assert second is not None
+    assert names.index(second.name) == (names.index(first.name) + 1) % len(names)
+    played.patches.step(-1)
+    assert played.session.choices.patch == first
+
+
+def test_a_patch_is_saved_renamed_and_deleted(played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    played.patches.change("knobs.decay", 3.0)
+    monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Mine", True))
+    played.patches.save()
+    file = own_patches() / "mine.json"
+    assert read_patch(file).knobs.decay == 3.0
+    assert played.patches.entry is not None
+    assert played.patches.entry.own
+    played.patches.change("knobs.decay", 4.0)
+    played.patches.save()  # the user's own, without a question
+    assert read_patch(file).knobs.decay == 4.0
+    monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Yours", True))
+    played.patches.rename()
+    assert not file.exists()
+    assert read_patch(own_patches() / "yours.json").name == "Yours"
+    played.patches.delete("yours")
+    assert not list(own_patches().glob("*.json"))
+
+
+def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+    song = tmp_path / "song.mid"
+    song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]))
+    played.take_file(song)
+    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding(), timeout=5_000)
+    played.play_or_stop()
+    assert not played.patches.playing
+    harp = tmp_path / "harp.json"
+    shutil.copy(PATCHES / "concert_harp.json", harp)
+    played.take_file(harp)
+    assert played.session.choices.patch == read_patch(harp)
+    told: list[str] = []
+    played.patches.told.connect(told.append)
+    (tmp_path / "bad.mid").write_bytes(b"no")
+    played.take_file(tmp_path / "bad.mid")
+    assert "bad.mid" in told[0]
+
+
+def test_what_is_played_is_recorded_as_wav_and_midi(
+    qtbot: QtBot, played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    played.patches.told.connect(told.append)
+    played.patches.record()
+    played.patches.record()
+    assert "Nothing was played" in told[0]
+    played.patches.record()
+    played.window.instrument.pressed.emit(60, 100)
+    played.window.instrument.released.emit(60)
+    out = tmp_path / "take.wav"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(out), ""))
+    played.patches.record()
+    qtbot.waitUntil(lambda: len(told) == 2, timeout=60_000)
+    assert str(out) in told[1]
+    sound, rate_hz = soundfile.read(out)
+    assert rate_hz == 48_000
+    assert 0.001 < abs(sound).max() < 1
+    assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+
+
+def test_what_is_beyond_training_is_told(qtbot: QtBot, played: Controller) -> None:
+    notes: list[str] = []
+    bar = played.window.instrument.bar
+    show, bar.show_note = bar.show_note, lambda text: (notes.append(text), show(text))  # type: ignore[method-assign]
+    played.patches.change("knobs.stiffness", 10.0)
+    played.patches.change("knobs.gauge", 3.0)
+    played.window.instrument.pressed.emit(80, 100)
+    qtbot.waitUntil(lambda: bool(notes), timeout=5_000)
+    assert "outside the trained" in notes[-1]
