@@ -44,6 +44,7 @@ from engine.resonators.family import inharmonicity
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 RECORDED = "WAV and MIDI (*.wav)"
+PLACES = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
 
 
 class PatchDesk(QObject):
@@ -81,7 +82,7 @@ class PatchDesk(QObject):
 
     def _connect(self) -> None:
         panel, bar, browser = self._panel, self._panel.bar, self.browser
-        panel.pressed.connect(lambda key, velocity: self._instruments.play(NoteOn(key, velocity)))
+        panel.pressed.connect(self._press)
         panel.released.connect(lambda key: self._instruments.play(NoteOff(key)))
         bar.previous_asked.connect(lambda: self.step(-1))
         bar.next_asked.connect(lambda: self.step(1))
@@ -292,7 +293,9 @@ class PatchDesk(QObject):
         if names & {"octave", "keys_play", "patch"}:
             choices = self._session.choices
             self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
-            self._panel.show_letters(letters_of(choices.octave) if self._instruments.plays_pitches else {})
+            pitches = self._instruments.plays_pitches
+            self._panel.show_letters(letters_of(choices.octave) if pitches else {})
+            self._panel.bar.show_note("" if pitches else PLACES)
         if names & {"heard", "a", "b"}:
             self._panel.show_source(self._session.source_heard)
 
@@ -339,6 +342,11 @@ class PatchDesk(QObject):
     def _toggle_favourite(self, name: str) -> None:
         self.favourites ^= {name}
         self._show_entries()
+
+    def _press(self, key: int, velocity: int) -> None:
+        """Of the keys on the screen, which are pitches always."""
+        self._session.update(keys_play="pitch")
+        self._instruments.play(NoteOn(key, velocity))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)
