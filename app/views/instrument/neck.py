@@ -144,7 +144,7 @@ class Neck(Playable):
                 painter.setPen(Qt.PenStyle.NoPen)
                 painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
                 painter.drawEllipse(end, *(2 * [2.5 + 2.5 * level]))
-        if self.hasFocus():
+        if self.shows_cursor:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.TEXT), 1.5))
             key = self.cursor_key

@@ -108,7 +108,7 @@ class PianoKeys(Playable):
         for key in sorted(marked | covering, key=is_black):
             if self.key_rect(key).intersects(dirty):
                 self._paint_key(painter, key, self._filling(key))
-        if self.hasFocus():
+        if self.shows_cursor:
             key = self.cursor_key
             painter.setPen(QPen(QColor(_ink(self._filling(key))), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)

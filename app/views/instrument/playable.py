@@ -61,6 +61,7 @@ class Playable(QWidget):
         self._typed: int | None = None  # by Enter
         self._held: set[int] = set()
         self._cursor = 60
+        self._by_keys = False  # it was come to, or moved on, with the keyboard
         self._rest = QPixmap()
         theme.changes.face_changed.connect(self.rest_changed)
 
@@ -155,7 +156,7 @@ class Playable(QWidget):
     @property
     def marked(self) -> frozenset[int]:
         """Keys that do not look as at rest."""
-        cursor = {self._cursor} if self.hasFocus() else set()
+        cursor = {self._cursor} if self.shows_cursor else set()
         down = {key for key in (self._down, self._typed) if key is not None}
         return frozenset(self._levels.keys() | self._held | cursor | down)
 
@@ -197,6 +198,8 @@ class Playable(QWidget):
         key = self.key_at(event.position())
         if key is None or not self.sounds(key) or self._down is not None:
             return
+        self._by_keys = False
+        self._set_cursor(key)
         holding = event.button() == Qt.MouseButton.RightButton or (
             event.button() == Qt.MouseButton.LeftButton and event.modifiers() & Qt.KeyboardModifier.ShiftModifier
         )
@@ -244,6 +247,7 @@ class Playable(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = _MOVES.get(Qt.Key(event.key()))
+        self._by_keys = self._by_keys or step is not None
         if step is not None:
             self._set_cursor(self._cursor + step)
         elif event.key() in ENTER_KEYS:
@@ -270,6 +274,7 @@ class Playable(QWidget):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
+        self._by_keys = event.reason() in (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason)
         self.update()
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -280,6 +285,11 @@ class Playable(QWidget):
     def cursor_key(self) -> int:
         """The key that Enter plays."""
         return self._cursor
+
+    @property
+    def shows_cursor(self) -> bool:
+        """Whether it is seen: not to those who play with the mouse."""
+        return self._by_keys and self.hasFocus()
 
     def _set_cursor(self, key: int) -> None:
         if not self._low <= key <= self._high:

@@ -237,7 +237,7 @@ def test_in_a_low_window_the_views_make_room_for_the_instrument(alive: MainWindo
 
     alive.instrument.set_unfolded(True)
     for height, parts in (
-        (800, (True, True, True, True)),
+        (830, (True, True, True, True)),
         (700, (False, True, True, True)),
         (600, (False, True, True, False)),
         (500, (False, True, False, False)),
