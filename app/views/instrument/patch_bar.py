@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MOST_MACROS = 8
 ROOMY_MACROS = 6  # more of them stand closer
-NARROW_NAME, NARROWEST_NAME = 130, 96  # pixels
+NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
     "body.mix": ("mix", SHARE, "How much is heard of the body that the strings stand on"),
@@ -175,9 +175,14 @@ class PatchBar(QFrame):
         """For a window with little room."""
         if compact != self._compact:
             self._compact = compact
-            self.category.setVisible(not compact and bool(self.category.text()))
-            self.name.setMinimumWidth(NARROWEST_NAME if compact else NARROW_NAME)
-            self._show_macros(self._macros)
+            self._share_width()
+
+    def _share_width(self) -> None:
+        close = self._compact or len(self._macros) > ROOMY_MACROS
+        self.category.setVisible(not close and bool(self.category.text()))
+        self.name.setMinimumWidth(NARROWEST_NAME if close else NARROW_NAME)
+        for knob in self.macros:
+            knob.set_narrow(close)
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
         """Name and title of each; none, the name "", is always there."""
@@ -196,7 +201,6 @@ class PatchBar(QFrame):
         told = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
         self.name.setToolTip(plain_tip(f"{told}\nClick to browse the patches"))
         self.category.setText(patch.category)
-        self.category.setVisible(not self._compact)
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)
         self.rename.setEnabled(own)
@@ -211,7 +215,6 @@ class PatchBar(QFrame):
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
         for number, knob in enumerate(self.macros):
             knob.setVisible(number < len(macros))
-            knob.set_narrow(self._compact or len(macros) > ROOMY_MACROS)
             if number >= len(macros):
                 continue
             macro = macros[number]
@@ -221,6 +224,7 @@ class PatchBar(QFrame):
             knob.set_value(macro.value)
         self._macros = macros
         self._before_macros.setVisible(bool(macros))
+        self._share_width()
 
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)
