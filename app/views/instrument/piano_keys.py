@@ -108,18 +108,28 @@ class PianoKeys(Playable):
         for key in sorted(marked | covering, key=is_black):
             if self.key_rect(key).intersects(dirty):
                 self._paint_key(painter, key, self._filling(key))
+                if key in self.held:
+                    self._paint_pin(painter, key)
         if self.shows_cursor:
             key = self.cursor_key
             painter.setPen(QPen(QColor(_ink(self._filling(key))), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
 
+    def _paint_pin(self, painter: QPainter, key: int) -> None:
+        """It stays down by itself."""
+        rect = self.key_rect(key)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(_ink(self._filling(key))))
+        painter.drawEllipse(QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38)), 2.5, 2.5)
+
     def _filling(self, key: int) -> QColor:
         if not self.sounds(key):
             return _mute(key)
-        ground = theme.blended(theme.FAINT, _own(key), 0.45).name() if self.is_down(key) else _own(key)
-        level = self.level(key)
-        return theme.blended(self.colour.name(), ground, 0.25 + 0.75 * level) if level > 0 else QColor(ground)
+        level, own = self.level(key), _own(key)
+        if level > 0:
+            return theme.blended(self.colour.name(), own, 0.35 + 0.65 * level)
+        return theme.blended(theme.FAINT, own, 0.45) if self.is_down(key) else QColor(own)
 
     def _paint_key(self, painter: QPainter, key: int, filling: QColor) -> None:
         rect = self.key_rect(key)
