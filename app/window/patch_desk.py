@@ -35,6 +35,7 @@ from app.session.instrument import choices_of
 from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
+from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from engine.effects import BODIES
@@ -329,7 +330,7 @@ class PatchDesk(QObject):
         if patch is None:
             return
         panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
-        panel.knobs.show_patch(patch)
+        panel.knobs.show_patch(patch, entry.patch if entry is not None else None)
         panel.knobs.show_facts(facts_of(patch))
         panel.set_range(*patch.range)
         strings = patch.strings
@@ -406,8 +407,3 @@ def _beyond(info: PresetInfo, struck: Struck) -> list[str]:
     rise = float(resonator.relative_tension_rise(resonator.to_modes(struck.pluck.displacement(resonator.points))))
     limit = info.family.tension_rise[1]
     return [*found, f"tension rise {rise:.0%} is outside the trained {limit:.0%}"] if rise > limit else found
-
-
-def note_name(key: int) -> str:
-    """As C4 for key 60."""
-    return f"{('C', 'C♯', 'D', 'D♯', 'E', 'F', 'F♯', 'G', 'G♯', 'A', 'A♯', 'B')[key % 12]}{key // 12 - 1}"
