@@ -321,7 +321,7 @@ def _cpu_s(process: subprocess.Popen[bytes]) -> float:
 
 
 def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> tuple[float | None, float | None]:
-    """Cores that the program and its window's thread take while nothing sounds; None where it does not fall silent."""
+    """Cores of the program and of its window's thread while nothing sounds; None where it does not fall silent."""
     if not recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S):
         return None, None
     before_s, before_cpu_s, before_window_s = time.monotonic(), _cpu_s(process), _window_cpu_s(process)
