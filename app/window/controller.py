@@ -43,7 +43,7 @@ from app.window.instruments import Instruments
 from app.window.main_window import KEYS, PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
 from app.window.panels.rack import fill
-from app.window.patch_desk import PatchDesk
+from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
@@ -269,8 +269,8 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """A dropped preset is taken in and chosen, a WAV's recipe restored, a patch chosen, a MIDI file played."""
-        if file.suffix.lower() in (".mid", ".midi", ".json"):
+        """A dropped preset is taken in and chosen, a WAV's recipe restored; what a patch is made of goes there."""
+        if file.suffix.lower() in TAKEN_FILES:
             self.patches.take_file(file)
             return
         dropped = receive(file, self.library)
@@ -279,6 +279,8 @@ class Controller(QObject):
             self.session.update(**dropped.choices)
         except ValueError as error:  # a recipe that was edited, or of another version
             notice = f"{file}: its choices cannot be restored here ({error})."
+        if dropped.body:
+            self.patches.take_body(dropped.body)
         if notice:
             self.window.notices.tell(notice)
 
