@@ -149,6 +149,17 @@ def untrained(how: str) -> Player:
     return play
 
 
+def knowing_physics() -> dict[str, Player]:
+    """By name what is untrained: it knows the string, and more or less of what its tension does."""
+    return {
+        "kicks without corrections": untrained("kicks"),
+        "backward error analysis (1/12)": untrained("series"),
+        "slow flow, third order": averaged_flow,
+        "averaging": averaging,
+        "linear string": linear_string,
+    }
+
+
 def _started(name: str, sizes: dict[str, Any], how: str, plucked: PluckedString, rate_hz: int) -> StringModel[Any]:
     model = build_model(name, sizes)
     model.initialise(how, Physics(plucked.resonator, rate_hz, SCALE_M), torch.Generator().manual_seed(0))
@@ -173,4 +184,27 @@ def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple
         inside = tuple(one for one in errors if low <= one.tension_rise < high)
         if inside:
             found.append((low, high, FamilyErrors(inside)))
+    return found
+
+
+Edges = tuple[float, float]
+
+
+def by_cell(
+    errors: Sequence[StringError], rises: Sequence[float], inharmonicities: Sequence[float]
+) -> list[tuple[Edges, Edges, FamilyErrors]]:
+    """In ranges of the rise of tension and of inharmonicity, those that hold strings; the last have both ends."""
+    found = []
+    for low, high in pairwise(rises):
+        for least, most in pairwise(inharmonicities):
+            inside = tuple(
+                one
+                for one in errors
+                if low <= one.tension_rise <= high
+                and least <= one.inharmonicity <= most
+                and (one.tension_rise < high or high == rises[-1])
+                and (one.inharmonicity < most or most == inharmonicities[-1])
+            )
+            if inside:
+                found.append(((low, high), (least, most), FamilyErrors(inside)))
     return found
