@@ -13,7 +13,10 @@ from app.commands.arguments import Cache, Json, PresetName, open_preset
 from app.commands.console import Failure, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from app.commands.console import Report
+    from training.family.errors import StringError
 
 family = typer.Typer(help="One model of many strings.", no_args_is_help=True)
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
@@ -120,9 +123,7 @@ def evaluate(
                 alone = {loaded.name: players[loaded.name]}
                 told = partial(_report, report, place / 2 + 0.2, 0.3)
                 last = measure(alone, column, "test", tenth, rate, (9.0, 10.0), seed=seed, report=told)[loaded.name]
-                of_column[loaded.name]["tenth_second"] = _facts(last) | {
-                    "over_first": last.geometric_mean / type(last)(of_preset[:tenth]).geometric_mean
-                }
+                of_column[loaded.name]["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
             found[column] = of_column
     cells = [
         {"rise": rises, "inharmonicity": edges, "strings": len(part.strings), **_facts(part)}
@@ -148,8 +149,9 @@ def evaluate(
         if tenth:
             last = of_column[loaded.name]["tenth_second"]
             print(
-                f"tenth second, {tenth} strings: {number(last['geometric_mean'])}, worst {number(last['worst'])}; "
-                f"{last['over_first']:.3g} times the first"
+                f"tenth second, {last['strings']} of {tenth} strings still sound: "
+                f"{number(last.get('geometric_mean'))}, worst {number(last.get('worst'))}; "
+                f"{number(last.get('over_first'))} times their first"
             )
     if error_map:
         _print_map(cells)
@@ -237,6 +239,17 @@ def _print_column(column: str, of_column: dict[str, Any], strings: int, rate_hz:
     figures = ("geometric_mean", "worst", "share_large", "processor_s")
     rows = [[who, *(number(f[name]) for name in figures), f["worst_at"]] for who, f in of_column.items()]
     print_table(("", *DESCRIBED), rows)
+
+
+def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) -> dict[str, Any]:
+    """Of those strings that still sound then."""
+    from training.family.errors import FamilyErrors
+
+    pairs = [(early, late) for early, late in zip(first, tenth, strict=True) if late.sounds]
+    if not pairs:
+        return {"strings": 0}
+    early, late = (FamilyErrors(tuple(part)) for part in zip(*pairs, strict=True))
+    return {"strings": len(pairs), **_facts(late), "over_first": late.geometric_mean / early.geometric_mean}
 
 
 def _print_map(cells: list[dict[str, Any]]) -> None:

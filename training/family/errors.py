@@ -33,6 +33,7 @@ class StringError:
     Attributes:
         rel_mse: relative squared error over the grid.
         processor_s: for a second of the whole string's motion.
+        sounds: whether the string still moves, as far as `UNHEARD` tells.
     """
 
     pitch_hz: float
@@ -41,6 +42,7 @@ class StringError:
     modes: int
     rel_mse: float
     processor_s: float = 0.0
+    sounds: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,12 @@ def measure(
             played = play(plucked, rate_hz, last)
             processor_s = (time.process_time() - started) * rate_hz / last
             wrong = played[first:] - truth
-            error = float(wrong.square().sum() / max(float(truth.square().sum()), unheard))
+            energy = float(truth.square().sum())
+            error = float(wrong.square().sum()) / max(energy, unheard)
             told = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
-            found[name].append(StringError(*told, error if math.isfinite(error) else math.inf, processor_s))
+            found[name].append(
+                StringError(*told, error if math.isfinite(error) else math.inf, processor_s, energy > unheard)
+            )
         report((number + 1) / count)
     return {name: FamilyErrors(tuple(errors)) for name, errors in found.items()}
 

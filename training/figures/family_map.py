@@ -13,6 +13,7 @@ from training.family.strings import FAMILY
 from training.figures import style
 
 LEAST_ERROR = 1e-13  # the true motions' own
+RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
 def family_map(errors: Sequence[StringError], name: str) -> Figure:
@@ -37,6 +38,8 @@ def family_map(errors: Sequence[StringError], name: str) -> Figure:
         )
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.set_yticks(RISES, [f"{rise:g}" for rise in RISES])
+        axes.minorticks_off()
         for edge in inside.inharmonicity[0]:
             axes.axvline(edge, color=style.MARKED, linewidth=1, linestyle="--")
         axes.axhline(inside.tension_rise[1], color=style.MARKED, linewidth=1, linestyle="--")

@@ -144,3 +144,16 @@ def test_a_map_has_every_string_once() -> None:
         ((0.1, 0.5), (1e-5, 1e-4)): 2,
         ((0.1, 0.5), (1e-4, 1e-3)): 4,
     }
+
+
+def test_a_string_that_has_fallen_silent_says_so() -> None:
+    """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all that is told."""
+    players = {"linear": family_errors.linear_string}
+    early, late = (
+        family_errors.measure(players, "inside", "test", 3, 8_000, seconds)["linear"].strings
+        for seconds in ((0.0, 0.05), (9.0, 9.05))
+    )
+    assert all(one.sounds for one in early)
+    assert [one.sounds for one in late] == [
+        draw_string("inside", "test", number).string.decay_rate(1) * 9 < 0.5 * math.log(1e18) for number in range(3)
+    ]
