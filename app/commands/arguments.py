@@ -75,10 +75,29 @@ def open_preset_of_string(
     Raises:
         PresetError, SchemaError: no such preset or string; or the preset is of one string.
     """
-    from engine.presets import find_string, of_string, read_string
-
     if rate_hz is not None:
         check_range("--rate", rate_hz, 1_000, 1_000_000, "Hz")
-    return of_string(
-        open_preset(name_or_path), None if string is None else read_string(find_string(string)), rate_hz, modes
-    )
+    return _of_string(open_preset(name_or_path), string, rate_hz, modes)
+
+
+def open_preset_to_render(name_or_path: str, string: str | None, rate_hz: int | None, modes: int | None) -> Preset:
+    """The same for a sound file of a rate: a model of many strings plays at it, any other at its own.
+
+    Raises:
+        As `open_preset_of_string`.
+    """
+    loaded = open_preset(name_or_path)
+    return _of_string(loaded, string, None if loaded.info.family is None else rate_hz, modes)
+
+
+def _of_string(loaded: Preset, string: str | None, rate_hz: int | None, modes: int | None) -> Preset:
+    from engine.presets import PresetError, find_string, of_string, read_string
+
+    if string is None:
+        return of_string(loaded, None, rate_hz, modes)
+    file = find_string(string)
+    parameters = read_string(file)
+    try:
+        return of_string(loaded, parameters, rate_hz, modes)
+    except PresetError as error:
+        raise PresetError(f"{file}: {error}") from error

@@ -33,6 +33,11 @@ def batch(
     amplitudes: Annotated[str, typer.Option(help="Peak displacements in mm, a comma between two.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="The folder; made where it is not there.")],
     seconds: arguments.Seconds,
+    strings: Annotated[
+        str | None,
+        typer.Option(help="For presets of many strings: names of strings or .toml files, a comma between two."),
+    ] = None,
+    modes: arguments.StringModes = None,
     sources: Annotated[str, typer.Option(help="Of model, truth, difference, both; a comma between two.")] = "model",
     rate: Rate = None,
     bits: BitsOption = "24",
@@ -46,22 +51,24 @@ def batch(
     normalise: Normalise = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Render again what is there already.")] = False,
 ) -> None:
-    """Render positions × amplitudes × presets × sources to WAV files; index.csv lists them with peaks and errors.
+    """Render positions × amplitudes × presets × strings × sources to WAV files.
 
-    A batch that was stopped goes on with the same command: whole files are kept.
+    index.csv lists them with peaks and errors. A batch that was stopped goes on with the same command: whole files
+    are kept.
     """
     places, heights = _numbers("--positions", positions), _numbers("--amplitudes", amplitudes)
     for place in places:
         for height in heights:
             pluck = arguments.check_pluck(place, height, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
-    from app.export.batch import INDEX, BatchPlan, run_batch
+    from app.export.batch import INDEX, BatchPlan, NamedString, run_batch
     from app.export.wav import WavSettings
     from app.presets.folders import usable_files
-    from engine.presets import find_preset
+    from engine.presets import find_preset, find_string, read_string
 
     files = usable_files()
     paths = tuple(find_preset(name, files) for name in _words(presets))
+    named = tuple(NamedString(path.stem, read_string(path)) for path in map(find_string, _words(strings or "")))
     try:
         plan = BatchPlan(
             paths,
@@ -78,6 +85,8 @@ def batch(
             decay_db,
             WavSettings(bits, rate, normalise),
             overwrite,
+            named,
+            modes,
         )
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error

@@ -30,8 +30,9 @@ def info(
     if json:
         print_json({**facts, "preset_file": here})
         return
-    pluck = facts.pop("pluck")
-    lines = {**{f"pluck {name}": value for name, value in pluck.items()}, **facts, "preset file": here}
+    parts = {part: facts.pop(part) or {} for part in ("pluck", "string")}
+    told = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
+    lines = {**told, **facts, "preset file": here}
     width = max(map(len, lines))
     for name, value in lines.items():
         print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")

@@ -24,7 +24,10 @@ Bits = Literal["16", "24", "32f"]  # app.export.wav.Bits, known without soundfil
 
 Rate = Annotated[
     int | None,
-    typer.Option(metavar="HZ", help="Sample rate; default the preset's own. A higher one adds no bandwidth."),
+    typer.Option(
+        metavar="HZ",
+        help="Sample rate; default the preset's own. A model of many strings plays at it; others are resampled.",
+    ),
 ]
 BitsOption = Annotated[Bits, typer.Option(help="16 is dithered; 32f is floating point and never clips.")]
 Listen = Annotated[float, typer.Option(help="Where to listen, 0 … 1 as for --position.")]
@@ -48,6 +51,8 @@ def render(
     position: Annotated[float | None, typer.Option(help=arguments.POSITION_HELP)] = None,
     amplitude_mm: Annotated[float | None, typer.Option(help=arguments.AMPLITUDE_HELP)] = None,
     seconds: Annotated[float | None, typer.Option(help=arguments.SECONDS_HELP)] = None,
+    string: arguments.StringName = None,
+    modes: arguments.StringModes = None,
     rate: Rate = None,
     bits: BitsOption = "24",
     listen: Listen = DEFAULT_LISTEN,
@@ -73,9 +78,10 @@ def render(
 ) -> None:
     """Render a pluck to a WAV file. 10 mm of displacement at the listening point are full scale."""
     if recipe is not None:
-        if out is not None or any(value is not None for value in (position, amplitude_mm, seconds)):
+        if out is not None or any(value is not None for value in (position, amplitude_mm, seconds, string, modes)):
             raise typer.BadParameter(
-                "holds preset, pluck and duration already; give OUT.wav alone beside it", param_hint="--recipe"
+                "holds preset, string, pluck and duration already; give OUT.wav alone beside it",
+                param_hint="--recipe",
             )
         _render_again(recipe, Path(preset) if preset else None)
         return
@@ -86,7 +92,7 @@ def render(
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
     from app.export.files import SoundRequest, WavSettings
 
-    loaded = arguments.open_preset(preset)
+    loaded = arguments.open_preset_to_render(preset, string, rate, modes)
     check_shortest(loaded, seconds)
     try:
         request = SoundRequest(

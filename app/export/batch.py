@@ -1,4 +1,4 @@
-"""A batch: positions × amplitudes × presets × sources, a WAV file each, and an index of them as CSV.
+"""A batch: positions × amplitudes × presets × strings × sources, a WAV file each, and an index of them as CSV.
 
 A batch that was stopped goes on where it was: a file that is there with the same recipe is kept. The index is written
 anew after every pluck, so it is never behind the files.
@@ -23,10 +23,31 @@ from app.export.sound import Cancelled, ExportCancelled, SoundRequest, Voices
 from app.export.wav import WavSettings
 from app.shared.vocabulary import Pickup, Source
 from engine.pluck import Pluck
-from engine.presets import Preset, PresetError, load_preset
+from engine.presets import Preset, load_preset, of_string
+from engine.resonators.string import StringParameters
 from engine.sources import Runaway
 
 BatchProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known
+
+
+@dataclass(frozen=True)
+class NamedString:
+    """A string for presets of many, and its name in the index and in names of files."""
+
+    name: str
+    parameters: StringParameters
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """A preset, and the string that it plays; None: its own."""
+
+    preset: Path
+    string: NamedString | None
+
+    @property
+    def name(self) -> str:
+        return f"{self.preset.stem}_{self.string.name}" if self.string else self.preset.stem
 
 
 @dataclass(frozen=True)
@@ -36,6 +57,8 @@ class BatchPlan:
     Attributes:
         pluck: its shape and width count; position and amplitude come from the lists.
         overwrite: render also what is there already.
+        strings: each preset plays all of these; empty: its own string.
+        modes: of a preset of many strings; None: all below 20 kHz. Its model plays at the files' rate.
 
     Raises:
         ValueError: a list is empty or has a value twice, or a pluck is out of its range.
@@ -55,6 +78,8 @@ class BatchPlan:
     decay_db: float | None = None
     settings: WavSettings = field(default_factory=WavSettings)
     overwrite: bool = False
+    strings: tuple[NamedString, ...] = ()
+    modes: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("presets", "positions", "amplitudes_mm", "sources"):
@@ -63,17 +88,31 @@ class BatchPlan:
                 raise ValueError(f"{word}: give at least one")
             if len(set(values)) < len(values):
                 raise ValueError(f"{word}: one is given twice")
+        if len({string.name for string in self.strings}) < len(self.strings):
+            raise ValueError("strings: one is given twice")
         for _ in self.plucks():
             pass
 
     @property
     def files(self) -> int:
-        return len(self.presets) * len(self.positions) * len(self.amplitudes_mm) * len(self.sources)
+        strings = max(1, len(self.strings))
+        return len(self.presets) * strings * len(self.positions) * len(self.amplitudes_mm) * len(self.sources)
 
     def plucks(self) -> Iterator[Pluck]:
         for position in self.positions:
             for amplitude_mm in self.amplitudes_mm:
                 yield replace(self.pluck, position=position, amplitude_mm=amplitude_mm)
+
+    def instruments(self) -> Iterator[Instrument]:
+        for path in self.presets:
+            for string in self.strings or (None,):
+                yield Instrument(path, string)
+
+    def load(self, instrument: Instrument) -> Preset:
+        """Raises PresetError: the file cannot be used, or is of one string and another is wanted."""
+        preset, string = load_preset(instrument.preset), instrument.string
+        rate_hz = None if preset.info.family is None else self.settings.rate_hz
+        return of_string(preset, string.parameters if string else None, rate_hz, self.modes)
 
     def request(self, preset: Preset, pluck: Pluck, source: Source) -> SoundRequest:
         return SoundRequest(
@@ -91,9 +130,9 @@ class BatchPlan:
 
 @dataclass(frozen=True)
 class _Job:
-    """One pluck of one preset: what is to be rendered of it."""
+    """One pluck of one instrument: what is to be rendered of it."""
 
-    preset: Path
+    instrument: Instrument
     pluck: Pluck
     sources: tuple[Source, ...]
 
@@ -119,11 +158,11 @@ def run_batch(
     jobs, rows = _sorted_out(plan, index)
     index.add(rows)
     started = time.monotonic()
-    preset: Preset | None = None
+    loaded: Instrument | None = None
     for done, job in enumerate(jobs):
-        if preset is None or preset.path != job.preset:
-            preset = load_preset(job.preset)
-        text = f"{preset.name}, position {job.pluck.position:g}, {job.pluck.amplitude_mm:g} mm"
+        if job.instrument != loaded:
+            preset, loaded = plan.load(job.instrument), job.instrument
+        text = f"{job.instrument.name}, position {job.pluck.position:g}, {job.pluck.amplitude_mm:g} mm"
 
         def part(share: float, done: int = done, text: str = text) -> None:
             whole = (done + share) / len(jobs)
@@ -140,27 +179,31 @@ def run_batch(
 def _sorted_out(plan: BatchPlan, index: BatchIndex) -> tuple[list[_Job], list[BatchRow]]:
     """What is to be rendered, and rows of what is not: kept, or of a preset that cannot be used."""
     jobs, rows = [], []
-    for path in plan.presets:
+    for instrument in plan.instruments():
         try:
-            preset = load_preset(path)
+            preset = plan.load(instrument)
             plan.request(preset, plan.pluck, plan.sources[0])
-        except (PresetError, ValueError) as error:
-            rows += [_row(plan, path.stem, 0, pluck, s, str(error)) for pluck in plan.plucks() for s in plan.sources]
+        except ValueError as error:
+            string = instrument.string
+            message = f"{string.name}: {error}" if string else str(error)
+            rows += [_row(plan, instrument, 0, pluck, s, message) for pluck in plan.plucks() for s in plan.sources]
             continue
         for pluck in plan.plucks():
             sources = []
             for source in plan.sources:
-                row = None if plan.overwrite else _kept(plan, preset, pluck, source, index)
+                row = None if plan.overwrite else _kept(plan, instrument, preset, pluck, source, index)
                 rows += [row] if row else []
                 sources += [] if row else [source]
             if sources:
-                jobs.append(_Job(path, pluck, tuple(sources)))
+                jobs.append(_Job(instrument, pluck, tuple(sources)))
     return jobs, rows
 
 
-def _kept(plan: BatchPlan, preset: Preset, pluck: Pluck, source: Source, index: BatchIndex) -> BatchRow | None:
+def _kept(
+    plan: BatchPlan, instrument: Instrument, preset: Preset, pluck: Pluck, source: Source, index: BatchIndex
+) -> BatchRow | None:
     """The row of a file that is there; None where it is to be rendered."""
-    row = _row(plan, preset.name, preset.info.rate_hz, pluck, source)
+    row = _row(plan, instrument, preset.info.rate_hz, pluck, source)
     path = plan.folder / row.file
     if not path.exists():
         return None
@@ -187,7 +230,7 @@ def _essence(recipe: Recipe) -> dict[str, object]:
 def _rendered(
     plan: BatchPlan, preset: Preset, job: _Job, progress: Callable[[float], None], cancelled: Cancelled
 ) -> list[BatchRow]:
-    blank = {s: _row(plan, preset.name, preset.info.rate_hz, job.pluck, s) for s in job.sources}
+    blank = {s: _row(plan, job.instrument, preset.info.rate_hz, job.pluck, s) for s in job.sources}
     paths = {source: plan.folder / row.file for source, row in blank.items()}
     request = plan.request(preset, job.pluck, job.sources[0])
     try:
@@ -202,14 +245,20 @@ def _rendered(
         return [*failed, *_rendered(plan, preset, truth, progress, cancelled)]
     except ExportError as error:
         return [replace(row, message=str(error)) for row in blank.values()]
-    errors = _errors(preset, voices)
+    errors, told = _errors(preset, voices), _outside(job.instrument, preset)
     return [
-        _measured(blank[source], report, (None, None) if source == "truth" else errors)
+        _measured(blank[source], report, *(((None, None), "") if source == "truth" else (errors, told)))
         for source, report in zip(blank, reports, strict=True)
     ]
 
 
-def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, float | None]) -> BatchRow:
+def _outside(instrument: Instrument, preset: Preset) -> str:
+    """How the string differs from those that a model of many has learned; empty where it does not."""
+    words = preset.info.family.outside(preset.info.string) if preset.info.family else []
+    return f"warning: {instrument.name}: {'; '.join(words)}" if words else ""
+
+
+def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, float | None], message: str) -> BatchRow:
     return replace(
         row,
         status="written",
@@ -218,6 +267,7 @@ def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, floa
         clipped=report.clipped,
         rel_mae_trained=errors[0],
         rel_mae=errors[1],
+        message=message,
     )
 
 
@@ -245,11 +295,21 @@ def _ratio(error: float, truth: float) -> float:
 
 
 def _row(
-    plan: BatchPlan, preset: str, preset_rate_hz: int, pluck: Pluck, source: Source, message: str = ""
+    plan: BatchPlan, instrument: Instrument, preset_rate_hz: int, pluck: Pluck, source: Source, message: str = ""
 ) -> BatchRow:
     rate_hz = plan.settings.rate_hz or preset_rate_hz
-    name = default_file_name(preset, pluck, rate_hz, source)
-    return BatchRow(name, "failed", preset, pluck.position, pluck.amplitude_mm, source, rate_hz, message=message)
+    name = default_file_name(instrument.name, pluck, rate_hz, source)
+    return BatchRow(
+        name,
+        "failed",
+        instrument.preset.stem,
+        pluck.position,
+        pluck.amplitude_mm,
+        source,
+        rate_hz,
+        message=message,
+        string=instrument.string.name if instrument.string else "",
+    )
 
 
-__all__ = ["INDEX", "BatchPlan", "BatchRow", "ExportCancelled", "run_batch"]
+__all__ = ["INDEX", "BatchPlan", "BatchRow", "ExportCancelled", "NamedString", "run_batch"]

@@ -25,6 +25,7 @@ class BatchRow:
     """A line of the index. Errors are the model's relative MAE at the listening points; the truth has none.
 
     Attributes:
+        string: of a preset of many strings; empty: its own.
         rel_mae_trained: as far as the model was trained; rel_mae: over the whole file.
     """
 
@@ -41,6 +42,7 @@ class BatchRow:
     rel_mae_trained: float | None = None
     rel_mae: float | None = None
     message: str = ""
+    string: str = ""
 
 
 class BatchIndex:
@@ -106,4 +108,5 @@ def _read_row(cells: dict[str, str]) -> BatchRow:
         number("rel_mae_trained"),
         number("rel_mae"),
         cells["message"],
+        cells.get("string", ""),  # earlier batches had none
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import soundfile
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from app.export.sound import LONGEST_S, SoundRequest
 from app.export.wav import RATE_RANGE_HZ, WavSettings
@@ -15,7 +15,9 @@ from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import Bits, Pickup, Source
 from engine.plain_text import one_line
 from engine.pluck import Pluck
-from engine.presets import Preset, PresetError, preset_digest
+from engine.presets import Preset, PresetError, of_string, preset_digest
+from engine.resonators.string import StringParameters
+from engine.schema import read
 from engine.sources import FULL_SCALE_M
 
 
@@ -34,6 +36,8 @@ class Recipe(BaseModel):
     """See the module. Lengths and rates as in `SoundRequest` and `WavSettings`; what is absent has its default.
 
     Attributes:
+        preset_rate_hz: at which the model played.
+        string: of a preset of many strings, which it played, with so many `modes`; None: the preset's own.
         horizon_s: the model's training ends here; what lies past it is extrapolation.
         full_scale_m: the displacement that is 0 dBFS.
     """
@@ -60,11 +64,20 @@ class Recipe(BaseModel):
     bits: Bits
     normalise: bool
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
+    string: StringParameters | None = None
+    modes: int | None = None
+
+    @field_validator("string", mode="before")
+    @classmethod
+    def _check_string(cls, data: object) -> object:
+        """As a string of a file is checked: no unknown field, no text for a number, all within their bounds."""
+        return data if data is None or isinstance(data, StringParameters) else read(StringParameters, data, "string")
 
     @classmethod
     def of(cls, request: SoundRequest, settings: WavSettings) -> Recipe:
         """Raises PresetError: the preset's file cannot be read any more."""
         info = request.preset.info
+        many = info.family is not None
         return cls(
             program=PROGRAM,
             version=program_version(),
@@ -85,10 +98,18 @@ class Recipe(BaseModel):
             bits=settings.bits,
             normalise=settings.normalise,
             fade_out_s=settings.fade_out_s,
+            string=info.string if many else None,
+            modes=info.modes if many else None,
         )
 
     def request(self, preset: Preset) -> SoundRequest:
-        """What is to be rendered. Raises ValueError where the values do not go together."""
+        """What is to be rendered. Raises ValueError where the values do not go together.
+
+        Args:
+            preset: as it was loaded.
+        """
+        if self.string is not None:
+            preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
         return SoundRequest(
             preset,
             self.pluck,

@@ -308,9 +308,11 @@ def test_readers(target: Target, tmp_path: Path, rounds: int, seed: int) -> None
     attacked(target.name, rounds // len(TARGETS), seed, attack)
 
 
-def test_recipes(small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
-    preset = load_preset(small_preset)
-    whole, path = wav(tmp_path, recipe_text(small_preset)), tmp_path / "stranger.wav"
+@pytest.mark.parametrize("of", ["one string", "many strings"])
+def test_recipes(of: str, small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> None:
+    file = small_preset if of == "one string" else SHIPPED / "studio_any_string.safetensors"
+    preset = load_preset(file)
+    whole, path = wav(tmp_path, recipe_text(file)), tmp_path / "stranger.wav"
 
     def attack(draw: random.Random) -> None:
         path.write_bytes(damaged_wav(whole, draw))
@@ -321,7 +323,7 @@ def test_recipes(small_preset: Path, tmp_path: Path, rounds: int, seed: int) -> 
         except RecipeError as error:
             in_one_line(error, path)
 
-    attacked("recipes", rounds // 4, seed, attack)
+    attacked(f"recipes of {of}", rounds // 4, seed, attack)
 
 
 def test_damage_depends_on_its_seed_alone() -> None:

@@ -33,6 +33,7 @@ class StringError:
     Attributes:
         rel_mse: relative squared error over the grid.
         processor_s: for a second of the whole string's motion.
+        sounds: whether the string still moves, as far as `UNHEARD` tells.
     """
 
     pitch_hz: float
@@ -41,6 +42,7 @@ class StringError:
     modes: int
     rel_mse: float
     processor_s: float = 0.0
+    sounds: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,12 @@ def measure(
             played = play(plucked, rate_hz, last)
             processor_s = (time.process_time() - started) * rate_hz / last
             wrong = played[first:] - truth
-            error = float(wrong.square().sum() / max(float(truth.square().sum()), unheard))
+            energy = float(truth.square().sum())
+            error = float(wrong.square().sum()) / max(energy, unheard)
             told = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
-            found[name].append(StringError(*told, error if math.isfinite(error) else math.inf, processor_s))
+            found[name].append(
+                StringError(*told, error if math.isfinite(error) else math.inf, processor_s, energy > unheard)
+            )
         report((number + 1) / count)
     return {name: FamilyErrors(tuple(errors)) for name, errors in found.items()}
 
@@ -149,6 +154,17 @@ def untrained(how: str) -> Player:
     return play
 
 
+def knowing_physics() -> dict[str, Player]:
+    """By name what is untrained: it knows the string, and more or less of what its tension does."""
+    return {
+        "kicks without corrections": untrained("kicks"),
+        "backward error analysis (1/12)": untrained("series"),
+        "slow flow, third order": averaged_flow,
+        "averaging": averaging,
+        "linear string": linear_string,
+    }
+
+
 def _started(name: str, sizes: dict[str, Any], how: str, plucked: PluckedString, rate_hz: int) -> StringModel[Any]:
     model = build_model(name, sizes)
     model.initialise(how, Physics(plucked.resonator, rate_hz, SCALE_M), torch.Generator().manual_seed(0))
@@ -173,4 +189,27 @@ def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple
         inside = tuple(one for one in errors if low <= one.tension_rise < high)
         if inside:
             found.append((low, high, FamilyErrors(inside)))
+    return found
+
+
+Edges = tuple[float, float]
+
+
+def by_cell(
+    errors: Sequence[StringError], rises: Sequence[float], inharmonicities: Sequence[float]
+) -> list[tuple[Edges, Edges, FamilyErrors]]:
+    """In ranges of the rise of tension and of inharmonicity, those that hold strings; the last have both ends."""
+    found = []
+    for low, high in pairwise(rises):
+        for least, most in pairwise(inharmonicities):
+            inside = tuple(
+                one
+                for one in errors
+                if low <= one.tension_rise <= high
+                and least <= one.inharmonicity <= most
+                and (one.tension_rise < high or high == rises[-1])
+                and (one.inharmonicity < most or most == inharmonicities[-1])
+            )
+            if inside:
+                found.append(((low, high), (least, most), FamilyErrors(inside)))
     return found

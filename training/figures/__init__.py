@@ -4,6 +4,7 @@
 `extrapolation`  past the end of training (Fig. 3)
 `error`          error per time step (Fig. 4)
 `eigenvalues`    what was learned, in the unit circle
+`family_map`     errors of a model of many strings, a dot each string
 `run_plot`       the course of a run, from its log
 `style`          how they look, and their files
 """

@@ -166,3 +166,45 @@ def test_two_batches_into_one_folder_lose_no_row(small_preset: Path, folder: Pat
         for which, one in enumerate(indices):
             one.add([BatchRow(f"{which}_{number}.wav", "written", "small", 0.3, 1.0, "model", 4000)])
     assert len(index(folder)) == 16
+
+
+def test_a_batch_varies_strings(run, folder: Path, tmp_path: Path) -> None:
+    """Each file of it is what `render` makes; a string that cannot be is a row that says so, and hinders no other."""
+    (tmp_path / "heavy.toml").write_text("damping_d1_kg_m_s = 900.0")
+    (tmp_path / "slack.toml").write_text("tension_n = 0.5")
+    strings = f"steel_g3,{tmp_path / 'slack.toml'},{tmp_path / 'heavy.toml'}"
+    line = ["batch", "--presets", "studio_any_string", "--positions", "0.3", "--amplitudes", "1", "--seconds", 0.1]
+    line += ["--out", folder / "out", "--strings", strings, "--rate", 44_100]
+    found = run(*line)
+    assert found.status == 1
+    assert "2 written, 0 kept, 1 failed" in found.out
+    rows = {row["string"]: row for row in index(folder)}
+    assert {name: row["status"] for name, row in rows.items()} == {
+        "steel_g3": "written",
+        "slack": "written",
+        "heavy": "failed",
+    }
+    assert "heavy: " in rows["heavy"]["message"] and "overdamped" in rows["heavy"]["message"]
+    assert "pitch" in rows["slack"]["message"] and rows["steel_g3"]["message"] == ""
+    assert rows["steel_g3"]["file"] == "studio_any_string_steel_g3_x0.30_a1.0_44100_model.wav"
+    one = folder / "one.wav"
+    told = ("--position", 0.3, "--amplitude-mm", 1, "--seconds", 0.1, "--string", "steel_g3", "--rate", 44_100)
+    assert run("render", "studio_any_string", one, *told).status == 0
+    assert one.read_bytes() == (folder / "out" / rows["steel_g3"]["file"]).read_bytes()
+    assert "0 written, 2 kept, 1 failed" in run(*line).out
+
+
+def test_a_preset_of_one_string_in_a_batch_of_strings_is_told(run, words: list[object]) -> None:
+    found = run(*words, "--strings", "steel_g3")
+    assert found.status == 1
+    assert "choose a preset of many strings" in found.err
+
+
+def test_an_index_from_before_there_were_strings_keeps_its_rows(small_preset: Path, folder: Path) -> None:
+    run_batch(plan(small_preset, folder))
+    file = folder / "out" / "index.csv"
+    file.write_text("\n".join(line.rpartition(",")[0] for line in file.read_text().splitlines()) + "\n")
+    before = index(folder)
+    assert all("string" not in row for row in before)
+    assert {row.status for row in run_batch(plan(small_preset, folder))} == {"kept"}
+    assert [{**row, "status": "kept", "string": ""} for row in before] == index(folder)

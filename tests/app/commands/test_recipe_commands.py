@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 import soundfile
 
+from engine.presets import find_string, read_string
+from engine.resonators.string import StringParameters
+
 PLUCK = ("--position", 0.41, "--amplitude-mm", 3.3, "--seconds", 0.15)
 
 
@@ -189,3 +192,84 @@ def test_escapes_and_forged_lines_of_a_recipe_do_not_reach_the_terminal(
     assert [line.split()[1] for line in shown.out.splitlines() if line.startswith("seconds ")] == ["0.15"]
     assert all(c.isprintable() or c == "\n" for c in run("info", bad, "--json").out)
     assert run("render", "--recipe", bad, tmp_path / "again.wav").failure.isprintable()
+
+
+def test_a_recipe_holds_the_string_that_a_model_of_many_played(run, folder: Path, tmp_path: Path) -> None:
+    """Its file may be gone: the eight parameters are in the recipe, and rate and modes beside them."""
+    string, first, again = tmp_path / "mine.toml", folder / "first.wav", folder / "again.wav"
+    string.write_text(find_string("steel_g3").read_text())
+    told = ("--string", string, "--rate", 44_100, "--modes", 30)
+    assert run("render", "studio_any_string", first, *PLUCK, *told).status == 0
+    string.unlink()
+    facts = json.loads(run("info", first, "--json").out)
+    assert StringParameters(**facts["string"]) == read_string(find_string("steel_g3"))
+    assert (facts["modes"], facts["preset_rate_hz"], facts["rate_hz"]) == (30, 44_100, 44_100)
+    assert "string tension n" in run("info", first).out
+    assert run("render", "--recipe", first, again).status == 0
+    assert again.read_bytes() == first.read_bytes()
+    own = folder / "own.wav"
+    assert run("render", "studio_any_string", own, *PLUCK).status == 0
+    assert own.read_bytes() != first.read_bytes()
+
+
+def test_a_recipe_from_before_there_were_strings_is_rendered(run, installed: Path, folder: Path) -> None:
+    first, old, again = folder / "first.wav", folder / "old.wav", folder / "again.wav"
+    run("render", "good", first, *PLUCK, "--bits", "16")
+    with soundfile.SoundFile(first) as sound:
+        recipe = json.loads(sound.comment)
+    assert recipe.pop("string") is None and recipe.pop("modes") is None
+    with soundfile.SoundFile(old, "w", 4000, 1, "PCM_16", format="WAV") as sound:
+        sound.comment = json.dumps(recipe)
+        sound.write(np.zeros(10))
+    assert run("render", "--recipe", old, again).status == 0
+    assert again.read_bytes() == first.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"tension_n": -1.0}, "string: Value error, string: string parameter tension_n must be positive"),
+        ({"tension_n": "60"}, "string.tension_n"),
+        ({"length_m": 1e9}, "length_m must lie in"),
+        ({"colour": 1.0}, "unknown field 'colour'"),
+        ({"damping_d1_kg_m_s": 900.0}, "overdamped"),
+    ],
+)
+def test_an_impossible_string_of_a_recipe_is_told(
+    run, folder: Path, tmp_path: Path, changes: dict[str, object], message: str
+) -> None:
+    run("render", "studio_any_string", folder / "first.wav", *PLUCK)
+    with soundfile.SoundFile(folder / "first.wav") as sound:
+        string = json.loads(sound.comment)["string"]
+    bad = forged(folder / "first.wav", tmp_path / "bad.wav", string=string | changes)
+    told = run("render", "--recipe", bad, tmp_path / "again.wav").failure
+    assert f"{bad}: its recipe cannot be used" in told and message in told
+
+
+@pytest.mark.parametrize("changes", [{"modes": 100}, {"modes": -1}, {"preset_rate_hz": 10**9}])
+def test_modes_and_rate_of_a_recipe_are_bounded(
+    run, folder: Path, tmp_path: Path, changes: dict[str, object]
+) -> None:
+    run("render", "studio_any_string", folder / "first.wav", *PLUCK)
+    bad = forged(folder / "first.wav", tmp_path / "bad.wav", **changes)
+    assert "its recipe cannot be used" in run("render", "--recipe", bad, tmp_path / "again.wav").failure
+
+
+def test_a_string_beyond_the_family_is_rendered_to_a_file_and_told(run, folder: Path, tmp_path: Path) -> None:
+    slack = find_string("steel_g3").read_text().replace("tension_n = 74.173", "tension_n = 0.74173")
+    (tmp_path / "slack.toml").write_text(slack)
+    found = run("render", "studio_any_string", folder / "a.wav", *PLUCK, "--string", tmp_path / "slack.toml")
+    assert found.status == 0
+    assert "warning: pitch" in found.err and "raises the tension" in found.err
+    (tmp_path / "heavy.toml").write_text("damping_d1_kg_m_s = 900.0")
+    told = run("render", "studio_any_string", folder / "b.wav", *PLUCK, "--string", tmp_path / "heavy.toml").failure
+    assert f"{tmp_path / 'heavy.toml'}: " in told and "overdamped" in told
+    assert not (folder / "b.wav").exists()
+
+
+def test_a_preset_of_one_string_plays_no_other(run, installed: Path, folder: Path) -> None:
+    told = run("render", "good", folder / "a.wav", *PLUCK, "--string", "steel_g3").failure
+    assert "choose a preset of many strings" in told
+    assert "--recipe: holds preset" in run("render", "--recipe", "c.wav", "--string", "steel_g3").usage.replace(
+        "'", ""
+    )

@@ -129,3 +129,31 @@ def test_a_column_tells_its_worst() -> None:
     assert math.isclose(told.geometric_mean, math.sqrt(1e-7))
     parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
     assert [(low, high, len(part.strings)) for low, high, part in parts] == [(0, 0.2, 1), (0.3, 0.5, 1)]
+
+
+def test_a_map_has_every_string_once() -> None:
+    strings = tuple(
+        StringError(100.0, inharmonicity, rise, 50, 1e-6)
+        for inharmonicity in (1e-5, 1e-4, 1e-3)
+        for rise in (0.02, 0.1, 0.5)
+    )
+    cells = family_errors.by_cell(strings, (0.02, 0.1, 0.5), (1e-5, 1e-4, 1e-3))
+    assert {(rises, edges): len(part.strings) for rises, edges, part in cells} == {
+        ((0.02, 0.1), (1e-5, 1e-4)): 1,
+        ((0.02, 0.1), (1e-4, 1e-3)): 2,
+        ((0.1, 0.5), (1e-5, 1e-4)): 2,
+        ((0.1, 0.5), (1e-4, 1e-3)): 4,
+    }
+
+
+def test_a_string_that_has_fallen_silent_says_so() -> None:
+    """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all that is told."""
+    players = {"linear": family_errors.linear_string}
+    early, late = (
+        family_errors.measure(players, "inside", "test", 3, 8_000, seconds)["linear"].strings
+        for seconds in ((0.0, 0.05), (9.0, 9.05))
+    )
+    assert all(one.sounds for one in early)
+    assert [one.sounds for one in late] == [
+        draw_string("inside", "test", number).string.decay_rate(1) * 9 < 0.5 * math.log(1e18) for number in range(3)
+    ]
