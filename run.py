@@ -67,8 +67,9 @@ APP_PACKAGES = {
     "fonts-dejavu-core": "/usr/share/fonts/**/*.[ot]t[fc]",
     f"python3.{sys.version_info.minor}-venv": "import ensurepip",
 }
-# For the tests of the real sound path and of a real window, which are skipped without them.
+# For the tests of the real sound path, of a real window and of SoundFonts, which are skipped without them.
 TEST_PACKAGES = {
+    "fluidsynth": "fluidsynth",
     "pulseaudio": "pulseaudio",
     "pulseaudio-utils": "parec",
     "libasound2-plugins": "/usr/lib/*/alsa-lib/libasound_module_pcm_pulse.so",

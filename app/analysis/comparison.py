@@ -12,10 +12,12 @@ from torch import Tensor
 from app.analysis.job import Cancelled, Job
 from app.presets.library import PresetEntry
 from app.rendering.job import BLOCK_FRAMES
+from app.rendering.subject import StringOf, load_subject
 from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
-from engine.presets import PresetInfo, load_preset
+from engine.presets import PresetInfo
 from engine.resonators.sine_transform import listening_weights, synthesis_matrix, to_modes
+from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
 
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
@@ -57,11 +59,12 @@ class ComparedRow:
 
 @dataclass(frozen=True)
 class Trial:
-    """What the presets are compared on: a pluck, for how long, and where it is heard."""
+    """What the presets are compared on: a pluck, its length, where it is heard; of one of many the string too."""
 
     pluck: Pluck
     seconds: float
     listen: float
+    string: StringParameters | None = None
 
 
 def compare(entries: list[PresetEntry], trial: Trial, job: Job) -> None:
@@ -103,7 +106,7 @@ class _Truths:
 def _compare_one(
     entry: PresetEntry, trial: Trial, truths: _Truths, before: float, share: float, job: Job
 ) -> ComparedRow:
-    preset = load_preset(entry.path)
+    preset = load_subject(entry.path if trial.string is None else StringOf(entry.path, trial.string))
     info = preset.info
     source = ModelSource(preset)
     job.check()

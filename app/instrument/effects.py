@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -13,8 +13,20 @@ from app.instrument.bodies import own_impulse
 from app.patches.patch import Patch
 from engine.effects import BODIES, Body, Effects, Room
 
-Response = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # frequencies in Hz to squares of the gain
-_RATE_HZ, _POINTS = 48_000, 2**16
+RESPONSE_HZ = 48_000
+_POINTS = 2**16
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a body does to a sound: its impulse response (frames,) at RESPONSE_HZ, and the square of its gain."""
+
+    impulse: NDArray[np.float64]
+    frequencies_hz: NDArray[np.float64]
+    power: NDArray[np.float64]
+
+    def power_at(self, frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.interp(frequencies_hz, self.frequencies_hz, self.power)
 
 
 def effects_of(patch: Patch) -> Effects | None:
@@ -49,7 +61,6 @@ def _body(patch: Patch) -> tuple[Body | None, str]:
 
 @lru_cache(maxsize=16)
 def _response(body: Body) -> Response:
-    impulse = Effects(body).impulse(_RATE_HZ)
+    impulse = Effects(body).impulse(RESPONSE_HZ)
     power = (np.abs(np.fft.rfft(impulse, _POINTS, axis=0)) ** 2).mean(1)
-    frequencies_hz = np.fft.rfftfreq(_POINTS, 1 / _RATE_HZ)
-    return lambda asked_hz: np.interp(asked_hz, frequencies_hz, power)
+    return Response(impulse[:, 0], np.asarray(np.fft.rfftfreq(_POINTS, 1 / RESPONSE_HZ), np.float64), power)

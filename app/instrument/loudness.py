@@ -6,17 +6,21 @@ note. The quiet string's partials decay each by itself, so that the mean square 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from app.instrument.effects import Response
+from app.instrument.effects import RESPONSE_HZ, Response
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.resonators.base import Resonator
 from engine.voices import Ear
 
 PART_S = 0.4  # of the note: a loudness meter's block
 WANTED_DB = -30.0  # of a note at REFERENCE_VELOCITY: ten hard ones struck at once stay below full scale
+HIGHEST_PEAK_DB = -15.0  # of such a note of any key: six hard ones at once reach full scale at worst
+PEAK_BLOCKS = 54  # of as many frames: 60 ms
 REFERENCE_VELOCITY = 100
 GAIN_RANGE_DB = (-36.0, 36.0)
 # BS.1770: the shelf and the high-pass as analogue filters of second order
@@ -42,16 +46,12 @@ def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | 
     Args:
         response: of what the string is heard through.
     """
-    q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
-    weights = (resonator.shapes @ ear.weights(resonator.points)).numpy() / FULL_SCALE_M  # (modes, points)
-    sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()
-    if ear.pickup == "velocity":
-        weights = weights * omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
+    amplitudes, sigma, omega = _heard(resonator, pluck, ear)
     falls = 2 * sigma * PART_S
     mean = np.where(falls > 1e-6, -np.expm1(-falls) / np.maximum(falls, 1e-6), 1.0)
     frequencies_hz = omega / (2 * np.pi)
-    heard = k_weight(frequencies_hz) * (response(frequencies_hz) if response is not None else 1.0)
-    squares = 0.5 * (weights * q[:, None]) ** 2 * (mean * heard)[:, None]
+    heard = k_weight(frequencies_hz) * (response.power_at(frequencies_hz) if response is not None else 1.0)
+    squares = 0.5 * amplitudes**2 * (mean * heard)[:, None]
     total = float(squares.sum(0).mean())
     return 10 * float(np.log10(total)) if total > 0 else -float("inf")
 
@@ -62,3 +62,34 @@ def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | N
         found = level_db(resonator, pluck, ear, response)
     low, high = GAIN_RANGE_DB
     return float(10 ** (min(max(WANTED_DB - found, low), high) / 20))
+
+
+def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
+    """The highest sample of a quiet pluck's first 60 ms, in dB of full scale; -inf for silence."""
+    amplitudes, sigma, omega = _heard(resonator, pluck, ear)
+    eigenvalues = (1j * omega - sigma) / RESPONSE_HZ
+    blocks = np.arange(PEAK_BLOCKS)
+    begins, within = (np.exp(np.multiply.outer(steps, eigenvalues)) for steps in (blocks * PEAK_BLOCKS, blocks))
+    sounds = []
+    for point in amplitudes.T:
+        turned = ((begins * point) @ within.T).ravel()
+        sound = turned.real if ear.pickup == "displacement" else turned.imag
+        if response is not None:
+            frames = len(sound)
+            points = 2 ** math.ceil(math.log2(frames + len(response.impulse)))
+            sound = np.fft.irfft(np.fft.rfft(sound, points) * np.fft.rfft(response.impulse, points))[:frames]
+        sounds.append(float(np.abs(sound).max()))
+    highest = max(sounds)
+    return 20 * float(np.log10(highest)) if highest > 0 else -float("inf")
+
+
+def _heard(
+    resonator: Resonator, pluck: Pluck, ear: Ear
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Amplitudes of the partials as they are heard, (modes, points), of full scale; σ and ω."""
+    q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
+    weights = (resonator.shapes @ ear.weights(resonator.points)).numpy() / FULL_SCALE_M
+    sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()
+    if ear.pickup == "velocity":
+        weights = weights * omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
+    return weights * q[:, None], sigma, omega

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from app.playing.stroke import Mix, Stroke
-from app.presets.library import Library
+from app.presets.library import Library, PresetEntry
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
 from app.session.ears import heard_ear
 from app.session.slots import other_preset
 from app.shared.vocabulary import DIFFERENCE
+from engine.presets import PresetInfo
+from engine.presets.of_string import HIGHEST_HZ
 
 
 def mix_of(choices: Choices) -> Mix:
@@ -22,6 +25,15 @@ def mix_of(choices: Choices) -> Mix:
 def subject_of(choices: Choices, preset: Path) -> Subject:
     """What is plucked."""
     return preset if choices.string is None else StringOf(preset, choices.string.parameters)
+
+
+def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
+    """What a preset says of the string that is plucked."""
+    if choices.string is None or entry.info.family is None:
+        return entry.info
+    info, string = entry.info, choices.string.parameters
+    modes = max(1, min(string.modes_below(min(HIGHEST_HZ, info.rate_hz / 2)), info.grid_points - 2))
+    return replace(info, string=string, modes=modes, model_configuration={**info.model_configuration, "modes": modes})
 
 
 def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from engine.presets import Preset, load_preset
+from engine.presets.of_string import of_string
 from engine.resonators.string import StringParameters
 
 
@@ -17,6 +19,13 @@ class StringOf:
 
 
 Subject = Path | StringOf
+
+
+def load_subject(subject: Subject) -> Preset:
+    """Raises PresetError: the file cannot be used, or its model cannot be this string."""
+    if isinstance(subject, StringOf):
+        return of_string(load_preset(subject.path), subject.string)
+    return load_preset(subject)
 
 
 def path_of(subject: Subject) -> Path:

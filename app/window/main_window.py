@@ -63,6 +63,7 @@ FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
 WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
+ALL_HIGH, KNOBS_HIGH = 640, 92  # beside the instrument, and its knobs, there is room for the views above this height
 FACTS_HEIGHT = 20
 TITLE_BAR = 40  # at most; how high it is, is known too late
 
@@ -126,12 +127,13 @@ class MainWindow(QMainWindow):
         self.rate_label.setObjectName("badge")
         self._audio_button = tool_button("Audio …", "Audio settings", "Audio output, sample rate and buffer (Ctrl+,)")
         self._audio_button.clicked.connect(self.audio_asked)
-        tip = "Show or hide the instrument: keys and patch (Ctrl+K)"
+        tip = "Show or hide the instrument: keys and patch (Ctrl+K). In a low window the views make room for it"
         self._instrument_button = tool_button("Keys", "Instrument", tip)
         self._instrument_button.setCheckable(True)
         self._instrument_button.setChecked(True)
         self._instrument_button.toggled.connect(self.show_instrument)
         self.instrument_asked.connect(self._instrument_button.toggle)
+        self.instrument.surface_changed.connect(self._share_height)
         self.menu = AppMenu(self)
         self._menu_button = menu_button(self.menu)
         self._lay_out()
@@ -224,8 +226,9 @@ class MainWindow(QMainWindow):
     def _set_alive(self, alive: bool) -> None:
         for part in (self.presets, self.transport, self._test_button, self._audio_button, self._menu_button):
             part.setEnabled(alive)
-        self._decks.setVisible(alive)
+        self._alive = alive
         self.instrument.setEnabled(alive)
+        self._share_height()
         self.rate_label.setVisible(alive)
 
     @property
@@ -236,6 +239,14 @@ class MainWindow(QMainWindow):
         """Folds the instrument away, or shows it."""
         self._instrument_button.setChecked(shown)
         self.instrument.setVisible(shown)
+        self._share_height()
+
+    def _share_height(self) -> None:
+        """In a low window the views make room for the instrument, then most of the instrument itself."""
+        height = self.height()
+        needed = ALL_HIGH + (KNOBS_HIGH if self.instrument.unfolded else 0) if self.shows_instrument else 0
+        self.instrument.set_low(height < ALL_HIGH, height < HIGH)
+        self._decks.setVisible(self._alive and height >= needed)
 
     def show_solo(self, mode: int) -> None:
         """Which mode is heard alone; 0: all are heard."""
@@ -257,7 +268,9 @@ class MainWindow(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """A small window spends its room on what is to be seen and turned."""
         super().resizeEvent(event)
-        self._brand.setVisible(self.width() >= WIDE)
+        for spared in (self._brand, self._instrument_button):  # the latter is in the menu too
+            spared.setVisible(self.width() >= WIDE)
+        self._share_height()
         narrow, low = self.width() < ROOMY, self.height() < HIGH
         self.transport.set_compact(narrow)
         self._head.setSpacing(6 if narrow else 10)

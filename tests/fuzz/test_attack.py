@@ -20,8 +20,9 @@ from app.analysis.abx.record import RecordError, load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
 from app.commands.console import Failure
-from app.export.files import SoundRequest
+from app.export.files import ExportError, SoundRequest
 from app.export.recipe import Recipe, RecipeError, read_recipe, request_of
+from app.export.sampled.store import SampleIndex, StoredSample, read_index
 from app.export.wav import WavSettings
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, list_patches, read_patch
@@ -270,6 +271,13 @@ state_size = 16
 multiplier_widths = [8]
 """
 HEARD = f"{','.join(COLUMNS)}\na,{'0' * 64},4,0.5,-1,0,0.1,,,1\n".encode()
+
+
+def sample_index(_: Path) -> bytes:
+    sample = StoredSample(made_from="0" * 64, sha256="1" * 64, frames=64, channels=2, gain_db=3.0, level_db=-20.0)
+    return SampleIndex(instrument="a.sfz", samples={"key060_vel127.flac": sample}).model_dump_json().encode()
+
+
 TARGETS = (
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
     Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
@@ -282,6 +290,7 @@ TARGETS = (
     Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
     Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
+    Target("index.json", sample_index, read_index, (ExportError,), json_or_bytes),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),
     Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),

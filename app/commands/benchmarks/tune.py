@@ -20,7 +20,7 @@ from app.patches.patch import Body, Patch, Room
 from engine.presets import Preset
 
 RATE_HZ = 48_000
-QUIET_MM = 0.001
+QUIET_MM = 0.03  # 100 dB below full scale a voice is over
 PITCH_S = 1.2  # of sound, of which the first tenth is left out
 PADDED = 2**21
 CHORD = (0, 7, 12, 16, 19, 24)  # semitones above a chord's root

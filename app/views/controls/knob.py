@@ -123,9 +123,10 @@ class Knob(QWidget):
         self.update()
 
     def set_low(self, low: bool) -> None:
-        """Smaller, for rows of many knobs; as narrow as can be."""
+        """Smaller, for rows of many knobs."""
         self._low = low
-        self.set_narrow(low)
+        self.updateGeometry()
+        self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -246,7 +247,7 @@ class Knob(QWidget):
         painter.setPen(QPen(ink, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
         width = self.width()
-        painter.setFont(theme.small_font(9 if self._width == NARROW_WIDTH else 10))
+        painter.setFont(theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10))
         painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
         name = painter.fontMetrics().elidedText(self._name.upper(), Qt.TextElideMode.ElideRight, width)
         painter.drawText(QRectF(0, 0 if self._low else 3, width, 14), Qt.AlignmentFlag.AlignCenter, name)

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.views import theme
 from app.views.instrument.playable import Playable, note_name
 
-HEIGHT = 104
 MOST_ROWS, MOST_FRETS = 8, 24
 NAMES_WIDTH = 40  # open strings, left of the nut
 FOOT = 15  # numbers of frets, names of octaves
 SHORTEST = 0.14  # of the fan's height
+THICK, THIN = 2.6, 1.0  # lowest and highest string, in pixels
+LARGEST_DOT = 14.0
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
@@ -39,7 +40,6 @@ class Neck(Playable):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Strings", TIP, parent)
         self._strings: tuple[tuple[str, int], ...] = ()
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._set_cursor(60)
 
     def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
@@ -54,12 +54,6 @@ class Neck(Playable):
     def in_rows(self) -> bool:
         """Whether it is a neck, not a fan."""
         return 1 < len(self._strings) <= MOST_ROWS
-
-    def sizeHint(self) -> QSize:
-        return QSize(720, HEIGHT)
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(480, HEIGHT)
 
     # Where keys are
 
@@ -86,11 +80,15 @@ class Neck(Playable):
         return QRectF(left, top, self.fret_x(max(fret, 0)) - left, height)
 
     def key_rect(self, key: int) -> QRectF:
-        if self.in_rows:
-            string = self.string_of(key)
-            fret = key - self._strings[string][1]
-            return self.cell(string, min(fret, self.frets)).adjusted(-6, -3, 6, 3)
-        return self._column(key)
+        if not self.in_rows:
+            return self._column(key).adjusted(-4, 0, 4, 0)
+        cell = self._cell_of(key).adjusted(-10, -5, 0, 5)
+        cell.setRight(self.width())  # the string is lit from there on
+        return cell
+
+    def _cell_of(self, key: int) -> QRectF:
+        string = self.string_of(key)
+        return self.cell(string, min(key - self._strings[string][1], self.frets))
 
     def _column(self, key: int) -> QRectF:
         width = self.width() / (self._high - self._low + 1)
@@ -121,11 +119,16 @@ class Neck(Playable):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self.in_rows:
-            self._paint_neck(painter)
+            self._paint_board(painter)
+            for number in range(len(self._strings)):
+                self._paint_string(painter, number)
+            self._paint_dots(painter)
         else:
-            self._paint_fan(painter, QRectF(event.rect()))
+            for key in range(self._low, self._high + 1):
+                if self._column(key).adjusted(-14, 0, 14, 0).intersects(QRectF(event.rect())):
+                    self._paint_column(painter, key)
 
-    def _paint_neck(self, painter: QPainter) -> None:
+    def _paint_board(self, painter: QPainter) -> None:
         bottom = self.height() - FOOT
         board = QRectF(NAMES_WIDTH, 1, self.fret_x(self.frets) - NAMES_WIDTH, bottom - 2)
         painter.setPen(QPen(QColor(theme.LINE), 1))
@@ -134,85 +137,76 @@ class Neck(Playable):
         painter.setFont(theme.small_font(9))
         for fret in range(1, self.frets + 1):
             x, before = self.fret_x(fret), self.fret_x(fret - 1)
-            if fret in INLAYS:
-                painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(theme.blended(theme.LINE, theme.RAISED, 0.55))
-                painter.drawRect(QRectF(before, 2, x - before, bottom - 4))
-                painter.setPen(QColor(theme.FAINT))
-                painter.drawText(
-                    QRectF(before - 10, bottom + 2, x - before + 20, 12), Qt.AlignmentFlag.AlignCenter, str(fret)
-                )
-        for fret in range(self.frets + 1):
-            x = self.fret_x(fret)
-            painter.setPen(QPen(QColor(theme.FAINT if fret == 0 else theme.LINE), 3 if fret == 0 else 1.5))
+            painter.setPen(QPen(QColor(theme.LINE), 1.5))
             painter.drawLine(QPointF(x, 2), QPointF(x, bottom - 2))
-        for number, (name, open_key) in enumerate(self._strings):
-            row = self.cell(number, 0)
-            y = row.center().y()
-            painter.setFont(theme.small_font(11, bold=True))
-            painter.setPen(QColor(theme.TEXT if self.sounds(open_key) else theme.DISABLED))
-            painter.drawText(
-                QRectF(0, row.top(), NAMES_WIDTH - 8, row.height()),
-                Qt.AlignmentFlag.AlignCenter,
-                _short(painter, name),
-            )
-            thick = 1 + 1.6 * (len(self._strings) - 1 - number) / max(1, len(self._strings) - 1)
-            painter.setPen(QPen(theme.blended(theme.FAINT, theme.RAISED, 0.9), thick))
-            painter.drawLine(QPointF(NAMES_WIDTH, y), QPointF(board.right(), y))
-        self._paint_dots(painter, board.right())
+            if fret not in INLAYS:
+                continue
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(theme.LINE))
+            for share in (0.25, 0.75) if fret % 12 == 0 else (0.5,):
+                painter.drawEllipse(QPointF((x + before) / 2, share * bottom), 4.5, 4.5)
+            painter.setPen(QColor(theme.FAINT))
+            number = QRectF(before - 10, bottom + 1, x - before + 20, FOOT - 2)
+            painter.drawText(number, Qt.AlignmentFlag.AlignCenter, str(fret))
+        painter.setPen(QPen(QColor(theme.FAINT), 4))
+        painter.drawLine(QPointF(NAMES_WIDTH, 2), QPointF(NAMES_WIDTH, bottom - 2))
 
-    def _paint_dots(self, painter: QPainter, right: float) -> None:
-        size = min(15.0, (self.height() - FOOT) / len(self._strings) - 2)
-        for key in sorted({*self._levels, *self._held, *(k for k in (self._down, self._typed) if k is not None)}):
-            string = self.string_of(key)
-            cell = self.cell(string, min(key - self._strings[string][1], self.frets))
+    def _paint_string(self, painter: QPainter, number: int) -> None:
+        name, open_key = self._strings[number]
+        row = self.cell(number, 0)
+        painter.setFont(theme.small_font(11, bold=True))
+        painter.setPen(QColor(theme.TEXT if self.sounds(open_key) else theme.DISABLED))
+        room = NAMES_WIDTH - 10
+        cut = painter.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, room)
+        painter.drawText(QRectF(0, row.top(), room, row.height()), Qt.AlignmentFlag.AlignCenter, cut)
+        thick = THICK - (THICK - THIN) * number / max(1, len(self._strings) - 1)
+        painter.setPen(QPen(QColor(theme.FAINT), thick))
+        y = row.center().y()
+        painter.drawLine(QPointF(NAMES_WIDTH, y), QPointF(self.fret_x(self.frets), y))
+
+    def _paint_dots(self, painter: QPainter) -> None:
+        size = min(LARGEST_DOT, (self.height() - FOOT) / len(self._strings) - 2)
+        down = (*self._held, *(key for key in (self._down, self._typed) if key is not None))
+        for key in sorted({*self._levels, *down}):
+            cell = self._cell_of(key)
             level = self.level(key)
-            middle = QPointF(
-                cell.right() - min(size, cell.width() / 2) if cell.left() else NAMES_WIDTH, cell.center().y()
-            )
+            x = cell.right() - min(size, cell.width() / 2) if cell.left() > 0 else NAMES_WIDTH
+            middle = QPointF(x, cell.center().y())
+            ink = theme.blended(self.colour.name(), theme.FAINT, 1.0 if level > 0 else 0.0)
             if level > 0:
-                painter.setPen(QPen(theme.blended(self.colour.name(), theme.RAISED, 0.35 + 0.65 * level), 2.2))
-                painter.drawLine(middle, QPointF(right, middle.y()))
-            painter.setPen(QPen(QColor(theme.PANEL), 1))
-            painter.setBrush(theme.blended(self.colour.name(), theme.FAINT, level))
-            painter.drawEllipse(middle, size / 2, size / 2)
+                painter.setPen(QPen(theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level), 2))
+                painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(theme.translucent(self.colour.name(), 70))
+                painter.drawEllipse(middle, *(2 * [size / 2 + 4 * level]))
+            painter.setPen(QPen(QColor(theme.RAISED), 1))
+            painter.setBrush(ink)
+            painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
         if self.hasFocus():
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-            string = self.string_of(self._cursor)
-            rect = self.cell(string, min(self._cursor - self._strings[string][1], self.frets))
-            painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), 3, 3)
+            painter.drawRoundedRect(self._cell_of(self._cursor).adjusted(1, 1, -1, -1), 3, 3)
 
-    def _paint_fan(self, painter: QPainter, dirty: QRectF) -> None:
-        open_keys = {open_key for _, open_key in self._strings}
-        bottom = self.height() - FOOT
-        painter.setFont(theme.small_font(9))
-        for key in range(self._low, self._high + 1):
-            column = self._column(key)
-            if not column.adjusted(-14, 0, 14, 0).intersects(dirty):
-                continue
-            length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (bottom - 6)
-            x, level = column.center().x(), self.level(key)
-            ink = theme.blended(
-                theme.TEXT if key in open_keys else theme.FAINT, theme.PANEL, 0.9 if key in open_keys else 0.5
-            )
-            if level > 0:
-                ink = theme.blended(self.colour.name(), theme.PANEL, 0.35 + 0.65 * level)
-            thick = 2.4 - 1.4 * (key - self._low) / max(1, self._high - self._low)
-            painter.setPen(QPen(ink, thick + (1 if level > 0 else 0)))
-            painter.drawLine(QPointF(x, 3), QPointF(x, 3 + length))
-            if level > 0 or self.is_down(key):
-                painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(theme.blended(self.colour.name(), theme.FAINT, level))
-                painter.drawEllipse(QPointF(x, 3 + length), 4, 4)
-            if key % 12 == 0:
-                painter.setPen(QColor(theme.FAINT))
-                painter.drawText(QRectF(x - 16, bottom + 1, 32, 12), Qt.AlignmentFlag.AlignCenter, note_name(key))
-            if self.hasFocus() and key == self._cursor:
-                painter.setBrush(Qt.BrushStyle.NoBrush)
-                painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-                painter.drawRoundedRect(column.adjusted(0.5, 1, -0.5, -FOOT), 3, 3)
-
-
-def _short(painter: QPainter, name: str) -> str:
-    return painter.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, NAMES_WIDTH - 8)
+    def _paint_column(self, painter: QPainter, key: int) -> None:
+        column, bottom, level = self._column(key), self.height() - FOOT, self.level(key)
+        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (bottom - 8)
+        x, ink = column.center().x(), QColor(theme.FAINT)
+        if any(key == open_key for _, open_key in self._strings):
+            ink = QColor(theme.TEXT)
+        if level > 0:
+            ink = theme.blended(self.colour.name(), theme.PANEL, 0.3 + 0.7 * level)
+        thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)
+        painter.setPen(QPen(ink, thick + (1 if level > 0 else 0)))
+        painter.drawLine(QPointF(x, 3), QPointF(x, 3 + length))
+        if level > 0 or self.is_down(key):
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
+            painter.drawEllipse(QPointF(x, 3 + length), *(2 * [2.5 + 2.5 * level]))
+        if key % 12 == 0:
+            painter.setFont(theme.small_font(9))
+            painter.setPen(QColor(theme.FAINT))
+            painter.drawText(QRectF(x - 16, bottom, 32, FOOT - 1), Qt.AlignmentFlag.AlignCenter, note_name(key))
+        if self.hasFocus() and key == self._cursor:
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
+            painter.drawRoundedRect(column.adjusted(0.5, 1, -0.5, -FOOT), 3, 3)

@@ -16,7 +16,7 @@ from app.views.instrument.patch_bar import PatchBar
 from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
-HINT = "Press A … L, or click the keys"
+HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
 _SURFACES = (
     ("keys", "Keys", "Show a piano's keyboard"),
     ("neck", "Strings", "Show the strings and where they are stopped"),
@@ -43,10 +43,13 @@ class InstrumentPanel(QFrame):
             played.released.connect(self.released)
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
-        self._fold = tool_button("String …", "Knobs of the string", "Show or hide the knobs of the string")
+        self._fold = tool_button("String knobs", tip="Show or hide the knobs of the string")
+        self._fold.setObjectName("small")
         self._fold.setCheckable(True)
+        self._fold.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._fold.toggled.connect(self.set_unfolded)
-        self._hint = Label(HINT, self)
+        self._low = (False, False)
+        self._hint = Label(HINTS["keys"], self)
         self._hint.setObjectName("hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._lay_out()
@@ -55,7 +58,7 @@ class InstrumentPanel(QFrame):
         self._stack = QStackedWidget()
         self._stack.addWidget(self.keys)
         self._stack.addWidget(self.neck)
-        self._stack.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._stack.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._knobs_row = Sideways(self.knobs)
         self._knobs_row.hide()
         side = QVBoxLayout()
@@ -70,7 +73,8 @@ class InstrumentPanel(QFrame):
         column = QVBoxLayout(self)
         column.setContentsMargins(12, 8, 12, 10)
         column.setSpacing(8)
-        column.addWidget(Sideways(self.bar))
+        self._bar_row = Sideways(self.bar)
+        column.addWidget(self._bar_row)
         column.addWidget(self._knobs_row)
         column.addLayout(below)
         self._stack.installEventFilter(self)
@@ -85,6 +89,8 @@ class InstrumentPanel(QFrame):
     def show_surface(self, surface: str) -> None:
         self._choice.show_key(surface)
         self._stack.setCurrentWidget(self.keys if surface == "keys" else self.neck)
+        self._hint.setText(HINTS[surface])
+        self._place_hint()
         self.surface_changed.emit()
 
     @property
@@ -94,8 +100,20 @@ class InstrumentPanel(QFrame):
 
     def set_unfolded(self, unfolded: bool) -> None:
         self._fold.setChecked(unfolded)
-        self._knobs_row.setVisible(unfolded)
+        self._share_room()
         self.surface_changed.emit()
+
+    def set_low(self, low: bool, lowest: bool) -> None:
+        """For a window with little height: without the string's knobs; at last with the surface alone."""
+        if (low, lowest) != self._low:
+            self._low = low, lowest
+            self._share_room()
+
+    def _share_room(self) -> None:
+        low, lowest = self._low
+        self._knobs_row.setVisible(self.unfolded and not low)
+        self._fold.setEnabled(not low)
+        self._bar_row.setVisible(not lowest)
 
     def set_range(self, low: int, high: int) -> None:
         """The lowest and the highest key that have a string."""
@@ -103,7 +121,7 @@ class InstrumentPanel(QFrame):
         self.neck.set_range(low, high)
 
     def set_octave(self, octave: int) -> None:
-        """Of the computer's keys."""
+        """Of the lowest of the computer's keys."""
         self.bar.show_octave(octave)
 
     def show_letters(self, letters: Mapping[int, str]) -> None:

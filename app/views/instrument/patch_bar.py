@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from app.patches.patch import Macro, Patch
 
 MOST_MACROS = 8
+ROOMY_MACROS = 6  # more of them stand closer
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
-    "body.mix": ("body", SHARE, "How much is heard of the body that the strings stand on"),
+    "body.mix": ("mix", SHARE, "How much is heard of the body that the strings stand on"),
     "room.mix": ("room", KnobRange(0, 1, 0, 0.02, "{:.0%}"), "How much is heard of the room"),
     "level_db": ("level", KnobRange(-60, 24, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
 }
@@ -59,13 +60,16 @@ class PatchBar(QFrame):
             knob.hide()
         for knob in (*self.macros, *self.knobs.values()):
             knob.set_low(True)
+            knob.set_narrow(True)
             knob.drag_started.connect(self.drag_started)
             knob.drag_ended.connect(self.drag_ended)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
         row.addLayout(self._build_words(), 1)
-        row.addWidget(vertical_rule())
+        self._before_macros = vertical_rule()
+        self._before_macros.hide()
+        row.addWidget(self._before_macros)
         turned = QHBoxLayout()
         turned.setSpacing(0)
         for knob in self.macros:
@@ -89,6 +93,7 @@ class PatchBar(QFrame):
         self.category = Label()
         self.category.setObjectName("badge")
         self.category.setToolTip("The patch's category")
+        self.category.hide()
         self.save = tool_button("Save", "Save the patch", "Save the patch; a shipped one under a name of your own")
         self.rename = tool_button("Rename …", "Rename the patch", "Give your patch another name")
         self.revert = tool_button("Revert", "Revert the patch", "As it was saved; your changes are given up")
@@ -98,6 +103,7 @@ class PatchBar(QFrame):
             (self.revert, self.revert_asked),
         ):
             button.setObjectName("small")
+            button.setEnabled(False)
             button.clicked.connect(signal)
         above = QHBoxLayout()
         above.setSpacing(6)
@@ -114,12 +120,12 @@ class PatchBar(QFrame):
 
     def _build_state(self) -> QHBoxLayout:
         self.note = words_label()
-        lower = tool_button("−", "Octave down", "The computer's keys play an octave lower")
-        higher = tool_button("+", "Octave up", "The computer's keys play an octave higher")
+        lower = tool_button("−", "Octave down", "The computer's keys play an octave lower (Z)")
+        higher = tool_button("+", "Octave up", "The computer's keys play an octave higher (X)")
         lower.clicked.connect(lambda: self.octave_asked.emit(-1))
         higher.clicked.connect(lambda: self.octave_asked.emit(1))
         self.octave = faint()
-        self.octave.setToolTip("Where the computer's keys play; C4 is middle C")
+        self.octave.setToolTip("From which C on the computer's keys play; C4 is middle C (Z, X)")
         self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.voices = faint("0 voices")
         self.voices.setToolTip("How many strings ring now")
@@ -136,7 +142,7 @@ class PatchBar(QFrame):
         row.addWidget(self.note, 1)
         for widget in (lower, self.octave, higher, self.voices, self.record):
             row.addWidget(widget)
-        self.show_octave(4)
+        self.show_octave(3)
         self.show_recording(None)
         self.show_note("")
         return row
@@ -164,11 +170,11 @@ class PatchBar(QFrame):
     # What is shown
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
-        """Name and title of each; none is always there."""
+        """Name and title of each; none, the name "", is always there."""
         chosen = self.body.currentData()
         with QSignalBlocker(self.body):
             self.body.clear()
-            for name, title in (("", "No body"), *bodies):
+            for name, title in (("", "No body"), *(body for body in bodies if body[0])):
                 self.body.addItem(title, name)
             self._show_body(chosen or "")
 
@@ -180,6 +186,7 @@ class PatchBar(QFrame):
         told = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
         self.name.setToolTip(plain_tip(f"{told}\nClick to browse the patches"))
         self.category.setText(patch.category)
+        self.category.show()
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)
         self.rename.setEnabled(own)
@@ -194,6 +201,7 @@ class PatchBar(QFrame):
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
         for number, knob in enumerate(self.macros):
             knob.setVisible(number < len(macros))
+            knob.set_narrow(len(macros) > ROOMY_MACROS)
             if number >= len(macros):
                 continue
             macro = macros[number]
@@ -202,6 +210,7 @@ class PatchBar(QFrame):
                 knob.set_name(macro.name, f"{macro.name}: turns {fields}")
             knob.set_value(macro.value)
         self._macros = macros
+        self._before_macros.setVisible(bool(macros))
 
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)
@@ -216,9 +225,8 @@ class PatchBar(QFrame):
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
     def show_octave(self, octave: int) -> None:
-        """Of the computer's lower row of keys, from its C."""
-        self.octave.setText(f"C{octave}")
-        self.octave.setAccessibleName(f"Octave of the computer's keys: C{octave}")
+        """Of the lowest of the computer's keys."""
+        self.octave.setText(f"from C{octave}")
 
     def show_recording(self, seconds: float | None) -> None:
         """For how long it has been recording; None: it is not."""

@@ -12,11 +12,36 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QWidget
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.views.controls.parts import combo_box, label, tool_button
+from app.views.controls.plain import Label, plain_tip
+from app.views.instrument.playable import note_name
 
 if TYPE_CHECKING:
     from app.patches.library import PatchEntry
+
+_KEYS = Qt.Key
+_MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
+_CLOSES = (_KEYS.Key_Return, _KEYS.Key_Enter, _KEYS.Key_Escape)
+_HINT = "Type to search   ·   ↑ ↓ load and play   ·   Space plays   ·   Ctrl+D favourite   ·   Enter closes"
+_NAME = Qt.ItemDataRole.UserRole
+REST_MS = 160  # an arrow key that is held down loads, and plays when it rests
+DELETE, REALLY = "Delete", "Delete it for good?"
 
 
 class PatchBrowser(QFrame):
@@ -26,7 +51,7 @@ class PatchBrowser(QFrame):
     audition_asked = Signal(str)  # to be heard
     favourite_asked = Signal(str)  # to be one, or no longer
     rename_asked = Signal(str)
-    delete_asked = Signal(str)
+    delete_asked = Signal(str)  # and confirmed
     folder_asked = Signal()
     file_dropped = Signal(str)  # the path of a .json
     listed_changed = Signal()
@@ -36,21 +61,359 @@ class PatchBrowser(QFrame):
         super().__init__(parent)
         self.setObjectName("browser")
         self.setAccessibleName("Patch browser")
+        self.setAcceptDrops(True)
+        self._entries: dict[str, PatchEntry] = {}
+        self._favourites: Collection[str] = ()
+        self._chosen = ""
+        self._before: QWidget | None = None  # had the keyboard
+        self._rest = QTimer(self, interval=REST_MS, singleShot=True)
+        self._rest.timeout.connect(self._audition)
+        self.search = QLineEdit(placeholderText="Search patches")
+        self.search.setAccessibleName("Search patches")
+        self.search.setToolTip("Words in any order: name, category, description, author")
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self._filter)
+        self._category = combo_box("Category", [("All categories", "")])
+        self._category.setToolTip("Show only patches of this category")
+        self._whose = combo_box("Whose", [("Shipped and own", ""), ("Shipped", "shipped"), ("Own", "own")])
+        self._whose.setToolTip("Show only patches that came with the program, or only your own")
+        for box in (self._category, self._whose):
+            box.currentIndexChanged.connect(self._filter)
+        self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
+        self._starred.setCheckable(True)
+        self._starred.toggled.connect(self._filter)
+        self.list = QListWidget()
+        self.list.setAccessibleName("Patches")
+        self.list.setToolTip("Arrows load and play, Space plays, Enter closes")
+        self.list.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.list.setTextElideMode(Qt.TextElideMode.ElideRight)
+        self.list.currentItemChanged.connect(self._row_changed)
+        self.list.itemClicked.connect(lambda _: self._rest.start())
+        self.list.itemDoubleClicked.connect(lambda _: self.dismiss())
+        self._lay_out()
+        for widget in (self.search, self.list):
+            widget.installEventFilter(self)
+        if parent is not None:
+            parent.installEventFilter(self)
         self.hide()
 
+    def _lay_out(self) -> None:
+        close = tool_button("✕", "Close the browser", "Close (Escape)")
+        close.clicked.connect(self.dismiss)
+        head = QHBoxLayout()
+        head.addWidget(self.search, 1)
+        for widget in (self._category, self._whose, self._starred, close):
+            head.addWidget(widget)
+        self._state = Label()
+        self._state.setObjectName("faint")
+        folder = tool_button("Open folder", tip="Show your patches' folder; a patch dropped here is copied to it")
+        folder.clicked.connect(self.folder_asked)
+        foot = QHBoxLayout()
+        foot.addWidget(self._state, 1)
+        foot.addWidget(folder)
+        hint = Label(_HINT)
+        hint.setObjectName("faint")
+        grid = QGridLayout(self)
+        grid.setContentsMargins(14, 14, 14, 12)
+        grid.setSpacing(10)
+        grid.addLayout(head, 0, 0, 1, 2)
+        grid.addWidget(self.list, 1, 0)
+        grid.addLayout(self._build_card(), 1, 1)
+        grid.addLayout(foot, 2, 0, 1, 2)
+        grid.addWidget(hint, 3, 0, 1, 2)
+        grid.setColumnStretch(0, 5)
+        grid.setColumnStretch(1, 4)
+        grid.setRowStretch(1, 1)
+
+    def _build_card(self) -> QVBoxLayout:
+        self._title, self._kind, self._words, self._facts = (
+            label("title"),
+            label("faint"),
+            label(),
+            label("faint", selectable=True),
+        )
+        self._play = QPushButton("▶  Play a note")
+        self._play.setToolTip("Play a note of this patch (Space)")
+        self._play.clicked.connect(self._audition)
+        self._star = QPushButton("☆  Favourite")
+        self._star.setToolTip("Make it a favourite, or no longer (Ctrl+D)")
+        self._star.clicked.connect(lambda: self._tell(self.favourite_asked))
+        self._rename = QPushButton("Rename …")
+        self._rename.setToolTip("Give your own patch another name")
+        self._rename.clicked.connect(lambda: self._tell(self.rename_asked))
+        self._delete = QPushButton(DELETE)
+        self._delete.setToolTip("Delete your own patch; asks once more")
+        self._delete.clicked.connect(self._ask_delete)
+        hearing, own = QHBoxLayout(), QHBoxLayout()
+        for row, buttons in ((hearing, (self._play, self._star)), (own, (self._rename, self._delete))):
+            for button in buttons:
+                row.addWidget(button)
+            row.addStretch(1)
+        column = QVBoxLayout()
+        column.setContentsMargins(8, 4, 4, 4)
+        column.setSpacing(8)
+        for widget in (self._title, self._kind, self._words, self._facts):
+            column.addWidget(widget)
+        column.addStretch(1)
+        column.addLayout(hearing)
+        column.addLayout(own)
+        return column
+
+    # What is shown
+
     def show_entries(self, entries: Sequence[PatchEntry], favourites: Collection[str], chosen: str) -> None:
-        """All patches there are."""
+        """All patches there are, in their order; which are favourites; which one is loaded."""
+        self._entries = {entry.name: entry for entry in entries}
+        self._favourites = frozenset(favourites)
+        self._chosen = chosen
+        with QSignalBlocker(self._category):
+            kept = self._category.currentData()
+            self._category.clear()
+            self._category.addItem("All categories", "")
+            for category in dict.fromkeys(entry.patch.category for entry in entries):
+                self._category.addItem(category.capitalize(), category)
+            self._category.setCurrentIndex(max(0, self._category.findData(kept)))
+        self._filter()
 
     def set_chosen(self, name: str) -> None:
         """Which one is loaded."""
+        if name == self._chosen:
+            return
+        self._chosen = name
+        with QSignalBlocker(self.list):
+            self._mark(name)
+        self._show_card(name)
 
     @property
     def listed(self) -> tuple[str, ...]:
         """The names that pass the filter, in the order shown: previous and next go through these."""
-        return ()
+        return tuple(name for row in range(self.list.count()) if (name := _name_of(self.list.item(row))))
+
+    def clear_filter(self) -> None:
+        """All patches are listed again; told once."""
+        parts = (self.search, self._category, self._whose, self._starred)
+        for widget in parts:
+            widget.blockSignals(True)
+        self.search.clear()
+        self._category.setCurrentIndex(0)
+        self._whose.setCurrentIndex(0)
+        self._starred.setChecked(False)
+        for widget in parts:
+            widget.blockSignals(False)
+        self._filter()
+
+    def _passes(self, entry: PatchEntry) -> bool:
+        patch, whose = entry.patch, self._whose.currentData()
+        text = f"{patch.name} {patch.category} {patch.description} {patch.author}".casefold()
+        return (
+            all(word in text for word in self.search.text().casefold().replace(",", " ").split())
+            and self._category.currentData() in ("", patch.category)
+            and (not whose or (whose == "own") == entry.own)
+            and (not self._starred.isChecked() or entry.name in self._favourites)
+        )
+
+    def _filter(self) -> None:
+        listed = [entry for entry in self._entries.values() if self._passes(entry)]
+        with QSignalBlocker(self.list):
+            self.list.clear()
+            heading = ""
+            for entry in listed:
+                if entry.patch.category != heading:
+                    heading = entry.patch.category
+                    self._add_heading(heading)
+                star = "★" if entry.name in self._favourites else "☆"
+                item = QListWidgetItem(f"{star}   {entry.patch.name}{'   (own)' if entry.own else ''}", self.list)
+                item.setData(_NAME, entry.name)
+                item.setToolTip(plain_tip(f"{entry.patch.name}\n{entry.patch.description}".strip()))
+            self._mark(self._chosen)
+        total = len(self._entries)
+        found = f"{len(listed)} of {total} patches" if len(listed) < total else f"{total} patches"
+        self._state.setText(found if listed else f"{found}: clear the search or the filters")
+        self._show_card(self._chosen)
+        self.listed_changed.emit()
+
+    def _add_heading(self, category: str) -> None:
+        item = QListWidgetItem(category.upper(), self.list)
+        item.setFlags(Qt.ItemFlag.NoItemFlags)
+        font = item.font()
+        font.setBold(True)
+        item.setFont(font)
+
+    def _mark(self, name: str) -> None:
+        for row in range(self.list.count()):
+            if (item := self.list.item(row)) is not None and _name_of(item) == name:
+                self.list.setCurrentItem(item)
+                return
+        self.list.setCurrentRow(-1)  # it was filtered out
+
+    def _show_card(self, name: str) -> None:
+        entry = self._entries.get(name)
+        self._delete.setText(DELETE)
+        for button in (self._play, self._star):
+            button.setVisible(entry is not None)
+        for button in (self._rename, self._delete):
+            button.setVisible(entry is not None and entry.own)
+        if entry is None:
+            self._title.setText("No patch is loaded")
+            for shown in (self._kind, self._words, self._facts):
+                shown.clear()
+            return
+        patch = entry.patch
+        self._title.setText(patch.name)
+        by = f"   ·   {patch.author}" if patch.author else ""
+        self._kind.setText(f"{patch.category.capitalize()}   ·   {'your own' if entry.own else 'shipped'}{by}")
+        self._words.setText(patch.description)
+        self._facts.setText(_facts(entry))
+        self._star.setText("★  Favourite" if name in self._favourites else "☆  Favourite")
+
+    # What is asked
 
     def show_over(self) -> None:
         """Opens with the keyboard in the search."""
+        self._before = QApplication.focusWidget()
+        self.opened.emit()
+        self._place()
+        self.show()
+        self.raise_()
+        self.search.setFocus()
+        self.search.selectAll()
+        if (item := self.list.currentItem()) is not None:
+            self.list.scrollToItem(item)
 
     def dismiss(self) -> None:
+        self._rest.stop()
         self.hide()
+        if self._before is not None and self._before.isVisible():
+            self._before.setFocus()
+        if not self.listed:  # next and previous would lead nowhere
+            self.clear_filter()
+
+    def _row_changed(self, item: QListWidgetItem | None) -> None:
+        if name := _name_of(item):
+            self._chosen = name
+            self._show_card(name)
+            self.chosen.emit(name)
+
+    def _audition(self) -> None:
+        self._rest.stop()
+        self._tell(self.audition_asked)
+
+    def _tell(self, signal: object) -> None:
+        if self._chosen in self._entries:
+            signal.emit(self._chosen)  # type: ignore[attr-defined]
+
+    def _ask_delete(self) -> None:
+        if self._delete.text() == DELETE:
+            self._delete.setText(REALLY)
+        else:
+            self._delete.setText(DELETE)
+            self._tell(self.delete_asked)
+
+    # Keys, drops and place
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self.parent():
+            if event.type() == QEvent.Type.Resize and self.isVisible():
+                self._place()
+            return False
+        if not isinstance(event, QKeyEvent):
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride:
+            if self._is_ours(watched, event) or (event.text() and event.text().isprintable()):
+                event.accept()  # the window's own keys rest meanwhile
+                return True
+        elif event.type() == QEvent.Type.KeyPress:
+            if self._is_ours(watched, event):
+                self._press(event)
+                return True
+            typed = event.key() == _KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
+            if watched is self.list and typed:
+                self.search.setFocus()
+                return QApplication.sendEvent(self.search, event)
+        return False
+
+    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
+        control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
+        if event.key() == _KEYS.Key_D:
+            return control
+        if event.key() == _KEYS.Key_Space and watched is self.search:
+            return not control and self.search.selectedText() == self.search.text()  # nothing is being written
+        return event.key() in (*_CLOSES, _KEYS.Key_Space, *_MOVES) and not control
+
+    def _press(self, event: QKeyEvent) -> None:
+        key = _KEYS(event.key())
+        if key in _MOVES:
+            self._move(key)
+        elif key == _KEYS.Key_Space:
+            self._audition()
+        elif key == _KEYS.Key_D:
+            self._tell(self.favourite_asked)
+        else:
+            listed = self.listed
+            if key != _KEYS.Key_Escape and listed and self._chosen not in listed:
+                self._mark(listed[0])
+            self.dismiss()
+
+    def _move(self, key: Qt.Key) -> None:
+        listed = self.listed
+        if not listed:
+            return
+        self.list.setFocus()  # where Space plays
+        page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
+        step = {_KEYS.Key_Up: -1, _KEYS.Key_Down: 1, _KEYS.Key_PageUp: -page, _KEYS.Key_PageDown: page}[key]
+        here = listed.index(self._chosen) + step if self._chosen in listed else (0 if step > 0 else len(listed) - 1)
+        self._mark(listed[min(max(here, 0), len(listed) - 1)])
+        self._rest.start()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if _patches(event):
+            event.setDropAction(Qt.DropAction.CopyAction)  # never a move, which would delete the user's file
+            event.accept()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        event.setDropAction(Qt.DropAction.CopyAction)
+        event.accept()
+        for path in _patches(event):
+            self.file_dropped.emit(path)
+
+    def _place(self) -> None:
+        """Above the instrument, whose keys stay in sight and in reach."""
+        parent = self.parentWidget()
+        if parent is not None:
+            top = 52
+            width, height = min(1000, parent.width() - 28), min(520, parent.height() - top - 240)
+            self.setGeometry(14, top, width, max(300, height))
+
+
+def _name_of(item: QListWidgetItem | None) -> str:
+    """The name of a row's patch; empty for a heading and for none."""
+    return (item.data(_NAME) or "") if item is not None else ""
+
+
+def _patches(event: QDropEvent) -> list[str]:
+    return [
+        url.toLocalFile()
+        for url in event.mimeData().urls()
+        if url.isLocalFile() and url.toLocalFile().lower().endswith(".json")
+    ]
+
+
+def _facts(entry: PatchEntry) -> str:
+    patch = entry.patch
+    low, high = patch.range
+    strings = (
+        f"{len(patch.strings.strings)} strings"
+        if patch.strings.kind == "set"
+        else "one string, shortened for every key"
+    )
+    lines = [strings, f"{note_name(low)} to {note_name(high)}"]
+    if patch.mode != "poly":
+        lines.append({"guitar": "each MIDI channel is a string", "mpe": "MPE"}[patch.mode])
+    if patch.body.name:
+        lines.append(f"body: {patch.body.name}")
+    if patch.macros:
+        lines.append(f"knobs: {', '.join(macro.name for macro in patch.macros)}")
+    lines.append(f"model: {patch.preset}")
+    lines.append(entry.path.name)
+    return "\n".join(lines)

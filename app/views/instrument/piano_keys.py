@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.views import theme
 from app.views.instrument.playable import Playable, note_name
 
-HEIGHT = 104
 BLACK_HEIGHT = 0.62  # of a white key's
 BLACK_WIDTH = 0.6
 FEWEST_KEYS = 49
@@ -44,7 +43,6 @@ class PianoKeys(Playable):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("On-screen keyboard", TIP, parent)
         self._letters: dict[int, str] = {}
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._first, self._last = shown_range(self._low, self._high)
         self._set_cursor(60)
 
@@ -53,12 +51,6 @@ class PianoKeys(Playable):
         if dict(letters) != self._letters:
             self._letters = dict(letters)
             self.update()
-
-    def sizeHint(self) -> QSize:
-        return QSize(720, HEIGHT)
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(480, HEIGHT)
 
     def lay_out(self) -> None:
         self._first, self._last = shown_range(self._low, self._high)
@@ -106,52 +98,48 @@ class PianoKeys(Playable):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(event.rect(), QColor(theme.LINE))  # between the keys
         dirty = QRectF(event.rect())
-        keys = [k for k in range(self._first, self._last + 1) if self.key_rect(k).intersects(dirty)]
-        for key in keys:
-            if not is_black(key):
-                self._paint_white(painter, key)
-        for key in range(self._first, self._last + 1):
-            if is_black(key) and self.key_rect(key).intersects(dirty):
-                self._paint_black(painter, key)
+        keys = [key for key in range(self._first, self._last + 1) if self.key_rect(key).intersects(dirty)]
+        for key in sorted(keys, key=is_black):  # black ones lie above
+            self._paint_key(painter, key)
 
-    def _paint_white(self, painter: QPainter, key: int) -> None:
-        rect = self.key_rect(key).adjusted(0.5, -4, -0.5, -1)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self._filling(key, theme.blended(_ivory(), theme.PANEL, 1.0)))
-        painter.drawRoundedRect(rect, 3, 3)
-        self._paint_words(painter, key, QColor(_ebony()))
-
-    def _paint_black(self, painter: QPainter, key: int) -> None:
-        rect = self.key_rect(key).adjusted(0, -4, 0, 0)
-        painter.setPen(QPen(QColor(theme.PANEL), 1))
-        painter.setBrush(self._filling(key, QColor(_ebony())))
-        painter.drawRoundedRect(rect, 2.5, 2.5)
-        self._paint_words(painter, key, QColor(_ivory()))
-
-    def _filling(self, key: int, own: QColor) -> QColor:
-        if not self.sounds(key):
-            return theme.blended(own.name(), theme.PANEL, 0.25)
-        level = self.level(key)
-        if level > 0:
-            return theme.blended(self.colour.name(), own.name(), 0.25 + 0.75 * level)
-        return theme.blended(theme.FAINT, own.name(), 0.45) if self.is_down(key) else own
-
-    def _paint_words(self, painter: QPainter, key: int, ink: QColor) -> None:
-        rect = self.key_rect(key)
-        foot = rect.bottom() - 5
-        painter.setPen(ink)
+    def _paint_key(self, painter: QPainter, key: int) -> None:
+        rect, own, ink = self.key_rect(key), _ivory(), _ebony()
+        if is_black(key):
+            own, ink = ink, own
+        filling = self._filling(key, own)
+        if theme.contrast(filling.name(), ink) < theme.contrast(filling.name(), own):
+            ink = own
+        painter.setBrush(filling)
+        if is_black(key):
+            painter.setPen(QPen(QColor(theme.LINE), 1))
+            painter.drawRoundedRect(rect.adjusted(0, -4, 0, 0), 2.5, 2.5)
+        else:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.drawRoundedRect(rect.adjusted(0.5, -4, -0.5, -1), 3, 3)
+        painter.setPen(QColor(ink))
         if key % 12 == 0:
-            painter.setFont(theme.small_font(9))
-            painter.drawText(
-                QRectF(rect.left(), foot - 11, rect.width(), 12), Qt.AlignmentFlag.AlignCenter, note_name(key)
-            )
-        if key in self._letters and self.sounds(key):
-            up = 24 if not is_black(key) else 13
-            painter.setFont(theme.small_font(11, bold=True))
-            painter.drawText(
-                QRectF(rect.left(), foot - up, rect.width(), 13), Qt.AlignmentFlag.AlignCenter, self._letters[key]
-            )
+            self._paint_word(painter, rect, note_name(key), 16, 9)
+        if self.sounds(key):
+            self._paint_word(painter, rect, self._letters.get(key, ""), 18 if is_black(key) else 30, 11)
+        if self.hasFocus() and key == self.cursor_key:
+            painter.setPen(QPen(QColor(ink), 1.5))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(rect.adjusted(3, 2, -3, -4), 3, 3)
+
+    def _filling(self, key: int, own: str) -> QColor:
+        if not self.sounds(key):
+            return theme.blended(own, theme.LINE, 0.3)
+        ground = theme.blended(theme.FAINT, own, 0.45).name() if self.is_down(key) else own
+        level = self.level(key)
+        return theme.blended(self.colour.name(), ground, 0.25 + 0.75 * level) if level > 0 else QColor(ground)
+
+    def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
+        """`above` the foot of a key, in pixels."""
+        painter.setFont(theme.small_font(size, bold=size > 9))
+        place = QRectF(key.left() - 4, key.bottom() - above, key.width() + 8, 13)
+        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)
 
 
 def _ivory() -> str:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QHideEvent, QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS
 
+LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixels
 SOFTEST, HARDEST = 16, 127  # velocities of a click at the top and at the bottom of a place
+TIP_MS = 5_000  # then it is out of the way
 TYPED = 96  # velocity of the Enter key
 LEVEL_STEPS = 24  # that can be told apart; finer changes are not painted
-NAMES = ("C", "C♯", "D", "E♭", "E", "F", "F♯", "G", "A♭", "A", "B♭", "B")
+NAMES = ("C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯", "A", "A♯", "B")
 _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
 
 
@@ -39,7 +41,9 @@ class Playable(QWidget):
         super().__init__(parent)
         self.setAccessibleName(name)
         self.setToolTip(tip)
+        self.setToolTipDuration(TIP_MS)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._low, self._high = 28, 88
         self._source = "model"
         self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
@@ -48,6 +52,12 @@ class Playable(QWidget):
         self._held: set[int] = set()
         self._cursor = 60
         theme.changes.face_changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        return QSize(720, HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(480, LOWEST)
 
     # What a surface is
 

@@ -7,15 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.views.controls.knob import Knob, KnobRange
-from app.views.controls.parts import faint, vertical_rule, words_label
+from app.views import theme
+from app.views.controls.knob import LOW_HEIGHT, Knob, KnobRange
+from app.views.controls.parts import faint, vertical_rule
+from app.views.controls.plain import plain_tip
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 
 if TYPE_CHECKING:
     from app.patches.patch import Patch
 
+HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 TIMES = "× {:.2f}"
 WHOLE = "tuning.transpose"  # turned by whole keys
 
@@ -140,6 +144,38 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
 SHAPED = ("pluck.width", "pluck.width_hard")  # a triangle has no width
 
 
+class Facts(QWidget):
+    """A line of words and values; what there is no room for is left out, and in the tip."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._facts: dict[str, str] = {}
+        self.setFixedHeight(FACTS_HEIGHT)
+        self.setAccessibleName("The string under one key, as the knobs make it")
+
+    def show_facts(self, facts: Mapping[str, str]) -> None:
+        if dict(facts) == self._facts:
+            return
+        self._facts = dict(facts)
+        lines = "\n".join(f"{name} {value}" for name, value in facts.items())
+        self.setAccessibleDescription(lines.replace("\n", ", "))
+        self.setToolTip(plain_tip(f"{self.accessibleName()}\n{lines}"))
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        x = 2
+        for name, value in self._facts.items():
+            for words, ink, bold, gap in ((name, theme.FAINT, False, 5), (value, theme.TEXT, True, 20)):
+                painter.setFont(theme.small_font(11, bold))
+                wide = painter.fontMetrics().horizontalAdvance(words)
+                if x + wide > self.width() and x > 2:
+                    return
+                painter.setPen(QColor(ink))
+                painter.drawText(x, 0, self.width() - x, self.height(), Qt.AlignmentFlag.AlignVCenter, words)
+                x += wide + gap
+
+
 class StringKnobs(QWidget):
     """Asks with `changed`, shows with `show_patch`."""
 
@@ -151,9 +187,7 @@ class StringKnobs(QWidget):
         super().__init__(parent)
         self.setAccessibleName("Knobs of the string")
         self.knobs: dict[str, Knob] = {}
-        self.facts = words_label()
-        self.facts.setFixedHeight(16)
-        self.facts.setToolTip("The string under one key, as the knobs make it")
+        self.facts = Facts()
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
@@ -164,13 +198,15 @@ class StringKnobs(QWidget):
         row.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
+        column.setSpacing(SPACING)
         column.addLayout(row)
         column.addWidget(self.facts)
+        self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # whatever its surroundings try
 
     def _group(self, title: str, turned: tuple[_Turned, ...]) -> QVBoxLayout:
         head = faint(title)
         head.setObjectName("group")
+        head.setFixedHeight(HEAD_HEIGHT)
         row = QHBoxLayout()
         row.setSpacing(0)
         for each in turned:
@@ -202,8 +238,7 @@ class StringKnobs(QWidget):
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
         """What the knobs make of a string: words and values with their units ("tension": "72.3 N"), in order."""
-        parts = [f"{name} {value}" for name, value in facts.items()]
-        self.facts.say("     ".join(parts), *("     ".join(parts[:n]) for n in range(len(parts) - 1, 0, -1)))
+        self.facts.show_facts(facts)
 
 
 def _value(patch: Patch, field: str) -> float | None:

@@ -45,7 +45,7 @@ class ComparePanel(Panel):
         self._background.failed.connect(self._failed)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"position", "amplitude_mm", "shape", "width", "seconds", "listen", "preset"}:
+        if names & {"position", "amplitude_mm", "shape", "width", "seconds", "listen", "preset", "string"}:
             self._unchanged_s = 0.0
             if self._tried != self._wanted():
                 self._background.cancel()
@@ -71,7 +71,8 @@ class ComparePanel(Panel):
     @property
     def _trial(self) -> Trial:
         choices = self.session.choices
-        return Trial(choices.pluck, choices.seconds, choices.listen)
+        string = None if choices.string is None else choices.string.parameters
+        return Trial(choices.pluck, choices.seconds, choices.listen, string)
 
     @property
     def _entries(self) -> list[PresetEntry]:
@@ -79,6 +80,8 @@ class ComparePanel(Panel):
         if self._names is not None:
             return [entry for entry in self.library.entries if entry.name in self._names]
         present = self.library.find(self.session.choices.preset)
+        if self.session.choices.string is not None:  # which no other preset has learned
+            return [present] if present is not None else []
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
     def _wanted(self) -> tuple[object, ...]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from app.analysis.job import Job
 from app.analysis.poles import PoleFigure, pole_figure
+from app.playing.chosen import subject_of
 from app.presets.library import Library
+from app.rendering.subject import Subject, load_subject
 from app.session.choices import Session
 from app.views.plots.eigenvalues_view import EigenvaluesView
 from app.window.panels._background import Background
 from app.window.panels.base import Moment, Panel
-from engine.presets import load_preset
 
 
 class EigenvaluesPanel(Panel):
@@ -28,7 +27,7 @@ class EigenvaluesPanel(Panel):
         self.view = EigenvaluesView()
         self.view.mode_chosen.connect(self._choose)
         self.view.solo_ended.connect(lambda: session.update(solo=0))
-        self._asked: Path | None = None
+        self._asked: Subject | None = None
         self._background = Background("eigenvalues", self)
         self._background.finished.connect(self.view.show_figure)
         self._background.failed.connect(self._failed)
@@ -39,12 +38,15 @@ class EigenvaluesPanel(Panel):
 
     def show_moment(self, moment: Moment) -> None:
         entry = self.library.find(self.session.choices.preset)
-        if entry is not None and entry.path != self._asked:
-            path = self._asked = entry.path
+        if entry is None or (moment.playing and self._asked is not None):  # keys may change it many times a second
+            return
+        subject = subject_of(self.session.choices, entry.path)
+        if subject != self._asked:
+            self._asked = subject
             self.view.show_figure(None, "Reading the preset …")
 
             def work(job: Job) -> PoleFigure:
-                return pole_figure(load_preset(path))
+                return pole_figure(load_subject(subject))
 
             self._background.start(work)
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from app.analysis.error_plane import ErrorPlane, PlanePicture
 from app.analysis.job import Job
+from app.playing.chosen import subject_of
 from app.presets.library import Library
 from app.rendering import Take
+from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
 from app.views.plots.error_plane_view import ErrorPlaneView
 from app.window.panels._background import Background
 from app.window.panels.base import Moment, Panel
 from engine.pluck import Pluck
-from engine.presets import load_preset, preset_digest
+from engine.presets import preset_digest
 
 MM = 1000.0
 SETTLED_S = 0.3  # a width that is still being turned is not computed
@@ -48,7 +48,7 @@ class ErrorPlanePanel(Panel):
         if "preset" in names and entry is not None:
             trained = entry.info.trained_range
             self.view.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
-        if names & {"preset", "shape", "width"} and self._wanted() != self._asked:
+        if names & {"preset", "string", "shape", "width"} and self._wanted() != self._asked:
             self._background.cancel()
             self._asked = ()
             self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
@@ -69,16 +69,16 @@ class ErrorPlanePanel(Panel):
         if entry is None or self._asked == self._wanted() or self._unchanged_s < SETTLED_S:
             return
         self._asked = self._wanted()
-        path, pluck = entry.path, self.session.choices.pluck
+        subject, pluck = subject_of(self.session.choices, entry.path), self.session.choices.pluck
         self.view.progress.show_share(0.0)
         self.view.set_words("The model's error for every pluck: computing …")
-        self._background.start(lambda job: self._planes.compute(path, pluck, job))
+        self._background.start(lambda job: self._planes.compute(subject, pluck, job))
 
     def close(self) -> None:
         self._background.close()
 
     def _wanted(self) -> tuple[object, ...]:
-        return (self.session.choices.preset, *_form(self.session.choices.pluck))
+        return (self.session.choices.preset, self.session.choices.string, *_form(self.session.choices.pluck))
 
     def _progressed(self, share: float, picture: PlanePicture | None) -> None:
         self.view.progress.show_share(share)
@@ -106,9 +106,9 @@ class _Planes:
     def __init__(self) -> None:
         self._known: dict[tuple[object, ...], ErrorPlane] = {}
 
-    def compute(self, path: Path, pluck: Pluck, job: Job) -> PlanePicture:
-        preset = load_preset(path)
-        key = (preset_digest(path), *_form(pluck))
+    def compute(self, subject: Subject, pluck: Pluck, job: Job) -> PlanePicture:
+        preset = load_subject(subject)
+        key = (preset_digest(preset.path), string_of(subject), *_form(pluck))
         plane = self._known.pop(key, None) or ErrorPlane()
         self._known[key] = plane  # the latest last
         for oldest in list(self._known)[:-MOST_KEPT]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
+from app.playing.chosen import info_of
 from app.presets.library import Library
 from app.presets.words import shape_word
 from app.rendering import Take
@@ -25,7 +26,7 @@ from engine.presets import PresetInfo, outside_training
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
 SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
-PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset"}
+PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "string"}
 HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
 WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
 
@@ -130,7 +131,7 @@ class StringPanel(Panel):
             silent = why_difference_silent(choices, self._take)
         if silent:
             return silent
-        return "; ".join(outside_training(entry.info, choices.pluck)) if entry else ""
+        return "; ".join(outside_training(info_of(choices, entry), choices.pluck)) if entry else ""
 
     # Gestures
 

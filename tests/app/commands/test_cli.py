@@ -23,6 +23,7 @@ COMMANDS = [
     "render",
     "info",
     "batch",
+    "sampled",
     "compare",
     "dataset",
     "train",

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QLabel, QListWidget, QTextEdit, QTreeWidget, QWidg
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
+from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
 from app.views.controls.notice_bar import NoticeBar
@@ -23,6 +24,8 @@ from app.views.controls.readout import Readout
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.preset_browser import PresetBrowser
+from app.views.instrument.panel import InstrumentPanel
+from app.views.instrument.patch_browser import PatchBrowser
 from engine.presets import read_info
 
 EVIL = "<img src=evil>"
@@ -77,6 +80,27 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
     assert "evil" in texts(notices)  # and it is shown
+
+
+def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
+    """Its name can hold no markup, for it is a file's; its other texts can."""
+    patch = read_patch(SHIPPED / "classical_guitar.json")
+    macros = tuple(macro.model_copy(update={"name": EVIL}) for macro in patch.macros)
+    body = patch.body.model_copy(update={"name": EVIL})
+    patch = patch.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
+    entry = PatchEntry(Path("/x") / f"{EVIL}.json", patch)
+    panel, browser = InstrumentPanel(), PatchBrowser()
+    views: list[QWidget] = [panel, browser]
+    for view in views:
+        qtbot.addWidget(view)
+    panel.bar.show_patch(patch, own=True, changed=True)
+    panel.bar.show_note(EVIL)
+    panel.knobs.show_facts({EVIL: EVIL})
+    panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
+    browser.show_entries([entry], (), entry.name)
+    for view in views:
+        assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
+        assert "evil" in texts(view)
 
 
 def test_labels_are_made_in_one_place() -> None:

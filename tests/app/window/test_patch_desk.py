@@ -1,160 +1,179 @@
-"""Files dropped for the patch that keys play: scales and mappings tune it, sounds are its body; undo goes back."""
+"""The instrument in the window: keys, patches and what they show."""
 
 from __future__ import annotations
 
-import math
+import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 import soundfile
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QInputDialog
 from pytestqt.qtbot import QtBot
 
-from app.instrument.bodies import own_bodies
-from app.patches.tuning import Tuning
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import midi_bytes, read_midi
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import own_patches, read_patch
 from app.window.controller import Controller
-from engine.effects import Effects
-
-FIVE = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
-FIVE_KEYS = "5\n0\n127\n60\n69\n440\n5\n" + "".join(f"{n}\n" for n in range(5))
-SEVEN_KEYS = "7\n0\n127\n60\n69\n440\n7\n" + "".join(f"{n}\n" for n in range(7))
+from engine.presets.finding import SHIPPED
 
 
 @pytest.fixture
-def patched(controller: Controller) -> Controller:
-    """A window in which keys play a patch."""
-    controller.patches.choose("classical_guitar")
-    assert controller.patches.patch is not None
+def played(
+    qtbot: QtBot, preset_folder: Path, controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Controller:
+    """With a patch, and the preset that plays it."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
+    controller.library.refresh()
+    controller.patches.choose("steel_string_acoustic")
+    qtbot.waitUntil(lambda: controller.performance.live.ready, timeout=20_000)
+    controller.window.setFocus()
     return controller
 
 
-def drop(controller: Controller, *files: Path) -> None:
-    mime = QMimeData()
-    mime.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
-    copy, left, none = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
-    controller.window.dropEvent(QDropEvent(QPointF(5, 5), copy, mime, left, none))
+def press(qtbot: QtBot, controller: Controller, key: Qt.Key) -> None:
+    qtbot.keyPress(controller.window, key)
 
 
-def written(path: Path, text: str) -> Path:
-    path.write_text(text)
-    return path
+def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, played: Controller) -> None:
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding().keys() == {48}
+    qtbot.waitUntil(lambda: played.session.choices.string is not None, timeout=5_000)
+    assert played.session.choices.preset == "studio_any_string"
+    wanted_hz = 440 * 2 ** ((48 - 69) / 12)
+
+    def shown() -> bool:
+        take = played.performance.take
+        return take is not None and take.complete and abs(take.fundamental_hz / wanted_hz - 1) < 1e-3
+
+    qtbot.waitUntil(shown, timeout=20_000)
+    qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1, timeout=5_000)
+    assert "error of this pluck" in played.window.error_label.text()
+    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    assert not struck.damped
+    qtbot.keyRelease(played.window, Qt.Key.Key_A)
+    assert struck.damped
 
 
-def cents(controller: Controller, low: int, high: int) -> float:
-    patch = controller.patches.patch
-    assert patch is not None
-    tuning = Tuning(patch.tuning)
-    return 1200 * math.log2(tuning.hz(high) / tuning.hz(low))
+def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
+    press(qtbot, played, Qt.Key.Key_X)
+    press(qtbot, played, Qt.Key.Key_9)
+    assert (played.session.choices.octave, played.session.choices.velocity) == (1, 127)
+    press(qtbot, played, Qt.Key.Key_K)
+    assert played.performance.live.sounding().keys() == {72}
+    qtbot.keyRelease(played.window, Qt.Key.Key_K)
 
 
-def test_a_dropped_scale_tunes_the_patch_and_undo_takes_it_back(patched: Controller, tmp_path: Path) -> None:
-    before = patched.patches.patch
-    drop(patched, written(tmp_path / "Five.SCL", FIVE))
-    assert cents(patched, 60, 61) == pytest.approx(240)
-    assert "Five.SCL tunes Classical guitar" in patched.window.notices.text
-    patched.history.undo()
-    assert patched.patches.patch == before
-    assert cents(patched, 60, 61) == pytest.approx(100)
-    patched.history.redo()
-    assert cents(patched, 60, 61) == pytest.approx(240)
+def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller) -> None:
+    played.session.update(keys_play="place")
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding() == {}
+    assert played.performance.notes.ringing == 1
 
 
-def test_a_scale_and_its_mapping_together_in_either_order(patched: Controller, tmp_path: Path) -> None:
-    """What fitted the scale before does not stand in the way of the new one."""
-    scale, keys = written(tmp_path / "five.scl", FIVE), written(tmp_path / "five.kbm", FIVE_KEYS)
-    seven = written(tmp_path / "seven.kbm", SEVEN_KEYS)
-    for files in ((scale, keys), (keys, scale), (seven, scale, keys)):
-        drop(patched, *files)
-        patch = patched.patches.patch
-        assert patch is not None
-        assert (patch.tuning.scale, patch.tuning.keymap) == (FIVE, FIVE_KEYS)
-        assert cents(patched, 60, 65) == pytest.approx(1200)
-        patched.patches.revert()
+def test_keys_on_the_screen_play(qtbot: QtBot, played: Controller) -> None:
+    played.window.instrument.pressed.emit(60, 100)
+    assert played.performance.live.sounding().keys() == {60}
+    played.window.instrument.released.emit(60)
+    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    assert struck.damped
 
 
-@pytest.mark.parametrize("name", ["empty.scl", "words.scl", "words.kbm", "missing.scl"])
-def test_a_file_that_is_no_tuning_is_told_and_changes_nothing(patched: Controller, tmp_path: Path, name: str) -> None:
-    before = patched.session.choices
-    if name != "missing.scl":
-        written(tmp_path / name, "no tuning" if "words" in name else "")
-    drop(patched, tmp_path / name)
-    assert name in patched.window.notices.text
-    assert patched.session.choices == before
-
-
-def test_without_a_patch_a_scale_is_told_what_it_needs(controller: Controller, tmp_path: Path) -> None:
-    drop(controller, written(tmp_path / "five.scl", FIVE))
-    assert controller.patches.patch is None
-    assert "choose one first" in controller.window.notices.text
-
-
-@pytest.fixture
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
-    return tmp_path / "own"
-
-
-def knock(path: Path, seconds: float = 0.05) -> Path:
-    """A short noise that dies away, and was not exported here."""
-    frames = int(seconds * 48_000)
-    noise = np.random.default_rng(1).uniform(-0.5, 0.5, frames) * np.geomspace(1, 1e-3, frames)
-    soundfile.write(path, noise, 48_000, "PCM_24")
-    return path
-
-
-def bodies(controller: Controller) -> list[str]:
-    box = controller.window.instrument.bar.body
-    return [box.itemData(row) for row in range(box.count())]
-
-
-@pytest.mark.parametrize("name", ["knock.wav", "knock.flac", "knock.aiff"])
-def test_a_dropped_sound_without_a_recipe_is_a_body_and_the_patch_stands_on_it(
-    own_folder: Path, patched: Controller, tmp_path: Path, name: str
-) -> None:
-    before = patched.patches.patch
+def test_a_knob_changes_the_patch_and_undo_takes_it_back(played: Controller) -> None:
+    before = played.session.choices.patch
     assert before is not None
-    assert bodies(patched) == ["", "guitar"]
-    drop(patched, knock(tmp_path / name))
-    assert (own_bodies() / name).read_bytes() == (tmp_path / name).read_bytes()
-    assert bodies(patched) == ["", "guitar", "knock"]
-    assert patched.window.instrument.bar.body.currentData() == "knock"
-    patch = patched.patches.patch
-    assert patch is not None
-    assert patch.body.name == "knock" and patch.body.mix > 0
-    assert "stands on the body knock" in patched.window.notices.text
-    patched.history.undo()
-    assert patched.patches.patch == before
+    played.window.instrument.knobs.changed.emit("knobs.stiffness", 2.0)
+    changed = played.session.choices.patch
+    assert changed is not None
+    assert changed.knobs.stiffness == 2.0
+    played.window.instrument.knobs.changed.emit("knobs.stiffness", 99.0)
+    assert played.session.choices.patch == changed
+    played.history.undo()
+    assert played.session.choices.patch == before
+    played.history.redo()
+    played.patches.revert()
+    assert played.session.choices.patch == before
 
 
-def test_a_sound_that_is_no_body_is_told_and_changes_nothing(
-    own_folder: Path, patched: Controller, tmp_path: Path
-) -> None:
-    before = patched.session.choices
-    for path in (knock(tmp_path / "long.wav", seconds=4.0), knock(tmp_path / "long.flac", seconds=4.0)):
-        drop(patched, path)
-        assert f"{path}: no impulse response that can be used" in patched.window.notices.text
-    assert patched.session.choices == before
-    assert not own_bodies().exists()
+def test_previous_and_next_go_through_the_list(played: Controller) -> None:
+    names = [entry.patch.name for entry in played.patches._entries]
+    first = played.session.choices.patch
+    assert first is not None
+    played.patches.step(1)
+    second = played.session.choices.patch
+    assert second is not None
+    assert names.index(second.name) == (names.index(first.name) + 1) % len(names)
+    played.patches.step(-1)
+    assert played.session.choices.patch == first
 
 
-def test_a_body_that_comes_back_is_heard_again(
-    qtbot: QtBot, own_folder: Path, patched: Controller, tmp_path: Path
-) -> None:
-    """The patch names it all the time, so that nothing of it changes."""
-    heard: list[Effects | None] = []
+def test_a_patch_is_saved_renamed_and_deleted(played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    played.patches.change("knobs.decay", 3.0)
+    monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Mine", True))
+    played.patches.save()
+    file = own_patches() / "mine.json"
+    assert read_patch(file).knobs.decay == 3.0
+    assert played.patches.entry is not None
+    assert played.patches.entry.own
+    played.patches.change("knobs.decay", 4.0)
+    played.patches.save()  # the user's own, without a question
+    assert read_patch(file).knobs.decay == 4.0
+    monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Yours", True))
+    played.patches.rename()
+    assert not file.exists()
+    assert read_patch(own_patches() / "yours.json").name == "Yours"
+    played.patches.delete("yours")
+    assert not list(own_patches().glob("*.json"))
+
+
+def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+    song = tmp_path / "song.mid"
+    song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]))
+    played.take_file(song)
+    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding(), timeout=5_000)
+    played.play_or_stop()
+    assert not played.patches.playing
+    harp = tmp_path / "harp.json"
+    shutil.copy(PATCHES / "concert_harp.json", harp)
+    played.take_file(harp)
+    assert played.session.choices.patch == read_patch(harp)
     told: list[str] = []
-    patched.performance.live._set_effects = heard.append
-    patched.performance.live._report = lambda message, details: told.append(message)
-    drop(patched, knock(tmp_path / "knock.wav"))
-    chosen = patched.session.choices
-    qtbot.waitUntil(lambda: bool(heard) and heard[-1] is not None and heard[-1].body is not None, timeout=20_000)
-    assert heard[-1] is not None and heard[-1].body is not None and heard[-1].body.impulse is not None
-    (own_bodies() / "knock.wav").unlink()
-    patched.performance.choices_changed(frozenset({"patch"}))
-    qtbot.waitUntil(lambda: heard[-1] is None or heard[-1].body is None, timeout=20_000)
-    qtbot.waitUntil(lambda: any("played without its body" in line for line in told), timeout=20_000)
-    drop(patched, tmp_path / "knock.wav")
-    qtbot.waitUntil(lambda: heard[-1] is not None and heard[-1].body is not None, timeout=20_000)
-    assert patched.session.choices == chosen
+    played.patches.told.connect(told.append)
+    (tmp_path / "bad.mid").write_bytes(b"no")
+    played.take_file(tmp_path / "bad.mid")
+    assert "bad.mid" in told[0]
+
+
+def test_what_is_played_is_recorded_as_wav_and_midi(
+    qtbot: QtBot, played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    played.patches.told.connect(told.append)
+    played.patches.record()
+    played.patches.record()
+    assert "Nothing was played" in told[0]
+    played.patches.record()
+    played.window.instrument.pressed.emit(60, 100)
+    played.window.instrument.released.emit(60)
+    out = tmp_path / "take.wav"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(out), ""))
+    played.patches.record()
+    qtbot.waitUntil(lambda: len(told) == 2, timeout=60_000)
+    assert str(out) in told[1]
+    sound, rate_hz = soundfile.read(out)
+    assert rate_hz == 48_000
+    assert 0.001 < abs(sound).max() < 1
+    assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+
+
+def test_what_is_beyond_training_is_told(qtbot: QtBot, played: Controller) -> None:
+    notes: list[str] = []
+    bar = played.window.instrument.bar
+    show, bar.show_note = bar.show_note, lambda text: (notes.append(text), show(text))  # type: ignore[method-assign]
+    played.patches.change("knobs.stiffness", 10.0)
+    played.patches.change("knobs.gauge", 3.0)
+    played.window.instrument.pressed.emit(80, 100)
+    qtbot.waitUntil(lambda: bool(notes), timeout=5_000)
+    assert "outside the trained" in notes[-1]

@@ -1,0 +1,143 @@
+"""sampled: a patch as an instrument for samplers, SFZ or SoundFont 2."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from app.commands.console import Failure, progress, say
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from app.export.sampled.plan import SampledPlan
+    from app.patches.patch import Patch
+
+ASKED_ABOVE_BYTES = 2**30
+
+
+def sampled(
+    patch: Annotated[str, typer.Argument(metavar="PATCH", help="A patch's name or the path of its file.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.sfz|OUT.sf2", help="An SFZ has a folder of samples beside it.")],
+    keys: Annotated[
+        str | None, typer.Option(metavar="LOW-HIGH", help="MIDI keys, as in 40-76; default all of the patch.")
+    ] = None,
+    every: Annotated[
+        int, typer.Option(metavar="N", help="A sample for every N keys; those between are transposed.")
+    ] = 1,
+    layers: Annotated[int, typer.Option(metavar="N", help="Velocity layers.")] = 4,
+    seconds: Annotated[
+        float, typer.Option(help="The longest sample; one that still rings is faded out. Silent ones end sooner.")
+    ] = 8.0,
+    rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = 48_000,
+    form: Annotated[
+        Literal["flac", "wav"] | None, typer.Option("--format", help="Of an SFZ's samples; default flac.")
+    ] = None,
+    bits: Annotated[
+        Literal["16", "24"] | None, typer.Option(help="Of an SFZ's samples; default 24. A SoundFont has 16.")
+    ] = None,
+    source: Annotated[Literal["model", "truth"], typer.Option(help="What plays the patch.")] = "model",
+    dry: Annotated[
+        bool, typer.Option("--dry", help="Without the patch's room, which would end with each key that is let go.")
+    ] = False,
+    size_only: Annotated[bool, typer.Option("--size-only", help="Tell the size, and render nothing.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Go on, however large it is.")] = False,
+) -> None:
+    """Render a patch for a sampler: each key at several velocities, without loops.
+
+    An export that was stopped goes on with the same command: whole samples are kept while the patch is the same.
+    """
+    from app.export.sampled.job import export_sampled, planned
+    from app.export.sampled.plan import SampledPlan
+    from app.instrument.effects import body_problem
+    from app.patches.library import find_patch
+    from app.presets.folders import usable_files
+    from engine.presets import find_preset, preset_digest
+
+    soundfont = out.suffix.lower() == ".sf2"
+    if soundfont and (form or bits):
+        raise typer.BadParameter(
+            "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
+        )
+    chosen = find_patch(patch).patch
+    if dry:
+        chosen = chosen.with_value("room.mix", 0.0)
+    if problem := body_problem(chosen):
+        say(problem)
+    preset_path = find_preset(chosen.preset, usable_files())
+    try:
+        plan = SampledPlan(
+            chosen,
+            _keys(keys),
+            every,
+            layers,
+            seconds,
+            rate,
+            form or "flac",
+            bits or "24",
+            source,
+            preset_digest(preset_path),
+        )
+        planned(plan, out)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    size = largest_bytes(plan, soundfont)
+    words = f"{_counted(plan)}, at most {_megabytes(size)}"
+    if size_only:
+        print(f"{out}: {words}")
+        return
+    if size > ASKED_ABOVE_BYTES and not yes:
+        raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
+    say(words)
+    from app.instrument.offline import render_note
+    from engine.presets import load_preset
+
+    preset = load_preset(preset_path)
+
+    def render(
+        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
+    ) -> NDArray[np.float32]:
+        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source)
+
+    with progress("sampled") as report:
+        made = export_sampled(plan, out, render, progress=report)
+    if chosen.room.mix > 0 and not chosen.damping.let_ring:
+        say("note: a key that is let go ends the room's tail as well; --dry leaves the room to the sampler")
+    if made.cut:
+        say(f"note: {made.cut} samples still rang after {seconds:g} s and were faded out")
+    if abs(made.gain_db) >= 0.05:
+        words = "softer than the patch, so that no note clips"
+        if made.gain_db > 0:
+            words = "louder than the patch, at the full level of 16 bits"
+        say(f"note: all of it is {abs(made.gain_db):.1f} dB {words}")
+    kept = made.samples - made.rendered
+    print(f"{out}: {made.rendered} samples rendered, {kept} kept, {_megabytes(made.size_bytes)}")
+
+
+def largest_bytes(plan: SampledPlan, soundfont: bool) -> int:
+    """Of what is written, at most; a SoundFont of 16 bits has its samples beside it until it is whole."""
+    return plan.largest_bytes * (16 + 24 if soundfont else int(plan.bits)) // int(plan.bits)
+
+
+def _keys(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    found = re.fullmatch(r"\s*(\d{1,3})\s*(?:-\s*(\d{1,3})\s*)?", text, re.ASCII)
+    if not found:
+        raise typer.BadParameter(f"must be two MIDI keys as in 40-76, not {text!r}", param_hint="--keys")
+    return int(found[1]), int(found[2] or found[1])
+
+
+def _counted(plan: SampledPlan) -> str:
+    zones = plan.zones
+    keys, layers = len({zone.key for zone in zones}), plan.layers
+    between = "" if plan.every == 1 else f", each for {plan.every} keys"
+    return f"{len(zones)} samples ({keys} keys{between}, {layers} velocity layers)"
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:,.0f} MB" if size >= 1e7 else f"{size / 1e6:.1f} MB"

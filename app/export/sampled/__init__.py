@@ -1,0 +1,1 @@
+"""A patch as a sampled instrument: every key at several velocities, for players of SFZ and of SoundFont 2."""

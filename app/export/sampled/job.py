@@ -1,0 +1,109 @@
+"""The export of a patch as SFZ or SoundFont 2: samples rendered or kept, then the file that plays them.
+
+An export that was stopped goes on with the same call: whole samples are kept, unless what they sound of has changed.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import soundfile
+
+from app.export.files import ExportError
+from app.export.sampled.plan import NoteRenderer, SampledPlan
+from app.export.sampled.sf2 import check_sf2, write_sf2
+from app.export.sampled.sfz import sfz_gain_db, sfz_text
+from app.export.sampled.store import SampledProgress, SampleStore
+from app.export.sound import Cancelled
+from app.shared.whole_file import WriteError, explain, whole_file
+
+SUFFIXES = (".sfz", ".sf2")
+LONGEST_STEM = 60
+
+
+@dataclass(frozen=True)
+class SampledReport:
+    """What was written.
+
+    Attributes:
+        samples: of the instrument; rendered: those of them that were not there yet.
+        size_bytes: of the instrument with all its samples.
+        cut: samples that still rang at their end, and were faded out.
+        gain_db: what all of it is louder than the patch: an SFZ is softer where a note would clip, a SoundFont is
+            raised to full level.
+    """
+
+    path: Path
+    samples: int
+    rendered: int
+    size_bytes: int
+    cut: int
+    gain_db: float
+
+
+def plain_stem(text: str) -> str:
+    """Letters, digits and `_.+-` of ASCII: what every player takes within an SFZ file, on every system."""
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
+
+
+def sample_folder(out: Path) -> Path:
+    """Where the samples of an instrument's file lie; a SoundFont's only until it is whole."""
+    kind = "samples" if out.suffix.lower() == ".sfz" else "sf2_samples"
+    return out.with_name(f"{plain_stem(out.stem)}_{kind}")
+
+
+def planned(plan: SampledPlan, out: Path) -> SampledPlan:
+    """The plan as it is carried out for a file of this kind.
+
+    Raises:
+        ValueError: the file's kind is not known, or a SoundFont cannot hold it.
+    """
+    if out.suffix.lower() not in SUFFIXES:
+        raise ValueError(f"{out}: must end with {' or '.join(SUFFIXES)}")
+    if out.suffix.lower() == ".sfz":
+        return plan
+    check_sf2(replace(plan, format="wav", bits="16"))
+    return replace(plan, format="flac", bits="24")  # stored so, until all of them are one file of 16 bits
+
+
+def export_sampled(
+    plan: SampledPlan,
+    out: Path,
+    render: NoteRenderer,
+    *,
+    progress: SampledProgress = lambda share, text, left_s: None,
+    cancelled: Cancelled = lambda: False,
+) -> SampledReport:
+    """Renders the samples of a plan and writes OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
+
+    Raises:
+        ValueError: see `planned`.
+        ExportCancelled: `cancelled` said so; samples that are whole stay, for the next time.
+        ExportError: a file cannot be written, or a note not rendered.
+    """
+    plan = planned(plan, out)
+    store = SampleStore(sample_folder(out), out.name)
+    with store.locked():
+        samples, rendered = store.fill(plan, render, progress, cancelled)
+        try:
+            with whole_file(out) as file:
+                if out.suffix.lower() == ".sfz":
+                    file.write(sfz_text(plan, samples, store.folder.name).encode())
+                    gain_db = sfz_gain_db(samples)
+                else:
+                    gain_db = write_sf2(file, plan, samples, store.folder)
+            size = out.stat().st_size
+            if out.suffix.lower() == ".sfz":
+                size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)
+        except WriteError as error:
+            raise ExportError(str(error)) from error
+        except OSError as error:
+            raise ExportError(explain(out, error)) from error
+        except soundfile.LibsndfileError as error:
+            raise ExportError(f"{store.folder}: a sample cannot be read ({error.error_string}); try again") from error
+    if out.suffix.lower() == ".sf2":
+        store.remove()
+    cut = sum(sample.cut for sample in samples.values())
+    return SampledReport(out, len(samples), rendered, size, cut, gain_db)

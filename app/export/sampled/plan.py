@@ -1,0 +1,154 @@
+"""What is sampled of a patch: which keys, at which velocities, for how long, and what that takes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.patches.patch import VELOCITIES, Patch
+from app.patches.tuning import Tuning
+from app.shared.version import program_version
+
+SampleFormat = Literal["flac", "wav"]
+SampleBits = Literal["16", "24"]
+SampledSource = Literal["model", "truth"]
+FORMATS: tuple[SampleFormat, ...] = get_args(SampleFormat)
+SAMPLE_BITS: tuple[SampleBits, ...] = get_args(SampleBits)
+
+MOST_LAYERS = 32
+WIDEST_STEP = 12  # keys from one sample to the next
+SECONDS_RANGE = (0.1, 60.0)
+SAMPLED_RATE_RANGE_HZ = (8_000, 192_000)
+UNHEARD_FIELDS = {"name", "category", "description", "author", "macros"}  # a macro's targets hold what it wrote
+
+
+class NoteRenderer(Protocol):
+    """Renders one note of a patch, struck at the first frame and let go after `held_s`.
+
+    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. Raises
+    ValueError where there is no such note.
+    """
+
+    def __call__(
+        self, patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, /
+    ) -> NDArray[np.float32]: ...
+
+
+@dataclass(frozen=True)
+class Zone:
+    """One sample: the key and the velocity that it is rendered at, and those that it sounds for (both ends count)."""
+
+    key: int
+    velocity: int
+    keys: tuple[int, int]
+    velocities: tuple[int, int]
+
+    @property
+    def stem(self) -> str:
+        """Of its file: numbers alone, so that no name of a patch becomes a path."""
+        return f"key{self.key:03d}_vel{self.velocity:03d}"
+
+
+@dataclass(frozen=True)
+class SampledPlan:
+    """What is rendered. Without `keys`, all of the patch's range.
+
+    Attributes:
+        every: a sample for each so many keys; its neighbours are the same sample, transposed. 1 transposes none.
+        layers: velocity layers, of equal widths; each is rendered at its highest velocity.
+        seconds: the longest sample. One that is silent sooner ends there; one that still rings is faded out.
+        preset_sha256: of the model that plays the patch, so that samples of an earlier one are not kept.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it.
+    """
+
+    patch: Patch
+    keys: tuple[int, int] | None = None
+    every: int = 1
+    layers: int = 4
+    seconds: float = 8.0
+    rate_hz: int = 48_000
+    format: SampleFormat = "flac"
+    bits: SampleBits = "24"
+    source: SampledSource = "model"
+    preset_sha256: str = ""
+
+    def __post_init__(self) -> None:
+        for name, value, known in (("format", self.format, FORMATS), ("bits", self.bits, SAMPLE_BITS)):
+            if value not in known:
+                raise ValueError(f"{name} {value!r} is not one of {', '.join(known)}")
+        for name, number, (low, high) in (
+            ("every", self.every, (1, WIDEST_STEP)),
+            ("layers", self.layers, (1, MOST_LAYERS)),
+            ("seconds", self.seconds, SECONDS_RANGE),
+            ("rate_hz", self.rate_hz, SAMPLED_RATE_RANGE_HZ),
+        ):
+            if not low <= number <= high:
+                raise ValueError(f"{name} must lie in {low:g} … {high:g}, not {number:g}")
+        (low, high), (lowest, highest) = self.key_range, self.patch.range
+        if not lowest <= low <= high <= highest:
+            raise ValueError(f"keys must be a range within the patch's own, {lowest}-{highest}, not {low}-{high}")
+        if self.every > 1 and (self.patch.tuning.scale or self.patch.tuning.keymap):
+            raise ValueError(
+                "every must be 1: transposed by semitones, samples would leave the patch's own tuning; "
+                "sample every key, or remove the scale"
+            )
+        if not self.zones:
+            raise ValueError("keys: the patch's tuning leaves all of them out; choose others")
+
+    @property
+    def key_range(self) -> tuple[int, int]:
+        return self.keys or self.patch.range
+
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """By key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
+        return tuple(
+            Zone(low + (high - low) // 2, velocities[1], (low, high), velocities)
+            for low, high in self._key_spans()
+            for velocities in self._layers()
+        )
+
+    @property
+    def channels(self) -> int:
+        """At most: a room may be heard in stereo."""
+        return 2 if self.patch.room.mix > 0 else len(self.patch.pickup.points)
+
+    @property
+    def largest_bytes(self) -> int:
+        """Of all samples, were none silent before `seconds` and none compressed."""
+        frames = round(self.seconds * self.rate_hz)
+        return len(self.zones) * frames * self.channels * int(self.bits) // 8
+
+    def file_name(self, zone: Zone) -> str:
+        return f"{zone.stem}.{self.format}"
+
+    def digest(self, zone: Zone) -> str:
+        """Of all that decides how a zone's file sounds; names and descriptions do not."""
+        told = {
+            "patch": self.patch.model_dump(mode="json", exclude=UNHEARD_FIELDS),
+            "preset": self.preset_sha256,
+            "source": self.source,
+            "note": [zone.key, zone.velocity, self.seconds, self.rate_hz],
+            "file": [self.format, self.bits],
+            "version": program_version(),
+        }
+        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+    def _key_spans(self) -> list[tuple[int, int]]:
+        low, high = self.key_range
+        spans = [(first, min(first + self.every - 1, high)) for first in range(low, high + 1, self.every)]
+        if self.every > 1:  # of an equal tuning, which has all keys
+            return spans
+        tuning = Tuning(self.patch.tuning)
+        return [span for span in spans if tuning.mapped(span[0])]
+
+    def _layers(self) -> list[tuple[int, int]]:
+        most = VELOCITIES[1]
+        return [(1 + n * most // self.layers, (n + 1) * most // self.layers) for n in range(self.layers)]

@@ -1,0 +1,76 @@
+"""One note as a sample file: cut where it is silent, faded out, raised to full level, as FLAC or WAV."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import soundfile
+from numpy.typing import NDArray
+
+from app.export.sampled.plan import SampleBits, SampleFormat
+from app.export.wav import faded_out, quantised
+
+SILENT_DB = -90.0  # below the note's own peak
+INAUDIBLE_DBFS = -120.0  # a note without a sample above this is silence
+PEAK_DBFS = -1.0  # of every stored sample: players interpolate, and overshoot
+END_FADE_S = 0.02  # where a note is silent
+CUT_FADE_S = 0.5  # where it still rings; no more than a quarter of the sample
+LEVEL_PART_S = 0.4  # of the note, whose level is told: a loudness meter's block
+FEWEST_FRAMES = 64  # of a sample that every player takes
+_SUBTYPES: dict[SampleBits, str] = {"16": "PCM_16", "24": "PCM_24"}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A note that is ready to be stored.
+
+    Attributes:
+        sound: float64 (frames, channels), its peak at PEAK_DBFS.
+        gain_db: what it was raised by; taken off again, it has the level that it was rendered with.
+        level_db: root mean square of its first 0.4 s, of all channels, as it was rendered.
+        cut: it still rang at its last frame.
+    """
+
+    sound: NDArray[np.float64]
+    gain_db: float
+    level_db: float
+    cut: bool
+
+
+def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
+    """Of a rendered note (frames, channels), where ±1 is full scale.
+
+    Raises:
+        ValueError: there are no frames, or a value is not finite.
+    """
+    if rendered.ndim != 2 or not 1 <= rendered.shape[1] <= 2 or len(rendered) == 0:
+        raise ValueError(f"a note of shape {rendered.shape} is no sound of one or two channels")
+    if not np.isfinite(rendered).all():
+        raise ValueError("the note holds values that are not finite; choose another source or a softer pluck")
+    sound = rendered.astype(np.float64)
+    level = np.abs(sound).max(axis=1)
+    peak = float(level.max())
+    if peak <= 10 ** (INAUDIBLE_DBFS / 20):
+        return Sample(np.zeros((FEWEST_FRAMES, sound.shape[1])), 0.0, INAUDIBLE_DBFS, False)
+    heard = int(np.flatnonzero(level > peak * 10 ** (SILENT_DB / 20))[-1]) + 1
+    end = heard + round(END_FADE_S * rate_hz)
+    cut = end > len(sound)
+    sound = sound[:end]
+    fade = min(round(CUT_FADE_S * rate_hz), len(sound) // 4) if cut else round(END_FADE_S * rate_hz)
+    part = sound[: math.ceil(LEVEL_PART_S * rate_hz)]
+    level_db = max(INAUDIBLE_DBFS, 10 * math.log10(float(np.mean(part**2))))
+    gain_db = math.floor(100 * (PEAK_DBFS - 20 * math.log10(peak))) / 100
+    sound = faded_out(sound, fade) * 10 ** (gain_db / 20)
+    missing = max(0, FEWEST_FRAMES - len(sound))
+    return Sample(np.pad(sound, ((0, missing), (0, 0))), gain_db, level_db, cut)
+
+
+def encoded(sample: Sample, rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:
+    """The whole file; the same samples make the same bytes."""
+    buffer = io.BytesIO()
+    stored, _ = quantised(sample.sound, bits)
+    soundfile.write(buffer, stored, rate_hz, _SUBTYPES[bits], format=form.upper())
+    return buffer.getvalue()

@@ -1,0 +1,249 @@
+"""SoundFont 2: all samples and the tables of one instrument in one RIFF file.
+
+Source: SoundFont Technical Specification 2.01 (E-mu, 1998); section numbers stand beside what they ask for.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import soundfile
+
+from app.export.sampled.levels import by_key, velocity_levels
+from app.export.sampled.plan import SampledPlan, Zone
+from app.export.sampled.store import StoredSample
+from app.export.wav import quantised
+from app.patches.patch import Patch
+from app.shared.version import PROGRAM, program_version
+from engine.plain_text import one_line
+
+ZEROS_BEHIND = 46  # frames after each sample (6.1)
+RATE_RANGE_HZ = (400, 50_000)  # of a sample (7.10)
+LARGEST_BYTES = 2**32 - 2**20  # a RIFF chunk's size has 32 bits; room for the tables
+MOST_ROWS = 2**16 - 16  # of a table: others point into it with 16 bits
+GENERATORS_A_ZONE = 5  # at most
+RELEASE_SPAN_DB = 100.0  # what the volume envelope falls in its release time (8.1.2, releaseVolEnv)
+TIMECENTS_RANGE = (-12_000, 8_000)
+HARD_PAN = 500  # per mille to either side
+
+# Generators (8.1.2)
+PAN, RELEASE_VOL_ENV, INSTRUMENT, KEY_RANGE, VEL_RANGE, SAMPLE_ID, EXCLUSIVE_CLASS = 17, 38, 41, 43, 44, 53, 57
+ATTENUATION, FILTER_CUTOFF = 48, 8
+# Default modulators that are switched off, as (source, destination, amount's source) (8.4.1, 8.4.2): velocity to
+# attenuation, which is not the patch's; velocity to the filter, in the forms of 2.01 and of 2.04.
+SWITCHED_OFF = ((0x0502, ATTENUATION, 0), (0x0102, FILTER_CUTOFF, 0x0D02), (0x0102, FILTER_CUTOFF, 0))
+MOST_RAISED_DB = 6.0  # of a layer above the hardest: a bit of resolution
+FALLING_VELOCITY = 0x0102  # 1 - velocity / 128, linear (8.2)
+# Kinds of samples (7.10)
+MONO, RIGHT, LEFT = 1, 2, 4
+
+Generator = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """A channel of a zone's sample, as a sample of its own."""
+
+    zone: Zone
+    name: str
+    start: int  # in frames of the smpl chunk
+    frames: int
+    kind: int
+    link: int
+    pan: int
+
+
+def check_sf2(plan: SampledPlan) -> None:
+    """Raises ValueError where a plan cannot be one SoundFont; the message names the remedy."""
+    low, high = RATE_RANGE_HZ
+    if not low <= plan.rate_hz <= high:
+        raise ValueError(f"a SoundFont's rate must lie in {low} … {high} Hz, not {plan.rate_hz}; lower it")
+    if len(plan.zones) * plan.channels * GENERATORS_A_ZONE > MOST_ROWS:
+        raise ValueError(f"{len(plan.zones)} samples are too many for a SoundFont; take fewer keys or layers, or SFZ")
+    if plan.largest_bytes > LARGEST_BYTES:
+        raise ValueError(
+            f"these samples may take {plan.largest_bytes / 2**30:.1f} GiB, and a SoundFont holds 4; "
+            "take fewer keys, layers or seconds, or SFZ"
+        )
+
+
+def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: Path) -> float:
+    """Writes the whole file; the stored samples are read one after the other.
+
+    Returns:
+        What all of it was raised by, in dB: the loudest sample, which has 16 bits here, is at full level.
+
+    Raises:
+        OSError, soundfile.LibsndfileError: a sample cannot be read, or the file not written.
+    """
+    channels = _channels(samples)
+    attenuations_cb = _attenuations_cb(plan.patch, samples)
+    tables = _tables(plan, channels, attenuations_cb)
+    size = 2 * sum(one.frames + ZEROS_BEHIND for one in channels)
+    info = _list(b"INFO", _information(plan))
+    body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
+    file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
+    file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
+    levels_db = {zone: _raised_db(attenuations_cb[zone], zone) - stored.gain_db for zone, stored in samples.items()}
+    gain_db = -max(levels_db.values())
+    for zone in samples:
+        sound, _ = soundfile.read(folder / plan.file_name(zone), dtype="float64", always_2d=True)
+        steps, _ = quantised(sound * 10 ** ((levels_db[zone] + gain_db) / 20), "16")
+        silence = bytes(2 * ZEROS_BEHIND)
+        for column in steps.T:
+            file.write((column.astype(np.int32) >> 16).astype("<i2").tobytes() + silence)
+    file.write(tables)
+    return gain_db
+
+
+def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
+    """By how many cB a velocity of 0 would be softer than one of 128, by zone.
+
+    So the level goes on within a layer as it does from layer to layer; less where a soft layer, which has to be
+    raised for it, would be much louder than the hardest.
+    """
+    found = {}
+    for layers, stored in by_key(samples):
+        levels_db = velocity_levels(patch, layers, stored)
+        for zone in layers:
+            below = max(1, zone.velocities[0] - 1)  # the velocity of the layer before
+            step = (levels_db[zone.velocity] - levels_db[below]) / max(1, zone.velocity - below)
+            most = (levels_db[-1] - levels_db[zone.velocity] + MOST_RAISED_DB) / (128 - zone.velocity)
+            found[zone] = round(10 * 128 * max(0.0, min(step, most)))
+    return found
+
+
+def _raised_db(attenuation_cb: int, zone: Zone) -> float:
+    """What the velocity's attenuation takes at the velocity that the zone is rendered at: its level is kept there."""
+    return attenuation_cb / 10 * (1 - zone.velocity / 128)
+
+
+def release_timecents(patch: Patch) -> int:
+    """Of the volume envelope: 60 dB in the damping time; for strings that ring on, the longest release there is."""
+    if patch.damping.let_ring:
+        return TIMECENTS_RANGE[1]
+    seconds = patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
+    low, high = TIMECENTS_RANGE
+    return max(low, min(high, round(1200 * math.log2(seconds))))
+
+
+def _channels(samples: Mapping[Zone, StoredSample]) -> list[_Channel]:
+    made: list[_Channel] = []
+    start = 0
+    for zone, stored in samples.items():
+        here = len(made)
+        sides = [("", MONO, 0, 0)]
+        if stored.channels == 2:
+            sides = [("_L", LEFT, here + 1, -HARD_PAN), ("_R", RIGHT, here, HARD_PAN)]
+        for suffix, kind, link, pan in sides:
+            made.append(_Channel(zone, zone.stem + suffix, start, stored.frames, kind, link, pan))
+            start += stored.frames + ZEROS_BEHIND
+    return made
+
+
+def _information(plan: SampledPlan) -> bytes:
+    """Version, engine and name are compulsory (5)."""
+    made_by = f"{PROGRAM} {program_version()}"
+    lines = [one_line(plan.patch.description)] if plan.patch.description else []
+    if plan.every > 1:
+        lines.append(f"A sample for every {plan.every} keys; those between are transposed.")
+    return b"".join(
+        [
+            _chunk(b"ifil", struct.pack("<HH", 2, 1)),
+            _chunk(b"isng", _text("EMU8000")),
+            _chunk(b"INAM", _text(plan.patch.name)),
+            _chunk(b"ICMT", _text(" ".join(lines))) if lines else b"",
+            _chunk(b"ISFT", _text(made_by)),
+        ]
+    )
+
+
+def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Mapping[Zone, int]) -> bytes:
+    """The nine tables (7.1); each ends with a row of its own that closes it."""
+    patch = plan.patch
+    name = _name(patch.name)
+    zones: list[list[Generator]] = [[(RELEASE_VOL_ENV, release_timecents(patch) & 0xFFFF)]]  # of all others (7.7)
+    for number, channel in enumerate(channels):
+        # key range first, velocity range next, the sample last (8.1.2)
+        zone = [(KEY_RANGE, _span(channel.zone.keys)), (VEL_RANGE, _span(channel.zone.velocities))]
+        if channel.pan:
+            zone.append((PAN, channel.pan & 0xFFFF))
+        if patch.damping.let_ring and channel.zone.keys[0] == channel.zone.keys[1] > 0:
+            zone.append((EXCLUSIVE_CLASS, channel.zone.key))  # else a key's tails would pile up
+        zones.append([*zone, (SAMPLE_ID, number)])
+    modulators = [struct.pack("<HHhHH", source, to, 0, by, 0) for source, to, by in SWITCHED_OFF]
+    bags = [struct.pack("<HH", 0, 0)]
+    generators = [struct.pack("<HH", *one) for one in zones[0]]
+    for channel, zone in zip(channels, zones[1:], strict=True):
+        bags.append(struct.pack("<HH", len(generators), len(modulators)))
+        generators += [struct.pack("<HH", *one) for one in zone]
+        amount_cb = attenuations_cb[channel.zone]
+        modulators.append(struct.pack("<HHhHH", FALLING_VELOCITY, ATTENUATION, amount_cb, 0, 0))
+    bags.append(struct.pack("<HH", len(generators), len(modulators)))
+    return _list(
+        b"pdta",
+        b"".join(
+            [
+                _table(b"phdr", [_preset(name, 0), _preset(b"EOP", 1)]),
+                _table(b"pbag", [struct.pack("<HH", 0, 0), struct.pack("<HH", 1, 0)]),
+                _table(b"pmod", [bytes(10)]),
+                _table(b"pgen", [struct.pack("<HH", INSTRUMENT, 0), bytes(4)]),
+                _table(b"inst", [struct.pack("<20sH", name, 0), struct.pack("<20sH", b"EOI", len(zones))]),
+                _table(b"ibag", bags),
+                _table(b"imod", [*modulators, bytes(10)]),
+                _table(b"igen", [*generators, bytes(4)]),
+                _table(b"shdr", [*(_header(plan, one) for one in channels), struct.pack("<20s26x", b"EOS")]),
+            ]
+        ),
+    )
+
+
+def _preset(name: bytes, bag: int) -> bytes:
+    """Bank 0, program 0 (7.2)."""
+    return struct.pack("<20sHHHIII", name, 0, 0, bag, 0, 0, 0)
+
+
+def _header(plan: SampledPlan, one: _Channel) -> bytes:
+    """Where a sample lies, in frames, and its key (7.10). Its loop is not played, but has to lie within it."""
+    end = one.start + one.frames
+    places = (one.start, end, one.start + 8, end - 8)
+    return struct.pack("<20sIIIIIBbHH", _name(one.name), *places, plan.rate_hz, one.zone.key, 0, one.link, one.kind)
+
+
+def _span(ends: tuple[int, int]) -> int:
+    return ends[0] | ends[1] << 8
+
+
+def _ascii(text: str) -> bytes:
+    """Accents go, what is left of other scripts becomes a question mark."""
+    return unicodedata.normalize("NFKD", one_line(text)).encode("ascii", "replace").replace(b"?", b"_")
+
+
+def _name(text: str | bytes) -> bytes:
+    """At most 19 characters and the zero behind them."""
+    return (text if isinstance(text, bytes) else _ascii(text))[:19]
+
+
+def _text(text: str) -> bytes:
+    """With one or two zeros behind, to an even length (5)."""
+    data = _ascii(text)[:254]
+    return data + bytes(2 - len(data) % 2)
+
+
+def _chunk(name: bytes, data: bytes) -> bytes:
+    return name + struct.pack("<I", len(data)) + data
+
+
+def _list(kind: bytes, data: bytes) -> bytes:
+    return _chunk(b"LIST", kind + data)
+
+
+def _table(name: bytes, rows: Iterable[bytes]) -> bytes:
+    return _chunk(name, b"".join(rows))

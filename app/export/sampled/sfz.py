@@ -1,0 +1,84 @@
+"""SFZ: the text that tells a player which sample sounds for which key and velocity, and how.
+
+Opcodes of SFZ 1, understood by every player, but for `default_path`, `note_polyphony` and `note_selfmask` of SFZ 2.
+Source: https://sfzformat.com
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from app.export.sampled.levels import Levels, by_key, velocity_levels
+from app.export.sampled.plan import SampledPlan, Zone
+from app.export.sampled.store import StoredSample
+from app.patches.patch import Patch
+from app.shared.version import PROGRAM, program_version
+from engine.plain_text import one_line
+
+RELEASE_SPAN_DB = 78.2  # a released voice falls by so much in `ampeg_release`: exp(-9), measured in sfizz
+
+
+def sfz_text(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str) -> str:
+    """The whole file. `folder`: of the samples, beside it; of plain characters."""
+    return "\n".join(_lines(plan, samples, folder)) + "\n"
+
+
+def sfz_gain_db(samples: Mapping[Zone, StoredSample]) -> float:
+    """What all of it is raised by: 0, or below where a note would clip. No volume is above 0 dB then."""
+    return min(0.0, *(sample.gain_db for sample in samples.values()))
+
+
+def release_s(patch: Patch) -> float:
+    """`ampeg_release` that lets a note fall by 60 dB in the patch's damping time."""
+    return patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
+
+
+def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str) -> Iterator[str]:
+    patch, gain_db = plan.patch, sfz_gain_db(samples)
+    yield f"// {one_line(patch.name)}, by {PROGRAM} {program_version()}"
+    yield f"// {one_line(patch.description)}" if patch.description else "//"
+    if plan.every > 1:
+        yield f"// A sample for every {plan.every} keys; those between are transposed."
+    if gain_db:
+        yield f"// All of it is {-gain_db:.2f} dB softer than the patch, so that no note clips."
+    yield "<control>"
+    yield f"default_path={folder}/"
+    yield ""  # sfzlint reads a value that ends with a slash on into the next line
+    yield "<global>"
+    # one_shot: letting go damps nothing; the damping is still what ends a string that is plucked again
+    yield f"loop_mode={'one_shot' if patch.damping.let_ring else 'no_loop'}"
+    yield f"ampeg_release={min(100.0, release_s(patch)):.4f}"
+    # a string that is plucked again: `off_by` for players of SFZ 1, where one key may end itself;
+    # `note_polyphony` for the others, `note_selfmask=off` so that a soft note ends a loud one as well
+    yield "off_mode=normal"
+    yield "note_polyphony=1"
+    yield "note_selfmask=off"
+    bend = round(100 * patch.bend_semitones)
+    yield f"bend_up={bend}"
+    yield f"bend_down={-bend}"
+    for layers, stored in by_key(samples):
+        low, high = layers[0].keys
+        yield "<group>"
+        yield f"lokey={low} hikey={high} pitch_keycenter={layers[0].key}"
+        if low == high:
+            yield f"group={low + 1} off_by={low + 1}"
+        levels_db = velocity_levels(patch, layers, stored)
+        for zone, sample in zip(layers, stored, strict=True):
+            softest, hardest = zone.velocities
+            yield (
+                f"<region> sample={plan.file_name(zone)} lovel={softest} hivel={hardest}"
+                f" volume={gain_db - sample.gain_db:.2f} {_velocity_curve(zone, levels_db)}"
+            )
+
+
+def _velocity_curve(zone: Zone, levels_db: Levels) -> str:
+    """Within a layer the level goes on as between layers: 1 at the velocity that was rendered.
+
+    Players draw straight lines between these points: with four, a layer of 10 dB is right to 0.1 dB.
+    """
+    low, high = zone.velocities
+    points = sorted({low + (high - low) * part // 3 for part in range(4)})
+    gains = np.minimum(1, 10 ** ((levels_db - levels_db[zone.velocity]) / 20))
+    return " ".join(f"amp_velcurve_{velocity}={gains[velocity]:.5f}" for velocity in points)

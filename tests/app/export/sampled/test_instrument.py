@@ -1,0 +1,73 @@
+"""A shipped patch, rendered by its model and played by samplers: pitch and level beside the note itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.export.sampled.job import export_sampled
+from app.export.sampled.plan import SampledPlan
+from app.instrument.offline import render_note
+from app.patches.library import find_patch
+from app.patches.patch import Patch
+from engine.presets import find_preset, load_preset
+
+RATE_HZ = 48_000
+KEYS = (52, 53)
+
+
+@pytest.fixture
+def harp() -> Patch:
+    """Without its room: a string alone."""
+    return find_patch("Concert harp").patch.with_value("room.mix", 0.0)
+
+
+@pytest.fixture
+def note(harp: Patch) -> Callable[..., NDArray[np.float32]]:
+    preset = load_preset(find_preset(harp.preset))
+
+    def rendered(patch: Patch, *words: float) -> NDArray[np.float32]:
+        return render_note(patch, preset, *words)  # type: ignore[arg-type]
+
+    return rendered
+
+
+@pytest.mark.parametrize("kind", ["sfz", "sf2"])
+def test_it_sounds_as_the_note_itself(
+    kind: str, harp: Patch, note: Callable, play: Callable, sfizz: Callable, tmp_path: Path, level_db: Callable
+) -> None:
+    out = tmp_path / f"harp.{kind}"
+    seconds = 0.17 if kind == "sfz" else 1.0
+    gain_db = export_sampled(SampledPlan(harp, KEYS, layers=3, seconds=seconds), out, note).gain_db
+    offsets, cents = [], []
+    for key, velocity in [(52, 42), (52, 127), (53, 84), (53, 20), (53, 100)]:
+        direct = note(harp, key, velocity, seconds, seconds, RATE_HZ).T
+        part = slice(480, round(0.12 * RATE_HZ))
+        if kind == "sfz":
+            player = sfizz(out)
+            player.press(key, velocity)
+            heard = player.play(0.12)
+        else:
+            heard = play(out, [(0, key, velocity)], 1.0)
+            part = slice(2_400, 40_000)
+        offsets += [level_db(a[part]) - level_db(b[part]) - gain_db for a, b in zip(heard, direct, strict=True)]
+        if velocity in (42, 84, 127):  # as rendered; between them, a pluck glides as the layer's hardest does
+            cents.append(drift_cents(heard[0][part], direct[0][part]))
+    assert np.ptp(offsets) < 1.0  # half a dB to either side
+    assert np.abs(cents).max() < 0.05
+
+
+def drift_cents(heard: NDArray, direct: NDArray) -> float:
+    """How much higher one sound is than another that is nearly the same, by their strongest partials."""
+
+    def hz(sound: NDArray) -> float:
+        spectrum = np.abs(np.fft.rfft(sound * np.hanning(len(sound)), 2**19))
+        peak = int(spectrum[1:-1].argmax()) + 1
+        below, top, above = np.log(spectrum[peak - 1 : peak + 2])
+        return float(peak + 0.5 * (below - above) / (below - 2 * top + above))
+
+    return float(1200 * np.log2(hz(heard) / hz(direct)))

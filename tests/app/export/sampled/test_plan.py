@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.export.sampled.plan import MOST_LAYERS, WIDEST_STEP, SampledPlan, Zone
+from app.patches.patch import Fretted, Patch, PhysicalString
+from engine.resonators.string import StringParameters
+
+STRING = PhysicalString(**{name: getattr(StringParameters(), name) for name in PhysicalString.model_fields})
+WHOLE = Patch(name="Whole", category="keys", strings=Fretted(string=STRING), range=(0, 127))
+
+
+@given(
+    st.tuples(st.integers(0, 127), st.integers(0, 127)).map(lambda ends: (min(ends), max(ends))),
+    st.integers(1, WIDEST_STEP),
+    st.integers(1, MOST_LAYERS),
+)
+def test_each_key_and_velocity_has_one_zone(keys: tuple[int, int], every: int, layers: int) -> None:
+    sounded = [
+        (key, velocity)
+        for zone in SampledPlan(WHOLE, keys, every, layers).zones
+        for key in range(zone.keys[0], zone.keys[1] + 1)
+        for velocity in range(zone.velocities[0], zone.velocities[1] + 1)
+    ]
+    assert sorted(sounded) == [(k, v) for k in range(keys[0], keys[1] + 1) for v in range(1, 128)]
+
+
+def test_no_key_is_transposed_unless_asked(patch: Patch) -> None:
+    assert {zone.keys for zone in SampledPlan(patch).zones} == {(key, key) for key in range(45, 65)}
+    assert all(zone.key == zone.keys[0] for zone in SampledPlan(patch).zones)
+    spans = {(zone.keys, zone.key) for zone in SampledPlan(patch, every=3).zones}
+    assert {((45, 47), 46), ((63, 64), 63)} < spans
+    assert len(spans) == 7
+
+
+def test_layers_are_rendered_at_their_hardest(patch: Patch) -> None:
+    zones = [zone for zone in SampledPlan(patch, layers=3).zones if zone.key == 50]
+    assert [(zone.velocities, zone.velocity) for zone in zones] == [((1, 42), 42), ((43, 84), 84), ((85, 127), 127)]
+
+
+def test_largest_bytes_counts_every_frame(patch: Patch, patch_of: Callable[..., Patch]) -> None:
+    plan = SampledPlan(patch, (50, 59), layers=2, seconds=1.5, rate_hz=48_000, bits="24")
+    assert plan.largest_bytes == 10 * 2 * 72_000 * 3
+    stereo = patch_of(pickup={"points": (0.2, 0.3)})
+    assert SampledPlan(stereo, (50, 59), layers=2, seconds=1.5, bits="16").largest_bytes == 10 * 2 * 72_000 * 2 * 2
+
+
+@pytest.mark.parametrize(
+    ("choices", "told"),
+    [
+        ({"every": 0}, "every must lie in 1 … 12, not 0"),
+        ({"layers": 33}, "layers must lie in 1 … 32, not 33"),
+        ({"seconds": float("nan")}, "seconds must lie in 0.1 … 60, not nan"),
+        ({"rate_hz": 10**9}, "rate_hz must lie in 8000 … 192000"),
+        ({"keys": (40, 64)}, "keys must be a range within the patch's own, 45-64, not 40-64"),
+        ({"keys": (60, 50)}, "not 60-50"),
+        ({"format": "mp3"}, "format 'mp3' is not one of flac, wav"),
+        ({"bits": "32f"}, "bits '32f' is not one of 16, 24"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(patch: Patch, choices: dict, told: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(told)):
+        SampledPlan(patch, **choices)
+
+
+def test_a_scale_of_its_own_is_never_transposed(patch_of: Callable[..., Patch]) -> None:
+    scale = "! five.scl\nfive equal steps\n 5\n 240.\n 480.\n 720.\n 960.\n 2/1\n"
+    tuned = patch_of(tuning={"scale": scale})
+    assert SampledPlan(tuned).every == 1
+    with pytest.raises(ValueError, match="every must be 1"):
+        SampledPlan(tuned, every=2)
+
+
+def test_the_digest_is_of_what_is_heard(patch: Patch) -> None:
+    zone = Zone(50, 64, (50, 50), (1, 64))
+    plan = SampledPlan(patch)
+    renamed = SampledPlan(patch.model_copy(update={"name": "Another", "description": "new", "author": "me"}))
+    assert plan.digest(zone) == renamed.digest(zone)
+    others = [
+        SampledPlan(patch.with_value("knobs.decay", 2.0)),
+        SampledPlan(patch, seconds=3),
+        SampledPlan(patch, rate_hz=44_100),
+        SampledPlan(patch, bits="16"),
+        SampledPlan(patch, format="wav"),
+        SampledPlan(patch, source="truth"),
+        SampledPlan(patch, preset_sha256="0" * 64),
+    ]
+    digests = {plan.digest(zone), plan.digest(Zone(51, 64, (51, 51), (1, 64))), *(one.digest(zone) for one in others)}
+    assert len(digests) == 2 + len(others)
+    assert SampledPlan(patch, layers=7, every=2).digest(zone) == plan.digest(zone)  # the same note, other neighbours
+
+
+def test_keys_that_the_tuning_leaves_out_have_no_sample(patch_of: Callable[..., Patch]) -> None:
+    white = ["0", "x", "2", "x", "4", "5", "x", "7", "x", "9", "x", "11"]
+    keymap = "\n".join(["12", "0", "127", "60", "69", "440.0", "12", *white]) + "\n"
+    tuned = patch_of(tuning={"keymap": keymap})
+    assert {zone.key for zone in SampledPlan(tuned, (48, 59)).zones} == {48, 50, 52, 53, 55, 57, 59}
+    with pytest.raises(ValueError, match="keys: the patch's tuning leaves all of them out"):
+        SampledPlan(tuned, (49, 49))

@@ -1,0 +1,64 @@
+"""The strip: one surface at a time, the string's knobs on demand, a hint until the first note."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.views.instrument.panel import InstrumentPanel
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> InstrumentPanel:
+    made = InstrumentPanel()
+    qtbot.addWidget(made)
+    made.resize(1250, 300)
+    made.show()
+    return made
+
+
+def test_either_surface_is_played_and_sees_what_sounds(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    panel.set_range(40, 86)
+    for name, surface in (("keys", panel.keys), ("neck", panel.neck)):
+        panel.show_surface(name)
+        assert panel.surface == name
+        assert surface.isVisible()
+        with qtbot.waitSignals([panel.pressed, panel.released], order="strict"):
+            qtbot.mouseClick(surface, Qt.MouseButton.LeftButton, pos=surface.key_rect(60).center().toPoint())
+    panel.show_sounding({62: 0.5})
+    assert panel.keys.level(62) == panel.neck.level(62) > 0
+
+
+def test_the_hint_goes_with_the_first_note(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    assert panel._hint.isVisible()
+    panel.show_sounding({})
+    assert panel._hint.isVisible()
+    panel.show_sounding({60: 0.2})
+    assert not panel._hint.isVisible()
+
+
+def test_a_note_of_the_other_surface_ends_when_it_is_hidden(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    qtbot.mouseClick(panel.keys, Qt.MouseButton.RightButton, pos=panel.keys.key_rect(60).center().toPoint())
+    with qtbot.waitSignal(panel.released):
+        panel.show_surface("neck")
+
+
+def test_the_knobs_of_the_string_are_folded_at_first(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    assert not panel.knobs.isVisible()
+    with qtbot.waitSignal(panel.surface_changed):
+        qtbot.mouseClick(panel._fold, Qt.MouseButton.LeftButton)
+    assert panel.unfolded
+    assert panel.knobs.isVisible()
+    facts = panel.knobs.facts
+    qtbot.waitUntil(lambda: facts.visibleRegion().boundingRect().height() == facts.height())  # and is not cut
+
+
+def test_in_little_room_the_surface_is_left(panel: InstrumentPanel) -> None:
+    panel.set_unfolded(True)
+    panel.set_low(True, False)
+    assert (panel.knobs.isVisible(), panel.bar.isVisible(), panel.keys.isVisible()) == (False, True, True)
+    panel.set_low(True, True)
+    assert (panel.knobs.isVisible(), panel.bar.isVisible(), panel.keys.isVisible()) == (False, False, True)
+    panel.set_low(False, False)
+    assert panel.knobs.isVisible()

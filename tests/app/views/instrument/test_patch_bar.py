@@ -1,0 +1,97 @@
+"""The patch bar asks for what is clicked, and shows what a patch says as it is."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractButton
+from pytestqt.qtbot import QtBot
+
+from app.patches.patch import Macro, Patch, Target
+from app.views.instrument.patch_bar import PatchBar
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
+    made = PatchBar()
+    qtbot.addWidget(made)
+    made.resize(1250, 64)
+    made.set_bodies([("guitar", "Guitar")])
+    made.show_patch(guitar, own=True, changed=True)
+    made.show()
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("Previous patch", "previous_asked"),
+        ("Next patch", "next_asked"),
+        ("Patch: Classical guitar, changed", "browse_asked"),
+        ("Save the patch", "save_asked"),
+        ("Rename the patch", "rename_asked"),
+        ("Revert the patch", "revert_asked"),
+        ("Record what is played", "record_asked"),
+    ],
+)
+def test_each_button_asks(qtbot: QtBot, bar: PatchBar, name: str, signal: str) -> None:
+    (button,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == name)
+    with qtbot.waitSignal(getattr(bar, signal)):
+        qtbot.mouseClick(button, LEFT)
+
+
+def test_it_says_whether_it_was_changed_and_whose_it_is(bar: PatchBar, guitar: Patch) -> None:
+    assert bar.name.text() == "●  Classical guitar   ▾"
+    bar.show_patch(guitar, own=False, changed=False)
+    assert bar.name.text() == "Classical guitar   ▾"
+    assert not (bar.save.isEnabled() or bar.revert.isEnabled() or bar.rename.isEnabled())
+
+
+def test_macros_are_those_of_the_patch(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+    shown = [knob for knob in bar.macros if knob.isVisible()]
+    assert [knob.accessibleName() for knob in shown] == [macro.name for macro in guitar.macros]
+    assert [knob.value for knob in shown] == [macro.value for macro in guitar.macros]
+    with qtbot.waitSignal(bar.macro_turned) as told:
+        qtbot.keyClick(shown[1], Qt.Key.Key_Home)
+    assert told.args == [1, 0.0]
+    eight = tuple(Macro(name=f"m{n}", targets=(Target(field="room.mix", low=0, high=1),)) for n in range(8))
+    bar.show_patch(guitar.model_copy(update={"macros": eight}), own=True)
+    assert sum(knob.isVisible() for knob in bar.macros) == 8
+    bar.show_patch(guitar.model_copy(update={"macros": ()}), own=True)
+    assert not any(knob.isVisible() for knob in bar.macros)
+
+
+def test_body_and_mixes(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+    assert bar.body.currentText() == "Guitar"
+    with qtbot.waitSignal(bar.body_chosen) as told:
+        bar.body.activated.emit(0)
+    assert told.args == [""]
+    with qtbot.waitSignal(bar.changed) as told:
+        qtbot.keyClick(bar.knobs["room.mix"], Qt.Key.Key_End)
+    assert told.args == ["room.mix", 1.0]
+    unknown = guitar.model_copy(update={"body": guitar.body.model_copy(update={"name": "a lost one"})})
+    bar.show_patch(unknown, own=True)
+    assert (bar.body.currentText(), bar.body.currentData()) == ("a lost one", "a lost one")
+    bar.set_bodies([("", "none"), ("guitar", "Guitar")])
+    assert [bar.body.itemData(row) for row in range(bar.body.count())].count("") == 1
+
+
+def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
+    bar.show_voices(1)
+    assert bar.voices.text() == "1 voice"
+    bar.show_voices(6, 64)
+    assert bar.voices.text() == "6 of 64 voices"
+    bar.show_recording(73.4)
+    assert (bar.record.text(), bar.record.isChecked()) == ("■  1:13", True)
+    bar.show_recording(None)
+    assert not bar.record.isChecked()
+    bar.show_octave(-1)
+    assert bar.octave.text() == "from C-1"
+    bar.show_note("Beyond training: stiffness")
+    assert bar.note.objectName() == "warning"
+    with qtbot.waitSignal(bar.octave_asked) as told:
+        (higher,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == "Octave up")
+        qtbot.mouseClick(higher, LEFT)
+    assert told.args == [1]

@@ -1,0 +1,71 @@
+"""The string's knobs show a patch and ask for changes of its fields."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.patches.patch import Patch
+from app.views.instrument.string_knobs import StringKnobs
+
+
+@pytest.fixture
+def knobs(qtbot: QtBot) -> StringKnobs:
+    made = StringKnobs()
+    qtbot.addWidget(made)
+    made.resize(1200, 110)
+    made.show()
+    return made
+
+
+def test_every_field_is_shown_and_can_be_turned_to_both_ends(knobs: StringKnobs, guitar: Patch) -> None:
+    knobs.show_patch(guitar)
+    for field, knob in knobs.knobs.items():
+        if field.startswith("tuning."):
+            continue
+        assert knob.value == guitar.value(field)
+        for value in (knob.limits.low, knob.limits.high):
+            if field not in ("pluck.softest_mm", "pluck.hardest_mm"):  # which bound each other
+                assert guitar.with_value(field, value).value(field) == pytest.approx(value)
+    assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz
+
+
+def test_a_turn_is_told_with_its_field(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
+    knobs.show_patch(guitar)
+    with qtbot.waitSignal(knobs.changed) as told:
+        qtbot.keyClick(knobs.knobs["knobs.gauge"], Qt.Key.Key_Up)
+    assert told.args == ["knobs.gauge", pytest.approx(1.03 * guitar.knobs.gauge)]
+    with qtbot.waitSignals([knobs.drag_started, knobs.drag_ended], order="strict"):
+        qtbot.mouseClick(knobs.knobs["knobs.decay"], Qt.MouseButton.LeftButton)
+
+
+def test_it_is_transposed_by_whole_keys(qtbot: QtBot, knobs: StringKnobs) -> None:
+    asked: list[float] = []
+    knobs.changed.connect(lambda _, value: asked.append(value))
+    knobs.knobs["tuning.transpose"].value_asked.emit(2.6)
+    qtbot.keyClick(knobs.knobs["tuning.transpose"], Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
+    assert asked == [3.0, 0.0]
+
+
+def test_what_a_patch_does_not_have_cannot_be_turned(knobs: StringKnobs, guitar: Patch) -> None:
+    mono = guitar.model_copy(
+        update={
+            "pickup": guitar.pickup.model_copy(update={"points": (0.2,)}),
+            "pluck": guitar.pluck.model_copy(update={"shape": "triangular"}),
+            "damping": guitar.damping.model_copy(update={"let_ring": True}),
+        }
+    )
+    knobs.show_patch(mono)
+    off = {field for field, knob in knobs.knobs.items() if not knob.isEnabled()}
+    assert off == {"pickup.points.1", "pluck.width", "pluck.width_hard", "damping.release_t60_s"}
+    gaussian = mono.model_copy(update={"pluck": mono.pluck.model_copy(update={"shape": "gaussian"})})
+    knobs.show_patch(gaussian)
+    assert knobs.knobs["pluck.width"].isEnabled()
+
+
+def test_the_facts_are_told_in_their_units(knobs: StringKnobs) -> None:
+    before = knobs.facts.grab().toImage()
+    knobs.show_facts({"tension": "72.3 N", "length": "650 mm"})
+    assert knobs.facts.accessibleDescription() == "tension 72.3 N, length 650 mm"
+    assert knobs.facts.grab().toImage() != before
