@@ -53,6 +53,7 @@ def sampled(
     """
     from app.export.sampled.job import export_sampled, planned
     from app.export.sampled.plan import SampledPlan
+    from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
     from app.presets.folders import usable_files
@@ -81,6 +82,7 @@ def sampled(
             bits or "24",
             source,
             preset_digest(preset_path),
+            body_digest(chosen.body.name),
         )
         planned(plan, out)
     except ValueError as error:

@@ -5,6 +5,7 @@ The user's lie in a folder beside the patches. A body is known by its file's nam
 
 from __future__ import annotations
 
+import hashlib
 from functools import lru_cache
 from itertools import count
 from pathlib import Path
@@ -46,6 +47,15 @@ def own_impulse(name: str) -> Impulse:
     except OSError as error:
         raise ImpulseError(f"{path}: cannot be read ({error.strerror}); drop it on the window again") from error
     return _read(path, state.st_mtime_ns, state.st_size)
+
+
+def body_digest(name: str) -> str:
+    """The SHA-256 of a body of the user's own; "" for any other."""
+    path = _own_files().get(name)
+    try:
+        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:  # it is told where it is heard
+        return ""
 
 
 def install_body(file: Path) -> str:

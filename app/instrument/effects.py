@@ -41,6 +41,13 @@ def body_problem(patch: Patch) -> str:
     return _body(patch)[1]
 
 
+def channels_of(patch: Patch) -> int:
+    """Two where it has two listening points, a room, or a body that was recorded so."""
+    body = _body(patch)[0]
+    wide = body is not None and body.impulse is not None and body.impulse.samples.shape[1] == 2
+    return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 or wide else 1
+
+
 def body_response(patch: Patch) -> Response | None:
     """Of its body alone, whose resonances favour some keys; None: it has none."""
     body = _body(patch)[0]

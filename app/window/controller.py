@@ -38,6 +38,7 @@ from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
+from app.window.dragged_export import DraggedExport
 from app.window.dropped_files import receive
 from app.window.instruments import Instruments
 from app.window.main_window import KEYS, PLAYED_KEYS, MainWindow
@@ -139,6 +140,10 @@ class Controller(QObject):
         for dragged in (window.instrument.bar, window.instrument.knobs):
             dragged.drag_started.connect(self.history.hold)
             dragged.drag_ended.connect(self.history.let_go)
+        self.dragged = DraggedExport(
+            window.transport.export, lambda: (self.library.entries, self.session.choices, self._settings.export)
+        )
+        self.dragged.told.connect(window.notices.tell)
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -230,8 +235,6 @@ class Controller(QObject):
             choices,
             self._settings.export,
             self.window,
-            listen_right=choices.listen_right if choices.stereo else None,
-            pickup=choices.pickup,
         )
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
@@ -295,6 +298,7 @@ class Controller(QObject):
             self._abx.abandon()
         self._timer.stop()
         self._deck_timer.stop()
+        self.dragged.close()
         self.keeper.close()
         self.patches.close()
         self.instruments.close()

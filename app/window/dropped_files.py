@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +88,8 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
     if recipe.source == "difference":
         low, high = DIFFERENCE_GAIN_RANGE_DB
         found |= {"a": "difference", "difference_gain_db": min(max(recipe.difference_gain_db, low), high)}
+    if recipe.string is not None:
+        found["string"] = asdict(recipe.string)
     found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
     if recipe.listen_right is not None:
         found["listen_right"] = recipe.listen_right

@@ -9,7 +9,7 @@ import pytest
 import soundfile
 
 from app.audio.impulse_file import ImpulseError
-from app.instrument.bodies import body_names, install_body, own_bodies, own_impulse
+from app.instrument.bodies import body_digest, body_names, install_body, own_bodies, own_impulse
 from app.instrument.effects import body_problem, body_response, effects_of
 from app.instrument.offline import render_note
 from app.patches.patch import Body, Patch
@@ -78,6 +78,23 @@ def test_it_is_heard_in_a_file(patch: Patch, preset: Preset, tmp_path: Path) -> 
     peak = np.abs(dry).max()
     assert np.abs(wet[:LATE_FRAMES]).max() < 1e-6 * peak
     np.testing.assert_allclose(wet[LATE_FRAMES:], dry[:-LATE_FRAMES], atol=1e-3 * peak)
+
+
+def test_a_body_in_stereo_is_heard_so(patch: Patch, preset: Preset, tmp_path: Path) -> None:
+    samples = np.zeros((200, 2))
+    samples[[0, -1], [0, 1]] = 0.5
+    soundfile.write(tmp_path / "wide.wav", samples, RATE_HZ, "FLOAT")
+    sound = render_note(on(patch, install_body(tmp_path / "wide.wav")), preset, 57, 90, 1.0, 0.1, RATE_HZ)
+    assert sound.shape[1] == 2
+    np.testing.assert_allclose(sound[199:, 1], sound[:-199, 0], atol=1e-5)
+
+
+def test_its_digest_is_that_of_its_file(tmp_path: Path) -> None:
+    name = install_body(late(tmp_path / "late.wav"))
+    first = body_digest(name)
+    assert len(first) == 64 and body_digest("guitar") == body_digest("nothing") == ""
+    late(own_bodies() / "late.wav", 7)
+    assert body_digest(name) not in ("", first)
 
 
 def test_one_that_is_gone_is_told_in_a_line_and_left_out(patch: Patch, preset: Preset, tmp_path: Path) -> None:
