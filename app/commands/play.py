@@ -42,6 +42,10 @@ def play(
         events, chosen = read_midi(midi), find_patch(patch).patch
     except (MidiFileError, PatchError) as error:
         raise Failure(str(error)) from error
+    from app.instrument.effects import body_problem
+
+    if problem := body_problem(chosen):
+        say(problem)
     loaded = arguments.open_preset(chosen.preset)
     from app.export.played import write_played
     from app.export.wav import WavSettings

@@ -53,6 +53,8 @@ def sampled(
     """
     from app.export.sampled.job import export_sampled, planned
     from app.export.sampled.plan import SampledPlan
+    from app.instrument.bodies import body_digest
+    from app.instrument.effects import body_problem
     from app.patches.library import find_patch
     from app.presets.folders import usable_files
     from engine.presets import find_preset, preset_digest
@@ -65,6 +67,8 @@ def sampled(
     chosen = find_patch(patch).patch
     if dry:
         chosen = chosen.with_value("room.mix", 0.0)
+    if problem := body_problem(chosen):
+        say(problem)
     preset_path = find_preset(chosen.preset, usable_files())
     try:
         plan = SampledPlan(
@@ -78,6 +82,7 @@ def sampled(
             bits or "24",
             source,
             preset_digest(preset_path),
+            body_digest(chosen.body.name),
         )
         planned(plan, out)
     except ValueError as error:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from app.export.recording import Recording
 from app.export.wav import Level, WavSettings, write_wav
+from app.instrument.effects import channels_of
 from app.instrument.events import TimedEvent
 from app.instrument.midi_file import midi_bytes
-from app.instrument.offline import channels_of, render_events
+from app.instrument.offline import render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from app.shared.whole_file import whole_file

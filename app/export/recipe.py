@@ -28,6 +28,10 @@ class RecipeError(Exception):
         super().__init__(one_line(message))
 
 
+class NoRecipe(RecipeError):
+    """A sound file that was not exported by us."""
+
+
 class Recipe(BaseModel):
     """See the module. Lengths and rates as in `SoundRequest` and `WavSettings`; what is absent has its default.
 
@@ -127,7 +131,8 @@ def read_recipe(path: Path) -> Recipe:
     """The recipe that a WAV file carries.
 
     Raises:
-        RecipeError: the file is missing or no WAV, has no recipe, or one that is broken or of a newer version.
+        NoRecipe: it is a sound file without one.
+        RecipeError: the file is missing or no WAV, or its recipe is broken or of a newer version.
     """
     try:
         with soundfile.SoundFile(path) as file:
@@ -138,7 +143,7 @@ def read_recipe(path: Path) -> Recipe:
             f"{path}: no sound file that can be read ({words}); give a WAV that was exported"
         ) from error
     if not text.lstrip().startswith("{"):
-        raise RecipeError(
+        raise NoRecipe(
             f"{path}: has no recipe; it was not exported by {PROGRAM}, or another program has removed its tags"
         )
     try:

@@ -8,8 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from app.audio.impulse_file import ImpulseError
+from app.instrument.bodies import own_impulse
 from app.patches.patch import Patch
-from engine.effects import Body, Effects, Room
+from engine.effects import BODIES, Body, Effects, Room
 
 RESPONSE_HZ = 48_000
 _POINTS = 2**16
@@ -28,24 +30,40 @@ class Response:
 
 
 def effects_of(patch: Patch) -> Effects | None:
-    """None where it has neither.
-
-    Raises:
-        ValueError: no body has that name; the message lists those that there are.
-    """
-    body = Body(patch.body.mix, patch.body.size, patch.body.name) if patch.body.name and patch.body.mix > 0 else None
+    """None where it has neither. A body that is not here is left out: `body_problem` tells of it."""
+    body = _body(patch)[0]
     room = Room(patch.room.mix, patch.room.t60_s) if patch.room.mix > 0 else None
     return None if body is None and room is None else Effects(body, room)
 
 
-def body_response(patch: Patch) -> Response | None:
-    """Of its body alone, whose resonances favour some keys; None: it has none.
+def body_problem(patch: Patch) -> str:
+    """Why its body is not heard, in one line; "" where nothing is wrong."""
+    return _body(patch)[1]
 
-    Raises:
-        ValueError: as `effects_of`.
-    """
-    effects = effects_of(patch)
-    return None if effects is None or effects.body is None else _response(effects.body)
+
+def channels_of(patch: Patch) -> int:
+    """Two where it has two listening points, a room, or a body that was recorded so."""
+    body = _body(patch)[0]
+    wide = body is not None and body.impulse is not None and body.impulse.samples.shape[1] == 2
+    return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 or wide else 1
+
+
+def body_response(patch: Patch) -> Response | None:
+    """Of its body alone, whose resonances favour some keys; None: it has none."""
+    body = _body(patch)[0]
+    return None if body is None else _response(body)
+
+
+def _body(patch: Patch) -> tuple[Body | None, str]:
+    name, mix, size = patch.body.name, patch.body.mix, patch.body.size
+    if not name or mix == 0:
+        return None, ""
+    if name in BODIES:
+        return Body(mix, size, name), ""
+    try:
+        return Body(mix, size, impulse=own_impulse(name)), ""
+    except ImpulseError as error:
+        return None, f"{patch.name} is played without its body: {error}"
 
 
 @lru_cache(maxsize=16)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from app.instrument.effects import effects_of
+from app.instrument.effects import channels_of, effects_of
 from app.instrument.events import Event, NoteOff, NoteOn, PatchTurned, TimedEvent
 from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
@@ -53,11 +53,6 @@ class _Stage:
         """Whether nothing rings any more."""
         self.mixer.forget_ended()
         return not self.mixer.voices
-
-
-def channels_of(patch: Patch) -> int:
-    """Two where it has two listening points or a room."""
-    return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 else 1
 
 
 def render_events(

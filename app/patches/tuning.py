@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from app.patches.patch import TuningChoice
 
 A4_KEY = 69
+SCALA_FILES = (".scl", ".kbm")
 LARGEST_FILE_BYTES = 2**16
 MOST_NOTES = 1_000  # of a scale
 LARGEST_MAPPED = 20_000.0  # any number of a keyboard mapping: it is counted up to, or tones are made for it

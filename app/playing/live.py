@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from app.instrument.effects import effects_of
+from app.instrument.effects import body_problem, effects_of
 from app.instrument.events import Event, NoteOn, PatchTurned, TimedEvent
 from app.instrument.player import SOURCES, Player, Struck
 from app.patches.patch import Patch
@@ -51,8 +51,9 @@ class Live:
         self._recorded: list[TimedEvent] | None = None
         self._recording_began_s = 0.0
         self._wished: object = None
-        self._effects: object = None  # body, room, and whether they are left out
+        self._effects: Effects | None = None  # as set
         self._dry = False
+        self._told_body = ""  # what is wrong with it, which is told once
         self._preparing: object = None
         self.seconds = 4.0  # that a picture of a note lasts
 
@@ -135,12 +136,20 @@ class Live:
 
     def _wish_effects(self, patch: Patch) -> None:
         """In the background: to make an impulse response takes milliseconds. The latest wish counts."""
-        wish = self._wished = (patch.body, patch.room, self._dry)
+        wish = self._wished = object()
+        dry = self._dry
 
         def work() -> None:
-            if wish is self._wished and wish != self._effects:
-                self._effects = wish
-                self._set_effects(None if wish[2] else effects_of(patch))
+            if wish is not self._wished:
+                return
+            effects = None if dry else effects_of(patch)
+            if effects != self._effects:
+                self._effects = effects
+                self._set_effects(effects)
+            problem, told = body_problem(patch), self._told_body
+            self._told_body = problem
+            if problem and problem != told:
+                self._report(problem, "")
 
         self._notes.in_background(work)
 

@@ -38,12 +38,13 @@ from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
+from app.window.dragged_export import DraggedExport
 from app.window.dropped_files import receive
 from app.window.instruments import Instruments
 from app.window.main_window import KEYS, PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
 from app.window.panels.rack import fill
-from app.window.patch_desk import PatchDesk
+from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
@@ -139,6 +140,10 @@ class Controller(QObject):
         for dragged in (window.instrument.bar, window.instrument.knobs):
             dragged.drag_started.connect(self.history.hold)
             dragged.drag_ended.connect(self.history.let_go)
+        self.dragged = DraggedExport(
+            window.transport.export, lambda: (self.library.entries, self.session.choices, self._settings.export)
+        )
+        self.dragged.told.connect(window.notices.tell)
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -230,8 +235,6 @@ class Controller(QObject):
             choices,
             self._settings.export,
             self.window,
-            listen_right=choices.listen_right if choices.stereo else None,
-            pickup=choices.pickup,
         )
         dialog.exec()
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
@@ -269,8 +272,8 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """A dropped preset is taken in and chosen, a WAV's recipe restored, a patch chosen, a MIDI file played."""
-        if file.suffix.lower() in (".mid", ".midi", ".json"):
+        """A dropped preset is taken in and chosen, a WAV's recipe restored; what a patch is made of goes there."""
+        if file.suffix.lower() in TAKEN_FILES:
             self.patches.take_file(file)
             return
         dropped = receive(file, self.library)
@@ -279,6 +282,8 @@ class Controller(QObject):
             self.session.update(**dropped.choices)
         except ValueError as error:  # a recipe that was edited, or of another version
             notice = f"{file}: its choices cannot be restored here ({error})."
+        if dropped.body:
+            self.patches.take_body(dropped.body)
         if notice:
             self.window.notices.tell(notice)
 
@@ -293,6 +298,7 @@ class Controller(QObject):
             self._abx.abandon()
         self._timer.stop()
         self._deck_timer.stop()
+        self.dragged.close()
         self.keeper.close()
         self.patches.close()
         self.instruments.close()

@@ -1,37 +1,55 @@
-"""What a dropped file means: a preset becomes one of the user's own, a WAV's recipe is restored."""
+"""What a dropped file means: a preset becomes the user's own, a WAV's recipe is restored, another sound is a body."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.export.recipe import Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
+from app.audio.impulse_file import ImpulseError
+from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
+from app.instrument.bodies import ENDINGS, install_body
 from app.presets.folders import user_folder
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
 from app.session.choices import SECONDS_RANGE
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
+from app.shared.whole_file import WriteError
 
 
 @dataclass(frozen=True)
 class Dropped:
-    """What follows: new choices of the session, and a line for the user."""
+    """What follows: new choices of the session, the name of a body for the patch, and a line for the user."""
 
     choices: dict[str, Any] = field(default_factory=dict)
     notice: str = ""
+    body: str = ""
 
 
 def receive(file: Path, library: Library) -> Dropped:
-    """Takes a file in. A preset is in the library afterwards; errors are notices."""
+    """Takes a file in. A preset is in the library afterwards, a body in its folder; errors are notices."""
+    ending = file.suffix.lower()
     try:
-        if file.suffix.lower() == SUFFIX:
+        if ending == SUFFIX:
             return _preset(file, library)
-        if file.suffix.lower() == ".wav":
+        if ending == ".wav":
             return _recipe(file, library)
-    except (InstallError, RecipeError) as error:
+        if ending in ENDINGS:
+            return Dropped(body=install_body(file))
+    except NoRecipe:
+        return _body(file)
+    except (InstallError, RecipeError, ImpulseError, WriteError) as error:
         return Dropped(notice=str(error))
-    return Dropped(notice=f"{file}: neither a preset ({SUFFIX}) nor an exported WAV; drop one of these")
+    kinds = f"a preset ({SUFFIX}), a patch, a scale, a MIDI file, an exported WAV or an impulse response"
+    return Dropped(notice=f"{file}: neither {kinds}; drop one of these")
+
+
+def _body(file: Path) -> Dropped:
+    """A sound that is not of ours."""
+    try:
+        return Dropped(body=install_body(file))
+    except (ImpulseError, WriteError) as error:
+        return Dropped(notice=f"{error}. It has no recipe either")
 
 
 def _preset(file: Path, library: Library) -> Dropped:
@@ -70,6 +88,8 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
     if recipe.source == "difference":
         low, high = DIFFERENCE_GAIN_RANGE_DB
         found |= {"a": "difference", "difference_gain_db": min(max(recipe.difference_gain_db, low), high)}
+    if recipe.string is not None:
+        found["string"] = asdict(recipe.string)
     found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
     if recipe.listen_right is not None:
         found["listen_right"] = recipe.listen_right

@@ -291,7 +291,8 @@ class MainWindow(QMainWindow):
         super().showEvent(event)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        if any(url.isLocalFile() for url in event.mimeData().urls()):
+        ours = event.source() is not None  # dragged out of this window
+        if not ours and any(url.isLocalFile() for url in event.mimeData().urls()):
             _copy(event)
 
     def dropEvent(self, event: QDropEvent) -> None:

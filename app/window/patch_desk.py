@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QUrl, Signal
@@ -13,11 +14,13 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QInputDialog
 
 from app.export.played import write_recorded
+from app.instrument.bodies import body_names
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import MidiFileError, read_midi
 from app.instrument.player import Struck
 from app.instrument.strings import Strings
 from app.patches.library import (
+    SUFFIX,
     PatchEntry,
     PatchError,
     list_patches,
@@ -26,7 +29,8 @@ from app.patches.library import (
     rename_patch,
     save_patch,
 )
-from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet
+from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice
+from app.patches.tuning import SCALA_FILES, read_scala
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
 from app.playing.playback import Playback
 from app.presets.library import Library
@@ -38,14 +42,19 @@ from app.views.instrument.patch_browser import PatchBrowser
 from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
-from engine.effects import BODIES
+from engine.plain_text import one_line
 from engine.presets import PresetError, PresetInfo, load_preset
+from engine.presets.of_string import of_string, read_string
 from engine.resonators.family import inharmonicity
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
+MANY_STRINGS = "studio_any_string"
 RECORDED = "WAV and MIDI (*.wav)"
 PLACES = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
+MIDI_FILES = (".mid", ".midi")
+STRING_FILE = ".toml"
+TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
 
 
 class PatchDesk(QObject):
@@ -78,7 +87,6 @@ class PatchDesk(QObject):
         self._playback = Playback(instruments.play)
         self._written.connect(self.told, Qt.ConnectionType.QueuedConnection)
         self.reload()
-        panel.bar.set_bodies([("", "no body"), *((name, name) for name in BODIES)])
         self._connect()
 
     def _connect(self) -> None:
@@ -123,6 +131,7 @@ class PatchDesk(QObject):
         self._entries, problems = list_patches()
         for problem in problems:
             self.told.emit(problem)
+        self._panel.bar.set_bodies([(name, name) for name in body_names()])
         self._show_entries()
 
     # Intents
@@ -231,14 +240,60 @@ class PatchDesk(QObject):
             self._session.update(**choices_of(entry.patch))
 
     def take_file(self, file: Path) -> None:
-        """A dropped patch is chosen, a dropped MIDI file is played."""
+        """One of TAKEN_FILES that was dropped: a patch or a string is chosen, a MIDI file played, a scale tunes."""
         try:
-            if file.suffix.lower() in (".mid", ".midi"):
+            if file.suffix.lower() in MIDI_FILES:
                 self._playback.play(read_midi(file))
+            elif file.suffix.lower() in SCALA_FILES:
+                self._tune(file)
+            elif file.suffix.lower() == STRING_FILE:
+                self._take_string(file)
             else:
                 self._session.update(**choices_of(read_patch(file)))
-        except (MidiFileError, PatchError, ValueError) as error:
-            self.told.emit(str(error))
+        except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
+            self.told.emit(one_line(str(error)))
+
+    def _take_string(self, file: Path) -> None:
+        """A string by its physical parameters is plucked, by the model of many strings."""
+        many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
+        if many is None:
+            self.told.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
+            return
+        string = read_string(file)
+        of_string(load_preset(many.path), string)  # it can be plucked
+        self._session.update(preset=many.name, string=PhysicalString(**asdict(string)))
+        outside = many.info.family.outside(string) if many.info.family is not None else []
+        beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""
+        self.told.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
+
+    def _tune(self, file: Path) -> None:
+        """The patch by a Scala file. Of a scale and a mapping that do not go together, the new one stays."""
+        patch, text = self.patch, read_scala(file)
+        if patch is None:
+            self.told.emit(f"{file.name}: tunes a patch, and none is chosen; choose one first.")
+            return
+        field, other = ("keymap", "scale") if file.suffix.lower() == ".kbm" else ("scale", "keymap")
+        tuned, left_out = {**dict(patch.tuning), field: text}, ""
+        try:
+            tuning = TuningChoice.model_validate(tuned)
+        except ValueError:  # both are well by themselves
+            tuning = TuningChoice.model_validate({**tuned, other: ""})
+            left_out = (
+                "; the scale before does not fit it" if other == "scale" else "; the mapping before does not fit it"
+            )
+        self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
+        self.told.emit(f"{file.name} tunes {patch.name}{left_out}.")
+
+    def take_body(self, name: str) -> None:
+        """One of the user's own that has come: the strings of the patch stand on it."""
+        self._panel.bar.set_bodies([(each, each) for each in body_names()])
+        if self.patch is None:
+            self.told.emit(f"{name} is a body for patches now; choose a patch, and it in the patch's bar.")
+            return
+        if self.patch.body.name == name:  # its file was missing
+            self._performance.choices_changed(frozenset({"patch"}))
+        self._choose_body(name)
+        self.told.emit(f"{self.patch.name} stands on the body {name}.")
 
     def stop(self) -> None:
         """Of a MIDI file that is played."""
@@ -359,7 +414,8 @@ class PatchDesk(QObject):
 
     def _choose_body(self, name: str) -> None:
         if self.patch is not None:
-            body = Body(**{**dict(self.patch.body), "name": name})
+            chosen = {**dict(self.patch.body), "name": name}
+            body = Body(**chosen) if chosen["mix"] > 0 else Body(name=name, size=chosen["size"])
             self._session.update(patch=self.patch.model_copy(update={"body": body}))
 
     def _open_folder(self) -> None:

@@ -10,6 +10,7 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.effects import channels_of
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
 from app.shared.version import program_version
@@ -63,6 +64,7 @@ class SampledPlan:
         layers: velocity layers, of equal widths; each is rendered at its highest velocity.
         seconds: the longest sample. One that is silent sooner ends there; one that still rings is faded out.
         preset_sha256: of the model that plays the patch, so that samples of an earlier one are not kept.
+        body_sha256: of the impulse response of the user's own that is its body, for the same reason.
 
     Raises:
         ValueError: a value is out of its range; the message names it.
@@ -78,6 +80,7 @@ class SampledPlan:
     bits: SampleBits = "24"
     source: SampledSource = "model"
     preset_sha256: str = ""
+    body_sha256: str = ""
 
     def __post_init__(self) -> None:
         for name, value, known in (("format", self.format, FORMATS), ("bits", self.bits, SAMPLE_BITS)):
@@ -117,8 +120,7 @@ class SampledPlan:
 
     @property
     def channels(self) -> int:
-        """At most: a room may be heard in stereo."""
-        return 2 if self.patch.room.mix > 0 else len(self.patch.pickup.points)
+        return channels_of(self.patch)
 
     @property
     def largest_bytes(self) -> int:
@@ -134,6 +136,7 @@ class SampledPlan:
         told = {
             "patch": self.patch.model_dump(mode="json", exclude=UNHEARD_FIELDS),
             "preset": self.preset_sha256,
+            **({"body": self.body_sha256} if self.body_sha256 else {}),
             "source": self.source,
             "note": [zone.key, zone.velocity, self.seconds, self.rate_hz],
             "file": [self.format, self.bits],

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
+from app.views.controls.drag_button import DragButton
 from app.views.controls.knob import Knob, KnobRange
 from app.views.controls.meter import Meter
 from app.views.controls.parts import combo_box, tool_button, vertical_rule
@@ -199,9 +200,9 @@ class TransportBar(QFrame):
         return column
 
     def _build_output(self) -> QVBoxLayout:
-        self._export = QPushButton("Export WAV …")
+        self.export = self._export = DragButton("Export WAV …")
         self._export.setAccessibleName("Export WAV")
-        self._export.setToolTip("Save this pluck as a WAV file (Ctrl+E)")
+        self._export.setToolTip("Save this pluck as a WAV file (Ctrl+E), or drag the file out of the window")
         self._export.clicked.connect(self.export_asked)
         column = QVBoxLayout()
         column.addWidget(self.meter)

@@ -20,16 +20,15 @@ from PySide6.QtWidgets import (
 
 from app.export.batch import INDEX, BatchRow, run_batch
 from app.export.choices import ExportChoices
-from app.export.files import SoundRequest, WavReport, export_sounds
+from app.export.files import WavReport
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
 from app.shared.durations import duration
-from app.shared.vocabulary import Pickup
 from app.views.controls.plain import Label
+from app.views.dialogs.chosen_sound import export_chosen
 from app.views.dialogs.export_job import ExportJob, Work
 from app.views.dialogs.export_pages import BatchPage, SoundPage, as_heard
-from app.views.dialogs.sound_form import SoundForm, wav_settings
-from engine.presets import load_preset
+from app.views.dialogs.sound_form import SoundForm
 
 _RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
 
@@ -39,7 +38,6 @@ class ExportDialog(QDialog):
 
     Args:
         entries: the presets of a batch; `choices.preset` is among them.
-        listen_right: the right listening point, in stereo.
     """
 
     def __init__(
@@ -48,9 +46,6 @@ class ExportDialog(QDialog):
         choices: Choices,
         export: ExportChoices,
         parent: QWidget | None = None,
-        *,
-        listen_right: float | None = None,
-        pickup: Pickup = "displacement",
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export WAV")
@@ -58,12 +53,10 @@ class ExportDialog(QDialog):
         choices, export = as_heard(entries, choices, export)
         self._preset = next(entry for entry in entries if entry.name == choices.preset)
         self._choices, self._export = choices, export
-        self._listen_right, self._pickup = listen_right, pickup
         self._job: ExportJob | None = None
         self._shown_folder = Path()
-        stereo = listen_right is not None
-        self.sound = SoundPage(self._preset, choices, export, stereo)
-        self.batch = BatchPage(entries, choices, export, stereo)
+        self.sound = SoundPage(self._preset, choices, export)
+        self.batch = BatchPage(entries, choices, export)
         self.form = SoundForm(export, self._preset.info.rate_hz)
         self._lay_out()
         for part in (self.sound, self.batch, self.form):
@@ -143,7 +136,7 @@ class ExportDialog(QDialog):
             self.save.setEnabled(bool(self.sound.path.text().strip()))
             return
         try:
-            files = self.batch.plan(export, self._listen_right, self._pickup).files
+            files = self.batch.plan(export).files
         except ValueError as error:
             self.save.setText("Export")
             self.save.setEnabled(False)
@@ -159,25 +152,15 @@ class ExportDialog(QDialog):
         export = self.export_choices()
         self.show_folder.hide()
         if self._is_batch:
-            plan = self.batch.plan(export, self._listen_right, self._pickup)
+            plan = self.batch.plan(export)
             self._shown_folder = plan.folder
             self._run(lambda tell, cancelled: run_batch(plan, tell, cancelled), self._tell_batch)
             return
-        preset, pluck, listen = self._preset.path, self._choices.pluck, self._choices.listen
-        right, pickup, paths = self._listen_right, self._pickup, self.sound.paths()
-        seconds = export.longest_s if export.until_decayed else export.seconds
-        decay_db = export.decay_db if export.until_decayed else None
+        preset, choices, paths = self._preset, self._choices, self.sound.paths()
         self._shown_folder = next(iter(paths.values())).parent
 
         def work(tell: Callable[..., None], cancelled: Callable[[], bool]) -> list[WavReport]:
-            gain_db = export.difference_gain_db if "difference" in paths else 0.0
-            request = SoundRequest(
-                load_preset(preset), pluck, listen, seconds, next(iter(paths)), right, pickup, gain_db, decay_db
-            )
-            settings = wav_settings(export)
-            return export_sounds(
-                request, paths, settings, progress=lambda share: tell(share, "Rendering"), cancelled=cancelled
-            )[0]
+            return export_chosen(preset, choices, export, paths, lambda share: tell(share, "Rendering"), cancelled)
 
         self._run(work, self._tell_sound)
 

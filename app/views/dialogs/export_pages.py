@@ -17,17 +17,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.export.batch import BatchPlan
+from app.export.batch import BatchPlan, NamedString
 from app.export.choices import BatchChoices, ExportChoices
-from app.export.files import Source, default_file_name
+from app.export.files import Source
 from app.export.sound import SOURCES
 from app.presets.library import PresetEntry
 from app.presets.words import shape_word
 from app.session.choices import Choices
 from app.session.slots import other_preset
-from app.shared.vocabulary import Pickup
 from app.views.controls.parts import combo_box, faint, tool_button
 from app.views.controls.plain import Label, plain_tip
+from app.views.dialogs.chosen_sound import string_word, suggested_name
 from app.views.dialogs.sound_form import label, row_of, wav_settings
 from engine.pluck import Pluck
 
@@ -51,7 +51,7 @@ def as_heard(
     source = choices.source_heard
     if name := other_preset(source):
         if any(entry.name == name for entry in entries):
-            choices = choices.model_copy(update={"preset": name})
+            choices = choices.model_copy(update={"preset": name, "string": None})
         source = "model"
     if source == "difference":
         gain_db = choices.difference_gain_db
@@ -71,14 +71,13 @@ class SoundPage(QWidget):
         preset: PresetEntry,
         choices: Choices,
         export: ExportChoices,
-        stereo: bool,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._preset, self._choices = preset, choices
         self._named_by_user = False
         self._folder = export.folder or str(Path.home())
-        names = [entry for entry in SOURCE_NAMES if not (stereo and entry[1] == "both")]
+        names = [entry for entry in SOURCE_NAMES if not (choices.stereo and entry[1] == "both")]
         self.source = combo_box("Source", names, export.source)
         self.source.currentIndexChanged.connect(self.changed)
         self.source.setToolTip("What to save")
@@ -107,9 +106,7 @@ class SoundPage(QWidget):
         if not self._named_by_user:
             chosen = self.source.currentData()
             source: Source = "model" if chosen == "files" else chosen
-            name = default_file_name(
-                self._preset.name, self._choices.pluck, rate_hz or self._preset.info.rate_hz, source
-            )
+            name = suggested_name(self._preset, self._choices, rate_hz, source)
             self.path.setText(str(Path(self._folder) / name))
         self.names.setText("\n".join(path.name for path in self.paths().values()))
         self._form.setRowVisible(self.names, len(self.paths()) > 1)
@@ -143,7 +140,6 @@ class BatchPage(QWidget):
         entries: Sequence[PresetEntry],
         choices: Choices,
         export: ExportChoices,
-        stereo: bool,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -164,7 +160,7 @@ class BatchPage(QWidget):
         self.positions = _line("Positions", batch.positions or f"{choices.position:g}", "0.1, 0.2, 0.35")
         self.amplitudes = _line("Amplitudes in mm", batch.amplitudes or f"{choices.amplitude_mm:g}", "1, 2, 5")
         self.sources = {
-            source: QCheckBox(source.capitalize()) for source in SOURCES if not (stereo and source == "both")
+            source: QCheckBox(source.capitalize()) for source in SOURCES if not (choices.stereo and source == "both")
         }
         for source, box in self.sources.items():
             box.setMinimumSize(92, 28)
@@ -207,7 +203,7 @@ class BatchPage(QWidget):
             folder=self.folder.text(),
         )
 
-    def plan(self, export: ExportChoices, listen_right: float | None, pickup: Pickup) -> BatchPlan:
+    def plan(self, export: ExportChoices) -> BatchPlan:
         """What is asked for. Raises ValueError: a list is not one; the message names it."""
         choices = self._choices
         return BatchPlan(
@@ -219,13 +215,21 @@ class BatchPage(QWidget):
             export.longest_s if export.until_decayed else export.seconds,
             choices.listen,
             Pluck(shape=choices.shape, width=choices.width),
-            listen_right,
-            pickup,
+            choices.listen_right if choices.stereo else None,
+            choices.pickup,
             export.difference_gain_db,
             export.decay_db if export.until_decayed else None,
             wav_settings(export),
             self.overwrite.isChecked(),
+            self._strings(),
         )
+
+    def _strings(self) -> tuple[NamedString, ...]:
+        """The one that is chosen, where every preset of the batch can play it; else they play their own."""
+        string = self._choices.string
+        if string is None or any(entry.info.family is None for entry in self._checked()):
+            return ()
+        return (NamedString(string_word(self._choices).replace(" ", ""), string.parameters),)
 
     def _checked(self) -> list[PresetEntry]:
         rows = range(self.presets.count())
@@ -239,7 +243,8 @@ class BatchPage(QWidget):
 def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
     pluck = f"{_shape_text(choices)}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
     modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    return f"{preset.title}: {pluck}, {_heard_text(choices)}{modes}"
+    string = f", a string of {string_word(choices)}" if choices.string else ""
+    return f"{preset.title}{string}: {pluck}, {_heard_text(choices)}{modes}"
 
 
 def _shape_text(choices: Choices) -> str:

@@ -28,13 +28,11 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
         shutil.copy(small_preset, folder / f"{name}.safetensors")
     entries, _ = list_presets(folder)
 
-    def make(
-        more: dict[str, object] | None = None, heard: dict[str, object] | None = None, **listening: object
-    ) -> ExportDialog:
+    def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
         export = ExportChoices.model_validate(settings)
         choices = Choices(preset="small", position=0.4).model_copy(update=heard or {})
-        dialog = ExportDialog(entries, choices, export, **listening)  # type: ignore[arg-type]
+        dialog = ExportDialog(entries, choices, export)
         qtbot.addWidget(dialog)
         dialog.show()
         return dialog
@@ -84,7 +82,7 @@ def test_both_become_two_files_or_two_channels(qtbot: QtBot, made, tmp_path: Pat
 
 
 def test_stereo_and_the_pick_up_reach_the_file(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog = made(listen_right=0.7, pickup="velocity")
+    dialog = made(heard={"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
     assert dialog.sound.source.findData("both") == -1
     assert "both" not in dialog.batch.sources
     run(qtbot, dialog, "Saved")

@@ -1,0 +1,107 @@
+"""The bodies that a patch may name: those of the engine, and impulse responses of the user's own, by their files.
+
+The user's lie in a folder beside the patches. A body is known by its file's name without the ending, never by a path.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from itertools import count
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from app.audio.impulse_file import ImpulseError, read_impulse
+from app.patches.library import file_stem
+from app.patches.patch import LONGEST_NAME, Reference
+from app.presets.folders import user_folder
+from app.shared.whole_file import WriteError, explain, whole_file
+from engine.effects import BODIES, Impulse
+
+ENDINGS = (".wav", ".flac", ".aif", ".aiff")
+_NAME: TypeAdapter[str] = TypeAdapter(Reference)
+
+
+def own_bodies() -> Path:
+    """The user's folder of bodies. It need not be there."""
+    return user_folder() / "bodies"
+
+
+def body_names() -> list[str]:
+    """All that a patch may name, the engine's first. Never raises; a file is read only where it is heard."""
+    return [*BODIES, *_own_files()]
+
+
+def own_impulse(name: str) -> Impulse:
+    """Of one of the user's bodies; the same value as long as its file stays.
+
+    Raises:
+        ImpulseError: there is none of this name, or its file cannot be used.
+    """
+    path = _own_files().get(name)
+    if path is None:
+        raise ImpulseError(f"the body {name} is not here: drop its impulse response on the window")
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise ImpulseError(f"{path}: cannot be read ({error.strerror}); drop it on the window again") from error
+    return _read(path, state.st_mtime_ns, state.st_size)
+
+
+def body_digest(name: str) -> str:
+    """The SHA-256 of a body of the user's own; "" for any other."""
+    path = _own_files().get(name)
+    try:
+        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:  # it is told where it is heard
+        return ""
+
+
+def install_body(file: Path) -> str:
+    """Copies a sound file that is an impulse response into the user's folder; the name of the body that it is then.
+
+    The same file is not copied twice; a name that is taken gets a number.
+
+    Raises:
+        ImpulseError: it is no impulse response that can be used.
+        WriteError: the copy cannot be written; nothing is left.
+    """
+    read_impulse(file)
+    folder, taken = own_bodies(), _own_files()
+    stem = file_stem(file.stem)[: LONGEST_NAME - 5]
+    try:
+        data = file.read_bytes()
+        for name, path in taken.items():
+            if path.stat().st_size == len(data) and path.read_bytes() == data:
+                return name
+        names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
+        name = next(name for name in names if name not in BODIES and name not in taken)
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WriteError(explain(folder, error)) from error
+    with whole_file(folder / f"{name}{file.suffix.lower()}") as copy:
+        copy.write(data)
+    return name
+
+
+def _own_files() -> dict[str, Path]:
+    """By name; of two files of one name, and beside one of the engine's, the first."""
+    found: dict[str, Path] = {}
+    try:
+        paths = sorted(path for path in own_bodies().iterdir() if path.suffix.lower() in ENDINGS)
+    except OSError:  # most often it is not there
+        return found
+    for path in paths:
+        try:
+            _NAME.validate_python(path.stem)
+        except ValidationError:  # no patch could name it
+            continue
+        if path.stem not in BODIES and path.is_file():
+            found.setdefault(path.stem, path)
+    return found
+
+
+@lru_cache(maxsize=16)
+def _read(path: Path, time_ns: int, size: int) -> Impulse:
+    return read_impulse(path)

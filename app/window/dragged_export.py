@@ -1,0 +1,118 @@
+"""What is chosen, dragged out of the window as a WAV file: rendered when the drag begins, as the export dialog would.
+
+The files lie in a folder of their own until the program ends, for another program may read them late. The same
+choices are rendered once: who lets go too early drags again.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QApplication
+
+from app.export.choices import ExportChoices
+from app.export.files import Source, WavReport
+from app.presets.library import PresetEntry
+from app.session.choices import Choices
+from app.views.controls.drag_button import DragButton
+from app.views.dialogs.chosen_sound import export_chosen, suggested_name
+from app.views.dialogs.export_job import ExportJob
+from app.views.dialogs.export_pages import as_heard
+
+_SOUND = {"string", "position", "amplitude_mm", "shape", "width", "listen", "listen_right", "stereo", "pickup"}
+
+
+class DraggedExport(QObject):
+    """`told` is for the user.
+
+    Args:
+        chosen: the presets, what is chosen, and how the export dialog was last set.
+    """
+
+    told = Signal(str)
+
+    def __init__(
+        self, button: DragButton, chosen: Callable[[], tuple[Sequence[PresetEntry], Choices, ExportChoices]]
+    ) -> None:
+        super().__init__(button)
+        self._button, self._chosen = button, chosen
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._rendered = 0
+        self._job: ExportJob | None = None
+        self._kept: tuple[object, list[Path]] = (None, [])  # what was rendered last, and its files
+        button.drag_began.connect(self._begin)
+        button.drag_ended.connect(self._end)
+
+    def close(self) -> None:
+        """Ends what is rendered, and removes all files; may be called again."""
+        self._end()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def _begin(self) -> None:
+        self._end()
+        entries, choices, export = self._chosen()
+        if all(entry.name != choices.preset for entry in entries):
+            self.told.emit("There is no preset to export: choose one first.")
+            return
+        choices, export = as_heard(entries, choices, export)
+        preset = next(entry for entry in entries if entry.name == choices.preset)
+        sources: tuple[Source, ...] = ("model", "truth") if export.source == "files" else (export.source,)
+        if choices.stereo and sources == ("both",):  # left and right are taken
+            sources = ("model",)
+        sound, form = choices.model_dump(include=_SOUND), export.model_dump(exclude={"folder", "batch"})
+        wish = (preset, sources, sound, form)
+        if wish == self._kept[0] and all(path.is_file() for path in self._kept[1]):
+            self._button.carry(self._kept[1])
+            return
+        try:
+            paths = self._paths(preset, choices, export, sources)
+        except OSError as error:
+            where, why = tempfile.gettempdir(), error.strerror
+            self.told.emit(f"{where}: no folder can be made there ({why}); free some space.")
+            return
+        self._job = job = ExportJob(
+            lambda tell, cancelled: export_chosen(preset, choices, export, paths, lambda share: None, cancelled)
+        )
+        job.finished.connect(lambda reports: self._rendered_all(job, wish, reports))
+        job.failed.connect(lambda message: self._failed(job, message))
+        QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
+        job.start()
+
+    def _paths(
+        self, preset: PresetEntry, choices: Choices, export: ExportChoices, sources: tuple[Source, ...]
+    ) -> dict[Source, Path]:
+        """In a folder of its own, so that no earlier file of this name is replaced while another program reads it."""
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="learned-strings-", ignore_cleanup_errors=True)
+        self._rendered += 1
+        folder = Path(self._folder.name) / str(self._rendered)
+        folder.mkdir()
+        return {source: folder / suggested_name(preset, choices, export.rate_hz, source) for source in sources}
+
+    def _rendered_all(self, job: ExportJob, wish: object, reports: list[WavReport]) -> None:
+        if job is self._job:  # and not one that was given up meanwhile
+            self._kept = wish, [report.path for report in reports]
+            self._wait()
+            self._button.carry(self._kept[1])
+
+    def _failed(self, job: ExportJob, message: str) -> None:
+        if job is self._job:
+            self._wait()
+            self.told.emit(message)
+
+    def _end(self) -> None:
+        """The button was let go: what is not rendered yet is not wanted."""
+        if self._job is not None:
+            self._job.cancel()
+            self._wait()
+
+    def _wait(self) -> None:
+        if self._job is not None:
+            job, self._job = self._job, None
+            job.wait()
+            QApplication.restoreOverrideCursor()

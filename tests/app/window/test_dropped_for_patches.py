@@ -1,0 +1,160 @@
+"""Files dropped for the patch that keys play: scales and mappings tune it, sounds are its body; undo goes back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+from pytestqt.qtbot import QtBot
+
+from app.instrument.bodies import own_bodies
+from app.patches.tuning import Tuning
+from app.window.controller import Controller
+from engine.effects import Effects
+
+FIVE = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
+FIVE_KEYS = "5\n0\n127\n60\n69\n440\n5\n" + "".join(f"{n}\n" for n in range(5))
+SEVEN_KEYS = "7\n0\n127\n60\n69\n440\n7\n" + "".join(f"{n}\n" for n in range(7))
+
+
+@pytest.fixture
+def patched(controller: Controller) -> Controller:
+    """A window in which keys play a patch."""
+    controller.patches.choose("classical_guitar")
+    assert controller.patches.patch is not None
+    return controller
+
+
+def drop(controller: Controller, *files: Path) -> None:
+    mime = QMimeData()
+    mime.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
+    copy, left, none = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    controller.window.dropEvent(QDropEvent(QPointF(5, 5), copy, mime, left, none))
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def cents(controller: Controller, low: int, high: int) -> float:
+    patch = controller.patches.patch
+    assert patch is not None
+    tuning = Tuning(patch.tuning)
+    return 1200 * math.log2(tuning.hz(high) / tuning.hz(low))
+
+
+def test_a_dropped_scale_tunes_the_patch_and_undo_takes_it_back(patched: Controller, tmp_path: Path) -> None:
+    before = patched.patches.patch
+    drop(patched, written(tmp_path / "Five.SCL", FIVE))
+    assert cents(patched, 60, 61) == pytest.approx(240)
+    assert "Five.SCL tunes Classical guitar" in patched.window.notices.text
+    patched.history.undo()
+    assert patched.patches.patch == before
+    assert cents(patched, 60, 61) == pytest.approx(100)
+    patched.history.redo()
+    assert cents(patched, 60, 61) == pytest.approx(240)
+
+
+def test_a_scale_and_its_mapping_together_in_either_order(patched: Controller, tmp_path: Path) -> None:
+    """What fitted the scale before does not stand in the way of the new one."""
+    scale, keys = written(tmp_path / "five.scl", FIVE), written(tmp_path / "five.kbm", FIVE_KEYS)
+    seven = written(tmp_path / "seven.kbm", SEVEN_KEYS)
+    for files in ((scale, keys), (keys, scale), (seven, scale, keys)):
+        drop(patched, *files)
+        patch = patched.patches.patch
+        assert patch is not None
+        assert (patch.tuning.scale, patch.tuning.keymap) == (FIVE, FIVE_KEYS)
+        assert cents(patched, 60, 65) == pytest.approx(1200)
+        patched.patches.revert()
+
+
+@pytest.mark.parametrize("name", ["empty.scl", "words.scl", "words.kbm", "missing.scl"])
+def test_a_file_that_is_no_tuning_is_told_and_changes_nothing(patched: Controller, tmp_path: Path, name: str) -> None:
+    before = patched.session.choices
+    if name != "missing.scl":
+        written(tmp_path / name, "no tuning" if "words" in name else "")
+    drop(patched, tmp_path / name)
+    assert name in patched.window.notices.text
+    assert patched.session.choices == before
+
+
+def test_without_a_patch_a_scale_is_told_what_it_needs(controller: Controller, tmp_path: Path) -> None:
+    drop(controller, written(tmp_path / "five.scl", FIVE))
+    assert controller.patches.patch is None
+    assert "choose one first" in controller.window.notices.text
+
+
+@pytest.fixture
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    return tmp_path / "own"
+
+
+def knock(path: Path, seconds: float = 0.05) -> Path:
+    """A short noise that dies away, and was not exported here."""
+    frames = int(seconds * 48_000)
+    noise = np.random.default_rng(1).uniform(-0.5, 0.5, frames) * np.geomspace(1, 1e-3, frames)
+    soundfile.write(path, noise, 48_000, "PCM_24")
+    return path
+
+
+def bodies(controller: Controller) -> list[str]:
+    box = controller.window.instrument.bar.body
+    return [box.itemData(row) for row in range(box.count())]
+
+
+@pytest.mark.parametrize("name", ["knock.wav", "knock.flac", "knock.aiff"])
+def test_a_dropped_sound_without_a_recipe_is_a_body_and_the_patch_stands_on_it(
+    own_folder: Path, patched: Controller, tmp_path: Path, name: str
+) -> None:
+    before = patched.patches.patch
+    assert before is not None
+    assert bodies(patched) == ["", "guitar"]
+    drop(patched, knock(tmp_path / name))
+    assert (own_bodies() / name).read_bytes() == (tmp_path / name).read_bytes()
+    assert bodies(patched) == ["", "guitar", "knock"]
+    assert patched.window.instrument.bar.body.currentData() == "knock"
+    patch = patched.patches.patch
+    assert patch is not None
+    assert patch.body.name == "knock" and patch.body.mix > 0
+    assert "stands on the body knock" in patched.window.notices.text
+    patched.history.undo()
+    assert patched.patches.patch == before
+
+
+def test_a_sound_that_is_no_body_is_told_and_changes_nothing(
+    own_folder: Path, patched: Controller, tmp_path: Path
+) -> None:
+    before = patched.session.choices
+    for path in (knock(tmp_path / "long.wav", seconds=4.0), knock(tmp_path / "long.flac", seconds=4.0)):
+        drop(patched, path)
+        assert f"{path}: no impulse response that can be used" in patched.window.notices.text
+    assert patched.session.choices == before
+    assert not own_bodies().exists()
+
+
+def test_a_body_that_comes_back_is_heard_again(
+    qtbot: QtBot, own_folder: Path, patched: Controller, tmp_path: Path
+) -> None:
+    """The patch names it all the time, so that nothing of it changes."""
+    heard: list[Effects | None] = []
+    told: list[str] = []
+    patched.performance.live._set_effects = heard.append
+    patched.performance.live._report = lambda message, details: told.append(message)
+    drop(patched, knock(tmp_path / "knock.wav"))
+    chosen = patched.session.choices
+    qtbot.waitUntil(lambda: bool(heard) and heard[-1] is not None and heard[-1].body is not None, timeout=20_000)
+    assert heard[-1] is not None and heard[-1].body is not None and heard[-1].body.impulse is not None
+    (own_bodies() / "knock.wav").unlink()
+    patched.performance.choices_changed(frozenset({"patch"}))
+    qtbot.waitUntil(lambda: heard[-1] is None or heard[-1].body is None, timeout=20_000)
+    qtbot.waitUntil(lambda: any("played without its body" in line for line in told), timeout=20_000)
+    drop(patched, tmp_path / "knock.wav")
+    qtbot.waitUntil(lambda: heard[-1] is not None and heard[-1].body is not None, timeout=20_000)
+    assert patched.session.choices == chosen
