@@ -336,6 +336,7 @@ def play(
         ("start to the window, s", found.start_to_window_s),
         ("start to the first sound, s", found.start_to_sound_s),
         ("cores while idle", found.idle_cpu_cores),
+        ("of these the window's thread; most others are the sound system's", found.idle_window_cores),
         *_spread_rows("sound to its picture", [lag]),
         ("uncertainty of the recording's clock, ms", found.clock_uncertainty_ms),
         ("uncertainty of the device's buffer, ms", found.device_uncertainty_ms),

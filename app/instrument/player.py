@@ -407,14 +407,13 @@ class Player:
         """The string of its key, with knobs, wheels and dampers as they are."""
         patch = self._wheeled("knobs")
         string = struck.key.string.parameters
-        now = self._key(struck.event.key) if patch is self._patch else None
-        if now is not None:
-            string = now.string.parameters
-        elif (wheeled := Strings(patch).of_key(struck.event.key)) is not None:
-            string = wheeled.parameters
-        ratio = self._ratio(struck)
         try:
-            string = (slid if self._patch.bend_by == "length" else bent)(string, ratio)
+            now = self._key(struck.event.key) if patch is self._patch else None
+            if now is not None:
+                string = now.string.parameters
+            elif (wheeled := Strings(patch).of_key(struck.event.key)) is not None:
+                string = wheeled.parameters
+            string = (slid if self._patch.bend_by == "length" else bent)(string, self._ratio(struck))
             if struck.damped:
                 string = damped(string, self._wheeled("damping").damping.release_t60_s)
         except ValueError:  # no such string: it stays as it is

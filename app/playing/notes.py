@@ -27,7 +27,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetError
 from engine.voices import Ear, Mixer, Voice, render_voice
 
-MOST_NOTES = 24  # that ring at once; the oldest makes room
+MOST_NOTES = 40  # that ring at once; the oldest makes room
 STOLEN_S = 0.03  # the fade of one that makes room
 STOP_S = 0.012
 REPLACED_S = 0.02

@@ -99,11 +99,15 @@ class Session:
         return self._choices
 
     def update(self, **changes: Any) -> None:
-        """Takes new values, all or none.
+        """Takes new values, all or none. Keys play what was chosen last: a preset's one string, or the patch.
 
         Raises:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
         """
+        if "preset" in changes and "keys_play" not in changes:
+            patch = self._choices.patch
+            plays = "pitch" if patch is not None and patch.preset == changes["preset"] else "place"
+            changes = {**changes, "keys_play": plays}
         if names := self._take(changes):
             self.changed.emit(names)
 
@@ -143,12 +147,6 @@ class Session:
     def switch_source(self) -> None:
         """From slot a to slot b and back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
-
-    def step_preset(self, names: list[str], step: int) -> None:
-        """The next or previous of `names`, going round."""
-        if names:
-            here = names.index(self._choices.preset) if self._choices.preset in names else 0
-            self.update(preset=names[(here + step) % len(names)])
 
 
 def _clamp(value: float, limits: tuple[float, float]) -> float:

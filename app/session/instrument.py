@@ -12,4 +12,4 @@ def choices_of(patch: Patch) -> dict[str, Any]:
     points = patch.pickup.points
     right = {"listen_right": points[1]} if len(points) > 1 else {}
     pickup = {"listen": points[0], "stereo": len(points) > 1, "pickup": patch.pickup.kind}
-    return {"patch": patch, "preset": patch.preset, **pickup, **right}
+    return {"patch": patch, "preset": patch.preset, "keys_play": "pitch", **pickup, **right}

@@ -63,7 +63,7 @@ FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
 WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
-ALL_HIGH, KNOBS_HIGH = 640, 92  # beside the instrument, and its knobs, there is room for the views above this height
+ALL_HIGH, KNOBS_HIGH = 640, 170  # beside the instrument, and its knobs, there is room for the views above this height
 FACTS_HEIGHT = 20
 TITLE_BAR = 40  # at most; how high it is, is known too late
 
@@ -128,7 +128,7 @@ class MainWindow(QMainWindow):
         self._audio_button = tool_button("Audio …", "Audio settings", "Audio output, sample rate and buffer (Ctrl+,)")
         self._audio_button.clicked.connect(self.audio_asked)
         tip = "Show or hide the instrument: keys and patch (Ctrl+K). In a low window the views make room for it"
-        self._instrument_button = tool_button("Keys", "Instrument", tip)
+        self._instrument_button = tool_button("Instrument", tip=tip)
         self._instrument_button.setCheckable(True)
         self._instrument_button.setChecked(True)
         self._instrument_button.toggled.connect(self.show_instrument)

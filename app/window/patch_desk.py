@@ -38,6 +38,7 @@ from app.session.instrument import choices_of
 from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
+from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from engine.presets import PresetError, PresetInfo, load_preset
@@ -48,6 +49,7 @@ SHOWN_EVERY_S = 0.04
 RECORDED = "WAV and MIDI (*.wav)"
 MIDI_FILES = (".mid", ".midi")
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
+PLACES = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
 
 
 class PatchDesk(QObject):
@@ -84,7 +86,7 @@ class PatchDesk(QObject):
 
     def _connect(self) -> None:
         panel, bar, browser = self._panel, self._panel.bar, self.browser
-        panel.pressed.connect(lambda key, velocity: self._instruments.play(NoteOn(key, velocity)))
+        panel.pressed.connect(self._press)
         panel.released.connect(lambda key: self._instruments.play(NoteOff(key)))
         bar.previous_asked.connect(lambda: self.step(-1))
         bar.next_asked.connect(lambda: self.step(1))
@@ -327,7 +329,9 @@ class PatchDesk(QObject):
         if names & {"octave", "keys_play", "patch"}:
             choices = self._session.choices
             self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
-            self._panel.show_letters(letters_of(choices.octave) if self._instruments.plays_pitches else {})
+            pitches = self._instruments.plays_pitches
+            self._panel.show_letters(letters_of(choices.octave) if pitches else {})
+            self._panel.bar.show_note("" if pitches else PLACES)
         if names & {"heard", "a", "b"}:
             self._panel.show_source(self._session.source_heard)
 
@@ -361,7 +365,7 @@ class PatchDesk(QObject):
         if patch is None:
             return
         panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
-        panel.knobs.show_patch(patch)
+        panel.knobs.show_patch(patch, entry.patch if entry is not None else None)
         panel.knobs.show_facts(facts_of(patch))
         panel.set_range(*patch.range)
         strings = patch.strings
@@ -374,6 +378,11 @@ class PatchDesk(QObject):
     def _toggle_favourite(self, name: str) -> None:
         self.favourites ^= {name}
         self._show_entries()
+
+    def _press(self, key: int, velocity: int) -> None:
+        """Of the keys on the screen, which are pitches always."""
+        self._session.update(keys_play="pitch")
+        self._instruments.play(NoteOn(key, velocity))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)
@@ -434,8 +443,3 @@ def _beyond(info: PresetInfo, struck: Struck) -> list[str]:
     rise = float(resonator.relative_tension_rise(resonator.to_modes(struck.pluck.displacement(resonator.points))))
     limit = info.family.tension_rise[1]
     return [*found, f"tension rise {rise:.0%} is outside the trained {limit:.0%}"] if rise > limit else found
-
-
-def note_name(key: int) -> str:
-    """As C4 for key 60."""
-    return f"{('C', 'C♯', 'D', 'D♯', 'E', 'F', 'F♯', 'G', 'G♯', 'A', 'A♯', 'B')[key % 12]}{key // 12 - 1}"

@@ -60,10 +60,10 @@ class PresetDesk(QObject):
         """To the next or previous preset of the filtered list, going round; from outside of it, to its end."""
         names = [entry.name for entry in self._filter.applied(self._library.entries, self.favourites)]
         chosen = self._session.choices.preset
-        if chosen in names:
-            self._session.step_preset(names, step)
-        elif names:
-            self._session.update(preset=names[0 if step > 0 else -1])
+        if names:
+            here = names.index(chosen) if chosen in names else -1
+            place = (here + step) % len(names) if here >= 0 else (0 if step > 0 else -1)
+            self._session.update(preset=names[place])
 
     def toggle_favourite(self, name: str) -> None:
         self.favourites ^= {name}

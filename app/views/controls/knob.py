@@ -118,9 +118,11 @@ class Knob(QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """For a window with little room."""
-        self._width = NARROW_WIDTH if narrow else WIDTH
-        self.updateGeometry()
-        self.update()
+        width = NARROW_WIDTH if narrow else WIDTH
+        if width != self._width:
+            self._width = width
+            self.updateGeometry()
+            self.update()
 
     def set_low(self, low: bool) -> None:
         """Smaller, for rows of many knobs."""

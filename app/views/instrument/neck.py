@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
@@ -48,7 +48,7 @@ class Neck(Playable):
         if ordered != self._strings:
             self.let_go()
             self._strings = ordered
-            self.update()
+            self.rest_changed()
 
     @property
     def in_rows(self) -> bool:
@@ -115,18 +115,41 @@ class Neck(Playable):
 
     # How it looks
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint_rest(self, painter: QPainter) -> None:
         if self.in_rows:
             self._paint_board(painter)
             for number in range(len(self._strings)):
                 self._paint_string(painter, number)
-            self._paint_dots(painter)
-        else:
-            for key in range(self._low, self._high + 1):
-                if self._column(key).adjusted(-14, 0, 14, 0).intersects(QRectF(event.rect())):
-                    self._paint_column(painter, key)
+            return
+        open_keys = {open_key for _, open_key in self._strings}
+        painter.setFont(theme.small_font(9))
+        for key in range(self._low, self._high + 1):
+            self._paint_column(painter, key, QColor(theme.TEXT if key in open_keys else theme.FAINT), 0.0)
+            if key % 12 == 0:
+                place = QRectF(self._column(key).center().x() - 16, self.height() - FOOT, 32, FOOT - 1)
+                painter.setPen(QColor(theme.FAINT))
+                painter.drawText(place, Qt.AlignmentFlag.AlignCenter, note_name(key))
+
+    def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
+        for key in sorted(self.marked):
+            level = self.level(key)
+            ground = theme.RAISED if self.in_rows else theme.PANEL
+            lit = theme.blended(self.colour.name(), ground, 0.3 + 0.7 * level)
+            if not self.key_rect(key).intersects(dirty) or not (level > 0 or self.is_down(key)):
+                continue
+            if self.in_rows:
+                self._paint_stopped(painter, key, lit, level)
+            elif self.sounds(key):
+                end = self._paint_column(painter, key, lit if level > 0 else QColor(theme.FAINT), 1.0)
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
+                painter.drawEllipse(end, *(2 * [2.5 + 2.5 * level]))
+        if self.shows_cursor:
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
+            key = self.cursor_key
+            place = self._cell_of(key) if self.in_rows else self._column(key).adjusted(0, 0, 0, -FOOT)
+            painter.drawRoundedRect(place.adjusted(1, 1, -1, -1), 3, 3)
 
     def _paint_board(self, painter: QPainter) -> None:
         bottom = self.height() - FOOT
@@ -164,49 +187,28 @@ class Neck(Playable):
         y = row.center().y()
         painter.drawLine(QPointF(NAMES_WIDTH, y), QPointF(self.fret_x(self.frets), y))
 
-    def _paint_dots(self, painter: QPainter) -> None:
+    def _paint_stopped(self, painter: QPainter, key: int, lit: QColor, level: float) -> None:
+        """A dot where a key is held, and its string from there on."""
         size = min(LARGEST_DOT, (self.height() - FOOT) / len(self._strings) - 2)
-        down = (*self._held, *(key for key in (self._down, self._typed) if key is not None))
-        for key in sorted({*self._levels, *down}):
-            cell = self._cell_of(key)
-            level = self.level(key)
-            x = cell.right() - min(size, cell.width() / 2) if cell.left() > 0 else NAMES_WIDTH
-            middle = QPointF(x, cell.center().y())
-            ink = theme.blended(self.colour.name(), theme.FAINT, 1.0 if level > 0 else 0.0)
-            if level > 0:
-                painter.setPen(QPen(theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level), 2))
-                painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))
-                painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(theme.translucent(self.colour.name(), 70))
-                painter.drawEllipse(middle, *(2 * [size / 2 + 4 * level]))
-            painter.setPen(QPen(QColor(theme.RAISED), 1))
-            painter.setBrush(ink)
-            painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
-        if self.hasFocus():
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-            painter.drawRoundedRect(self._cell_of(self._cursor).adjusted(1, 1, -1, -1), 3, 3)
-
-    def _paint_column(self, painter: QPainter, key: int) -> None:
-        column, bottom, level = self._column(key), self.height() - FOOT, self.level(key)
-        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (bottom - 8)
-        x, ink = column.center().x(), QColor(theme.FAINT)
-        if any(key == open_key for _, open_key in self._strings):
-            ink = QColor(theme.TEXT)
+        cell = self._cell_of(key)
+        x = cell.right() - min(size, cell.width() / 2) if cell.left() > 0 else NAMES_WIDTH
+        middle = QPointF(x, cell.center().y())
         if level > 0:
-            ink = theme.blended(self.colour.name(), theme.PANEL, 0.3 + 0.7 * level)
-        thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)
-        painter.setPen(QPen(ink, thick + (1 if level > 0 else 0)))
-        painter.drawLine(QPointF(x, 3), QPointF(x, 3 + length))
-        if level > 0 or self.is_down(key):
+            painter.setPen(QPen(lit, 2))
+            painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))
             painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
-            painter.drawEllipse(QPointF(x, 3 + length), *(2 * [2.5 + 2.5 * level]))
-        if key % 12 == 0:
-            painter.setFont(theme.small_font(9))
-            painter.setPen(QColor(theme.FAINT))
-            painter.drawText(QRectF(x - 16, bottom, 32, FOOT - 1), Qt.AlignmentFlag.AlignCenter, note_name(key))
-        if self.hasFocus() and key == self._cursor:
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-            painter.drawRoundedRect(column.adjusted(0.5, 1, -0.5, -FOOT), 3, 3)
+            painter.setBrush(theme.translucent(self.colour.name(), 70))
+            painter.drawEllipse(middle, *(2 * [size / 2 + 4 * level]))
+        painter.setPen(QPen(QColor(theme.RAISED), 1))
+        painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
+        painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
+
+    def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
+        """A key's string in the fan; gives its end."""
+        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self.height() - FOOT - 8)
+        x = self._column(key).center().x()
+        thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)
+        painter.setPen(QPen(ink, thick + thicker))
+        end = QPointF(x, 3 + length)
+        painter.drawLine(QPointF(x, 3), end)
+        return end

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.views.controls.parts import tool_button
@@ -17,6 +18,8 @@ from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
+FOLD_TIP, NO_ROOM = "Show or hide the knobs of the string", "The window is too low for the knobs of the string"
+ROOMY = 1180  # below, the bar stands closer
 _SURFACES = (
     ("keys", "Keys", "Show a piano's keyboard"),
     ("neck", "Strings", "Show the strings and where they are stopped"),
@@ -43,7 +46,7 @@ class InstrumentPanel(QFrame):
             played.released.connect(self.released)
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
-        self._fold = tool_button("String knobs", tip="Show or hide the knobs of the string")
+        self._fold = tool_button("String knobs", tip=FOLD_TIP)
         self._fold.setObjectName("small")
         self._fold.setCheckable(True)
         self._fold.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -109,8 +112,13 @@ class InstrumentPanel(QFrame):
             self._low = low, lowest
             self._share_room()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.bar.set_compact(self.width() < ROOMY)
+
     def _share_room(self) -> None:
         low, lowest = self._low
+        self._fold.setToolTip(NO_ROOM if low else FOLD_TIP)
         self._knobs_row.setVisible(self.unfolded and not low)
         self._fold.setEnabled(not low)
         self._bar_row.setVisible(not lowest)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 MOST_MACROS = 8
 ROOMY_MACROS = 6  # more of them stand closer
+NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
     "body.mix": ("mix", SHARE, "How much is heard of the body that the strings stand on"),
@@ -51,6 +52,7 @@ class PatchBar(QFrame):
         super().__init__(parent)
         self.setAccessibleName("Patch")
         self._macros: tuple[Macro, ...] = ()
+        self._compact = False
         self.knobs = {field: Knob(name, limits, tip) for field, (name, limits, tip) in _MIXES.items()}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
@@ -87,7 +89,7 @@ class PatchBar(QFrame):
         following.clicked.connect(self.next_asked)
         self.name = NameButton("No patch")
         self.name.setToolTip("Browse the patches")
-        self.name.setMinimumWidth(130)
+        self.name.setMinimumWidth(NARROW_NAME)
         self.name.setMaximumWidth(320)
         self.name.clicked.connect(self.browse_asked)
         self.category = Label()
@@ -169,6 +171,19 @@ class PatchBar(QFrame):
 
     # What is shown
 
+    def set_compact(self, compact: bool) -> None:
+        """For a window with little room."""
+        if compact != self._compact:
+            self._compact = compact
+            self._share_width()
+
+    def _share_width(self) -> None:
+        close = self._compact or len(self._macros) > ROOMY_MACROS
+        self.category.setVisible(not close and bool(self.category.text()))
+        self.name.setMinimumWidth(NARROWEST_NAME if close else NARROW_NAME)
+        for knob in self.macros:
+            knob.set_narrow(close)
+
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
         """Name and title of each; none, the name "", is always there."""
         chosen = self.body.currentData()
@@ -186,7 +201,6 @@ class PatchBar(QFrame):
         told = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
         self.name.setToolTip(plain_tip(f"{told}\nClick to browse the patches"))
         self.category.setText(patch.category)
-        self.category.show()
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)
         self.rename.setEnabled(own)
@@ -201,7 +215,6 @@ class PatchBar(QFrame):
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
         for number, knob in enumerate(self.macros):
             knob.setVisible(number < len(macros))
-            knob.set_narrow(len(macros) > ROOMY_MACROS)
             if number >= len(macros):
                 continue
             macro = macros[number]
@@ -211,6 +224,7 @@ class PatchBar(QFrame):
             knob.set_value(macro.value)
         self._macros = macros
         self._before_macros.setVisible(bool(macros))
+        self._share_width()
 
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)

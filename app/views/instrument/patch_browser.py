@@ -13,7 +13,7 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, QTimer, Signal
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeyEvent
+from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -28,6 +28,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.views import theme
 from app.views.controls.parts import combo_box, label, tool_button
 from app.views.controls.plain import Label, plain_tip
 from app.views.instrument.playable import note_name
@@ -89,8 +90,8 @@ class PatchBrowser(QFrame):
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setTextElideMode(Qt.TextElideMode.ElideRight)
         self.list.currentItemChanged.connect(self._row_changed)
-        self.list.itemClicked.connect(lambda _: self._rest.start())
-        self.list.itemDoubleClicked.connect(lambda _: self.dismiss())
+        self.list.itemClicked.connect(lambda item: self._rest.start() if _name_of(item) else None)
+        self.list.itemDoubleClicked.connect(lambda item: self.dismiss() if _name_of(item) else None)
         self._lay_out()
         for widget in (self.search, self.list):
             widget.installEventFilter(self)
@@ -235,7 +236,8 @@ class PatchBrowser(QFrame):
 
     def _add_heading(self, category: str) -> None:
         item = QListWidgetItem(category.upper(), self.list)
-        item.setFlags(Qt.ItemFlag.NoItemFlags)
+        item.setFlags(Qt.ItemFlag.ItemIsEnabled)
+        item.setForeground(QColor(theme.FAINT))
         font = item.font()
         font.setBold(True)
         item.setFont(font)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
@@ -13,7 +13,8 @@ from app.views.instrument.playable import Playable, note_name
 
 BLACK_HEIGHT = 0.62  # of a white key's
 BLACK_WIDTH = 0.6
-FEWEST_KEYS = 49
+FEWEST_KEYS = 48
+SMALLEST_LETTER, LARGEST_LETTER = 7, 11
 TIP = (
     "Click or drag to play: softer at the top of a key, harder at the bottom.\n"
     "Right button or Shift: the key stays down. With the keyboard: arrows and Enter"
@@ -29,7 +30,7 @@ def is_black(key: int) -> bool:
 def shown_range(low: int, high: int) -> tuple[int, int]:
     """Whole octaves from C to B about a range, and four of them at least."""
     first, last = low - low % 12, high + 11 - high % 12
-    while last - first + 1 < FEWEST_KEYS - 1:
+    while last - first + 1 < FEWEST_KEYS:
         if first >= 12 and (low - first <= last - high or last > 115):
             first -= 12
         else:
@@ -50,14 +51,10 @@ class PianoKeys(Playable):
         """The computer's keys that play, by the key that each plays."""
         if dict(letters) != self._letters:
             self._letters = dict(letters)
-            self.update()
+            self.rest_changed()
 
     def lay_out(self) -> None:
         self._first, self._last = shown_range(self._low, self._high)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self.update()
 
     # Where keys are
 
@@ -69,6 +66,11 @@ class PianoKeys(Playable):
     def _pitch(self) -> float:
         """From a white key to the next, in pixels."""
         return self.width() / (self._white(self._last) + 1)
+
+    @property
+    def _letter_size(self) -> int:
+        """In pixels: as large as a black key is wide."""
+        return min(max(round(0.9 * BLACK_WIDTH * self._pitch), SMALLEST_LETTER), LARGEST_LETTER)
 
     def key_rect(self, key: int) -> QRectF:
         if not self._first <= key <= self._last:
@@ -95,22 +97,42 @@ class PianoKeys(Playable):
 
     # How they look
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.fillRect(event.rect(), QColor(theme.LINE))  # between the keys
-        dirty = QRectF(event.rect())
-        keys = [key for key in range(self._first, self._last + 1) if self.key_rect(key).intersects(dirty)]
-        for key in sorted(keys, key=is_black):  # black ones lie above
-            self._paint_key(painter, key)
+    def paint_rest(self, painter: QPainter) -> None:
+        painter.fillRect(self.rect(), QColor(theme.LINE))  # between the keys
+        for key in sorted(range(self._first, self._last + 1), key=is_black):  # black ones lie above
+            self._paint_key(painter, key, QColor(_own(key)) if self.sounds(key) else _mute(key))
 
-    def _paint_key(self, painter: QPainter, key: int) -> None:
-        rect, own, ink = self.key_rect(key), _ivory(), _ebony()
-        if is_black(key):
-            own, ink = ink, own
-        filling = self._filling(key, own)
-        if theme.contrast(filling.name(), ink) < theme.contrast(filling.name(), own):
-            ink = own
+    def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
+        marked = self.marked
+        covering = {black for key in marked for black in (key - 1, key + 1) if is_black(black) and not is_black(key)}
+        for key in sorted(marked | covering, key=is_black):
+            if self.key_rect(key).intersects(dirty):
+                self._paint_key(painter, key, self._filling(key))
+                if key in self.held:
+                    self._paint_pin(painter, key)
+        if self.shows_cursor:
+            key = self.cursor_key
+            painter.setPen(QPen(QColor(_ink(self._filling(key))), 1.5))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
+
+    def _paint_pin(self, painter: QPainter, key: int) -> None:
+        """It stays down by itself."""
+        rect = self.key_rect(key)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(_ink(self._filling(key))))
+        painter.drawEllipse(QPointF(rect.center().x(), rect.bottom() - (26 if is_black(key) else 38)), 2.5, 2.5)
+
+    def _filling(self, key: int) -> QColor:
+        if not self.sounds(key):
+            return _mute(key)
+        level, own = self.level(key), _own(key)
+        if level > 0:
+            return theme.blended(self.colour.name(), own, 0.35 + 0.65 * level)
+        return theme.blended(theme.FAINT, own, 0.45) if self.is_down(key) else QColor(own)
+
+    def _paint_key(self, painter: QPainter, key: int, filling: QColor) -> None:
+        rect = self.key_rect(key)
         painter.setBrush(filling)
         if is_black(key):
             painter.setPen(QPen(QColor(theme.LINE), 1))
@@ -118,34 +140,32 @@ class PianoKeys(Playable):
         else:
             painter.setPen(Qt.PenStyle.NoPen)
             painter.drawRoundedRect(rect.adjusted(0.5, -4, -0.5, -1), 3, 3)
-        painter.setPen(QColor(ink))
+        letter = self._letters.get(key, "") if self.sounds(key) else ""
+        if letter or key % 12 == 0:
+            painter.setPen(QColor(_ink(filling)))
         if key % 12 == 0:
             self._paint_word(painter, rect, note_name(key), 16, 9)
-        if self.sounds(key):
-            self._paint_word(painter, rect, self._letters.get(key, ""), 18 if is_black(key) else 30, 11)
-        if self.hasFocus() and key == self.cursor_key:
-            painter.setPen(QPen(QColor(ink), 1.5))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRoundedRect(rect.adjusted(3, 2, -3, -4), 3, 3)
-
-    def _filling(self, key: int, own: str) -> QColor:
-        if not self.sounds(key):
-            return theme.blended(own, theme.LINE, 0.3)
-        ground = theme.blended(theme.FAINT, own, 0.45).name() if self.is_down(key) else own
-        level = self.level(key)
-        return theme.blended(self.colour.name(), ground, 0.25 + 0.75 * level) if level > 0 else QColor(ground)
+        if letter:
+            self._paint_word(painter, rect, letter, 18 if is_black(key) else 30, self._letter_size)
 
     def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
         """`above` the foot of a key, in pixels."""
-        painter.setFont(theme.small_font(size, bold=size > 9))
+        painter.setFont(theme.small_font(size, bold=above > 16))
         place = QRectF(key.left() - 4, key.bottom() - above, key.width() + 8, 13)
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)
 
 
-def _ivory() -> str:
-    """The lighter of text and raised ground: white keys are light under both faces."""
-    return max(theme.TEXT, theme.RAISED, key=lambda colour: QColor(colour).lightness())
+def _own(key: int) -> str:
+    """The colour of a key at rest: white keys are light under both faces, and black ones dark."""
+    pick = min if is_black(key) else max
+    return pick(theme.TEXT, theme.RAISED, theme.BACKGROUND, key=lambda colour: QColor(colour).lightness())
 
 
-def _ebony() -> str:
-    return min(theme.TEXT, theme.BACKGROUND, key=lambda colour: QColor(colour).lightness())
+def _mute(key: int) -> QColor:
+    """Of a key without a string."""
+    return theme.blended(_own(key), theme.LINE, 0.3)
+
+
+def _ink(filling: QColor) -> str:
+    """What is best read on it."""
+    return max(theme.TEXT, theme.BACKGROUND, key=lambda ink: theme.contrast(ink, filling.name()))

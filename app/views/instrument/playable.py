@@ -6,7 +6,17 @@ from abc import abstractmethod
 from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QHideEvent, QKeyEvent, QMouseEvent
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QHideEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPixmap,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.views import theme
@@ -51,7 +61,9 @@ class Playable(QWidget):
         self._typed: int | None = None  # by Enter
         self._held: set[int] = set()
         self._cursor = 60
-        theme.changes.face_changed.connect(self.update)
+        self._by_keys = False  # it was come to, or moved on, with the keyboard
+        self._rest = QPixmap()
+        theme.changes.face_changed.connect(self.rest_changed)
 
     def sizeHint(self) -> QSize:
         return QSize(720, HEIGHT)
@@ -73,6 +85,14 @@ class Playable(QWidget):
     def share_at(self, key: int, at: QPointF) -> float:
         """How far down on a key a point lies, 0 … 1."""
 
+    @abstractmethod
+    def paint_rest(self, painter: QPainter) -> None:
+        """All of it as it is when nothing sounds and no hand is on it. Kept as a picture until `rest_changed`."""
+
+    @abstractmethod
+    def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
+        """What sounds, what is down, and where the keyboard's cursor is, as far as it lies in `dirty`."""
+
     # What is shown
 
     def set_range(self, low: int, high: int) -> None:
@@ -82,10 +102,15 @@ class Playable(QWidget):
             self._low, self._high = low, high
             self._set_cursor(self._cursor)
             self.lay_out()
-            self.update()
+            self.rest_changed()
 
     def lay_out(self) -> None:
-        """Called where the range or the size has changed."""
+        """Called where the range has changed."""
+
+    def rest_changed(self) -> None:
+        """It is to be painted anew."""
+        self._rest = QPixmap()
+        self.update()
 
     def show_sounding(self, levels: Mapping[int, float]) -> None:
         """How loud each key sounds, 0 … 1; keys that are left out are silent."""
@@ -128,6 +153,31 @@ class Playable(QWidget):
 
     # For painting
 
+    @property
+    def marked(self) -> frozenset[int]:
+        """Keys that do not look as at rest."""
+        cursor = {self._cursor} if self.shows_cursor else set()
+        down = {key for key in (self._down, self._typed) if key is not None}
+        return frozenset(self._levels.keys() | self._held | cursor | down)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        ratio = self.devicePixelRatioF()
+        if self._rest.isNull() or self._rest.devicePixelRatio() != ratio:
+            self._rest = QPixmap(self.size() * ratio)
+            self._rest.setDevicePixelRatio(ratio)
+            self._rest.fill(Qt.GlobalColor.transparent)
+            with QPainter(self._rest) as painter:
+                painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+                self.paint_rest(painter)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.drawPixmap(QPointF(), self._rest)
+        self.paint_marks(painter, QRectF(event.rect()))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.rest_changed()
+
     def level(self, key: int) -> float:
         return self._levels.get(key, 0) / LEVEL_STEPS
 
@@ -148,6 +198,8 @@ class Playable(QWidget):
         key = self.key_at(event.position())
         if key is None or not self.sounds(key) or self._down is not None:
             return
+        self._by_keys = False
+        self._set_cursor(key)
         holding = event.button() == Qt.MouseButton.RightButton or (
             event.button() == Qt.MouseButton.LeftButton and event.modifiers() & Qt.KeyboardModifier.ShiftModifier
         )
@@ -195,6 +247,7 @@ class Playable(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = _MOVES.get(Qt.Key(event.key()))
+        self._by_keys = self._by_keys or step is not None
         if step is not None:
             self._set_cursor(self._cursor + step)
         elif event.key() in ENTER_KEYS:
@@ -221,6 +274,7 @@ class Playable(QWidget):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
+        self._by_keys = event.reason() in (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason)
         self.update()
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -231,6 +285,11 @@ class Playable(QWidget):
     def cursor_key(self) -> int:
         """The key that Enter plays."""
         return self._cursor
+
+    @property
+    def shows_cursor(self) -> bool:
+        """Whether it is seen: not to those who play with the mouse."""
+        return self._by_keys and self.hasFocus()
 
     def _set_cursor(self, key: int) -> None:
         if not self._low <= key <= self._high:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
@@ -226,12 +226,16 @@ class StringKnobs(QWidget):
     def _ask(self, field: str, value: float) -> None:
         self.changed.emit(field, float(round(value)) if field == WHOLE else value)
 
-    def show_patch(self, patch: Patch) -> None:
+    def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
+        """`saved` is what a double click goes back to."""
         for field, knob in self.knobs.items():
             value = _value(patch, field)
             knob.setEnabled(value is not None)
             if value is not None:
                 knob.set_value(value)
+            before = None if saved is None else _value(saved, field)
+            if before is not None:
+                knob.limits = replace(knob.limits, default=before)
         for field in SHAPED:
             self.knobs[field].setEnabled(patch.pluck.shape != "triangular")
         self.knobs["damping.release_t60_s"].setEnabled(not patch.damping.let_ring)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,12 +12,18 @@ from app.instrument.events import MOD_WHEEL, SOUND_OFF, SUSTAIN, Bend, Controlle
 from app.instrument.loudness import k_weight
 from app.instrument.offline import render_events, render_note
 from app.instrument.player import Player, Struck
-from app.patches.patch import Damping, Knobs, Patch, Pickup
+from app.patches.patch import Damping, Fretted, Knobs, Patch, PhysicalString, Pickup
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
+from engine.resonators.string import StringParameters
 from engine.voices import Mixer
 
 RATE_HZ = 48_000
+STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
+
+
+def physical(string: StringParameters) -> PhysicalString:
+    return PhysicalString(**asdict(string))
 
 
 def changed(patch: Patch, **parts: object) -> Patch:
@@ -169,6 +177,18 @@ def test_a_knob_changes_strings_that_ring(patch: Patch, preset: Preset) -> None:
     free = play(patch, preset, 1.5, (0.0, NoteOn(57, 60))) / struck[0].gain
     fallen = level_db(after.astype(np.float64), 0.8, 0.9) - level_db(free, 1.3, 1.4)
     assert fallen < -3
+
+
+def test_an_impossible_knob_leaves_what_rings_and_is_told_by_the_next_key(patch: Patch, preset: Preset) -> None:
+    struck: list[Struck] = []
+    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
+    player.handle(NoteOn(57, 60))
+    before = struck[0].parameters
+    thin = changed(patch, strings=Fretted(string=physical(replace(STEEL, density_kg_m3=90_000.0))))
+    player.set_patch(changed(thin, knobs=Knobs(density=3.0)))
+    assert struck[0].parameters == before
+    with pytest.raises(ValueError, match="density_kg_m3"):
+        player.handle(NoteOn(57, 60))
 
 
 def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> None:

@@ -2,7 +2,20 @@
 
 import pytest
 
+from app.patches.patch import Fretted, Patch, PhysicalString
 from app.session.choices import Choices, Session
+from app.session.instrument import choices_of
+
+STRING = {
+    "length_m": 0.65,
+    "area_m2": 5e-7,
+    "second_moment_m4": 2e-14,
+    "density_kg_m3": 7850.0,
+    "youngs_modulus_pa": 2e11,
+    "damping_d1_kg_m_s": 4e-4,
+    "damping_d3_kg_m_s": 4e-7,
+    "tension_n": 75.0,
+}
 
 
 def recorded(session: Session) -> list[frozenset[str]]:
@@ -70,16 +83,19 @@ def test_choices_from_before_the_slots_are_understood(source: str) -> None:
     assert choices.position == 0.4
 
 
-def test_presets_go_round() -> None:
-    session = Session(Choices(preset="b"))
-    session.step_preset(["a", "b", "c"], 1)
-    assert session.choices.preset == "c"
-    session.step_preset(["a", "b", "c"], 1)
-    assert session.choices.preset == "a"
-    session.step_preset(["a", "b", "c"], -1)
-    assert session.choices.preset == "c"
-    session.step_preset([], 1)
-    assert session.choices.preset == "c"
+def test_keys_play_what_was_chosen_last() -> None:
+    patch = Patch(name="p", category="harp", preset="many", strings=Fretted(string=PhysicalString(**STRING)))
+    session = Session(Choices(preset="many", patch=patch, string=patch.strings.string))  # type: ignore[union-attr]
+    session.update(preset="one")
+    assert (session.choices.keys_play, session.choices.string) == ("place", None)
+    session.update(preset="many")
+    assert session.choices.keys_play == "pitch"
+    session.update(preset="one")
+    session.update(**choices_of(patch))
+    assert (session.choices.preset, session.choices.keys_play) == ("many", "pitch")
+    session.update(preset="one")
+    session.play(preset="many", string=patch.strings.string)  # type: ignore[union-attr]
+    assert session.choices.keys_play == "place", "a note chooses nothing"
 
 
 def test_what_a_note_changes_is_told_as_played_before_it_is_told_as_changed() -> None:

@@ -207,3 +207,46 @@ def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> Non
         qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
         qapp.setStyleSheet(style)
         qapp.setPalette(palette)
+
+
+@pytest.fixture
+def alive(qtbot: QtBot) -> MainWindow:
+    window = MainWindow()
+    qtbot.addWidget(window)
+    window.show_string(QWidget())
+    window.show()
+    qtbot.waitExposed(window)
+    return window
+
+
+def test_the_instrument_is_folded_away_and_comes_back(qtbot: QtBot, alive: MainWindow) -> None:
+    alive.resize(1280, 720)
+    assert alive.shows_instrument
+    assert alive.instrument.isVisible()
+    for shown in (False, True):
+        alive.instrument_asked.emit()  # Ctrl+K, and the menu
+        assert alive.shows_instrument == alive.instrument.isVisible() == shown
+    qtbot.mouseClick(alive._instrument_button, Qt.MouseButton.LeftButton)
+    assert not alive.instrument.isVisible()
+
+
+def test_in_a_low_window_the_views_make_room_for_the_instrument(alive: MainWindow) -> None:
+    def seen() -> tuple[bool, ...]:
+        parts = (alive.left, alive.instrument.keys, alive.instrument.bar, alive.instrument.knobs)
+        return tuple(part.isVisible() for part in parts)
+
+    alive.instrument.set_unfolded(True)
+    for height, parts in (
+        (830, (True, True, True, True)),
+        (700, (False, True, True, True)),
+        (600, (False, True, True, False)),
+        (500, (False, True, False, False)),
+    ):
+        alive.resize(1000, height)
+        assert seen() == parts, height
+    alive.show_instrument(False)
+    assert alive.left.isVisible()
+    alive.show_instrument(True)
+    alive.instrument.set_unfolded(False)
+    alive.resize(1000, 680)  # of 720 with a title bar
+    assert seen() == (True, True, True, False)

@@ -123,6 +123,7 @@ class PlayBenchmark:
     start_to_window_s: float
     start_to_sound_s: float
     idle_cpu_cores: float | None
+    idle_window_cores: float | None
     picture_lag_ms: Spread | None
     phases: tuple[Phase, ...]
     clock_uncertainty_ms: float
@@ -212,7 +213,7 @@ def measure(
             (choices.left_view, choices.right_view),
             window_s - started_s,
             clock.time_s(start + int(first[0])) - started_s,
-            idle,
+            *idle,
             Spread.of(lags_s),
             phases,
             1000 * clock.spread_s,
@@ -319,13 +320,21 @@ def _cpu_s(process: subprocess.Popen[bytes]) -> float:
     return total
 
 
-def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> float | None:
-    """Cores that the program takes while nothing sounds; None where it does not fall silent."""
+def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> tuple[float | None, float | None]:
+    """Cores of the program and of its window's thread while nothing sounds; None where it does not fall silent."""
     if not recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S):
-        return None
-    before_s, before_cpu_s = time.monotonic(), _cpu_s(process)
+        return None, None
+    before_s, before_cpu_s, before_window_s = time.monotonic(), _cpu_s(process), _window_cpu_s(process)
     time.sleep(IDLE_S)
-    return (_cpu_s(process) - before_cpu_s) / (time.monotonic() - before_s)
+    lasted_s = time.monotonic() - before_s
+    return (_cpu_s(process) - before_cpu_s) / lasted_s, (_window_cpu_s(process) - before_window_s) / lasted_s
+
+
+def _window_cpu_s(process: subprocess.Popen[bytes]) -> float:
+    """Of a process's first thread, which is the window's."""
+    return sum(
+        each.user_time + each.system_time for each in psutil.Process(process.pid).threads() if each.id == process.pid
+    )
 
 
 def _control_holes_ms(played: _Played, control: Recording) -> list[float]:

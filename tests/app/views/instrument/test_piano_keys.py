@@ -170,6 +170,18 @@ def test_arrows_choose_a_key_and_enter_plays_it(qtbot: QtBot, keys: PianoKeys, h
     assert keys.cursor_key == 86, "no further than the strings go"
 
 
+def test_the_cursor_is_where_one_clicked_and_seen_by_those_who_use_the_keyboard(
+    qtbot: QtBot, keys: PianoKeys, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keys, "hasFocus", lambda: True)  # a window without a desktop is never active
+    qtbot.mouseClick(keys, LEFT, pos=spot(keys, 71))
+    at_rest = keys.grab().toImage()
+    assert keys.cursor_key == 71
+    qtbot.keyClick(keys, Qt.Key.Key_Right)
+    assert keys.cursor_key == 72
+    assert keys.grab().toImage() != at_rest
+
+
 def test_enter_is_the_keys_own_and_not_the_windows(keys: PianoKeys) -> None:
     for key, accepted in ((Qt.Key.Key_Return, True), (Qt.Key.Key_Space, False)):
         event = QKeyEvent(QEvent.Type.ShortcutOverride, key, Qt.KeyboardModifier.NoModifier)

@@ -40,6 +40,13 @@ def test_a_turn_is_told_with_its_field(qtbot: QtBot, knobs: StringKnobs, guitar:
         qtbot.mouseClick(knobs.knobs["knobs.decay"], Qt.MouseButton.LeftButton)
 
 
+def test_a_double_click_goes_back_to_what_was_saved(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
+    knobs.show_patch(guitar.with_value("pluck.position", 0.4), guitar)
+    with qtbot.waitSignal(knobs.changed) as told:
+        qtbot.mouseDClick(knobs.knobs["pluck.position"], Qt.MouseButton.LeftButton)
+    assert told.args == ["pluck.position", guitar.pluck.position]
+
+
 def test_it_is_transposed_by_whole_keys(qtbot: QtBot, knobs: StringKnobs) -> None:
     asked: list[float] = []
     knobs.changed.connect(lambda _, value: asked.append(value))
