@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.session.choices import Choices, Session
-from app.session.step_words import step_words
+from app.session.step_words import step_words, turned_fields
 
 # Not what is only looked at or listened to: views, speed, volume, loop, model or truth.
 PLUCK = ("preset", "string", "patch", "position", "amplitude_mm", "shape", "width", "seconds")
@@ -100,15 +100,15 @@ class History:
         fields = names & RECORDED
         if not fields or values == self._present:  # the latter while a step is restored, or a note played
             return
-        now_s = self._now_s()
-        soon = fields == self._open_fields and now_s - self._changed_s <= GATHER_S
+        now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
+        soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):
             self._undo.append({})
         step = self._undo[-1]
         for name in fields - step.keys():
             step[name] = self._present[name]
         self._redo.clear()
-        self._open_fields, self._changed_s, self._present = fields, now_s, values
+        self._open_fields, self._changed_s, self._present = turned, now_s, values
 
 
 def _recorded(choices: Choices) -> Values:

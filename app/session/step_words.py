@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -61,6 +61,15 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     if "preset" in changed:
         return f"preset {after['preset']}"
     return _together([words for name, words in CHOICES.items() if name in changed])
+
+
+def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
+    """Which fields a change turned: `names` of `Choices`, and within a patch that stays the same one its own."""
+    found = set(names)
+    old, new = before.get("patch"), after.get("patch")
+    if "patch" in found and old is not None and new is not None and old.name == new.name:
+        found |= {f"patch.{field}" for field in _changed(old, new)}
+    return frozenset(found)
 
 
 def _of_patch(before: Patch | None, after: Patch | None) -> str:

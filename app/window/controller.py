@@ -133,6 +133,7 @@ class Controller(QObject):
             settings.patch_favourites,
         )
         self.patches.told.connect(window.notices.tell)
+        self.patches.informed.connect(window.notices.inform)
         self.instruments.struck.connect(self.patches.show_struck)
         window.show_instrument(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)

@@ -105,3 +105,18 @@ def test_a_drag_that_came_back_is_not_told(guitar: Patch) -> None:
     session.update(position=0.35)
     history.let_go()
     assert history.undo_words == "duration"
+
+
+def test_two_knobs_of_a_patch_are_two_steps_however_quick_and_notches_of_one_are_one(guitar: Patch) -> None:
+    session = Session()
+    history = History(session, lambda: 0.0)
+    session.update(patch=guitar)
+    for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
+        patch = session.choices.patch
+        assert patch is not None
+        session.update(patch=patch.with_value(field, value))
+    found = []
+    while history.undo_words:
+        found.append(history.undo_words)
+        history.undo()
+    assert found == ["stiffness", "decay", "patch Classical guitar"]
