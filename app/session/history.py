@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.session.choices import Choices, Session
+from app.session.step_words import step_words, turned_fields
 
 # Not what is only looked at or listened to: views, speed, volume, loop, model or truth.
 PLUCK = ("preset", "string", "patch", "position", "amplitude_mm", "shape", "width", "seconds")
@@ -47,6 +48,23 @@ class History:
     def can_redo(self) -> bool:
         return bool(self._redo)
 
+    @property
+    def undo_words(self) -> str:
+        """What `undo` would take back, in plain words; "" where there is nothing."""
+        step = self._next(self._undo)
+        return "" if step is None else step_words(step, {name: self._present[name] for name in step})
+
+    @property
+    def redo_words(self) -> str:
+        """What `redo` would do again."""
+        step = self._next(self._redo)
+        return "" if step is None else step_words({name: self._present[name] for name in step}, step)
+
+    def _next(self, steps: Sequence[Values]) -> Values | None:
+        """A drag that came back to its start is no step."""
+        here = self._present
+        return next((step for step in reversed(steps) if any(here[name] != step[name] for name in step)), None)
+
     def hold(self) -> None:
         """A gesture begins: all that it changes is one step."""
         self._held = True
@@ -66,14 +84,13 @@ class History:
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:
         self.let_go()
-        while source:
-            wanted = source.pop()
-            here = {name: self._present[name] for name in wanted}
-            if wanted != here:  # a drag that came back to its start is no step
-                target.append(here)
-                self._present |= wanted
-                self._session.update(**wanted)
-                return
+        wanted = self._next(source)
+        while source and source.pop() is not wanted:
+            pass
+        if wanted is not None:
+            target.append({name: self._present[name] for name in wanted})
+            self._present |= wanted
+            self._session.update(**wanted)
 
     def _choices_played(self, _: frozenset[str]) -> None:
         self._present = _recorded(self._session.choices)
@@ -83,15 +100,15 @@ class History:
         fields = names & RECORDED
         if not fields or values == self._present:  # the latter while a step is restored, or a note played
             return
-        now_s = self._now_s()
-        soon = fields == self._open_fields and now_s - self._changed_s <= GATHER_S
+        now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
+        soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):
             self._undo.append({})
         step = self._undo[-1]
         for name in fields - step.keys():
             step[name] = self._present[name]
         self._redo.clear()
-        self._open_fields, self._changed_s, self._present = fields, now_s, values
+        self._open_fields, self._changed_s, self._present = turned, now_s, values
 
 
 def _recorded(choices: Choices) -> Values:

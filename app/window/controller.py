@@ -133,6 +133,7 @@ class Controller(QObject):
             settings.patch_favourites,
         )
         self.patches.told.connect(window.notices.tell)
+        self.patches.informed.connect(window.notices.inform)
         self.instruments.struck.connect(self.patches.show_struck)
         window.show_instrument(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)
@@ -188,8 +189,9 @@ class Controller(QObject):
 
     def _connect_history(self) -> None:
         window, session, history = self.window, self.session, self.history
-        window.undo_asked.connect(history.undo)
-        window.redo_asked.connect(history.redo)
+        window.undo_asked.connect(self._undo)
+        window.redo_asked.connect(self._redo)
+        window.menu.aboutToShow.connect(lambda: window.menu.show_steps(history.undo_words, history.redo_words))
         window.motion_asked.connect(lambda: session.update(motion=not session.choices.motion))
         window.envelope_asked.connect(lambda: session.update(envelope=not session.choices.envelope))
         strings = (panel.view for panel in self.panels if isinstance(panel, StringPanel))
@@ -205,6 +207,16 @@ class Controller(QObject):
             self._choices_shown(frozenset({field}))
 
     # Intents
+
+    def _undo(self) -> None:
+        words = self.history.undo_words
+        self.history.undo()
+        self.window.say_briefly(f"Undone: {words}" if words else "Nothing to undo")
+
+    def _redo(self) -> None:
+        words = self.history.redo_words
+        self.history.redo()
+        self.window.say_briefly(f"Done again: {words}" if words else "Nothing to do again")
 
     def pluck(self) -> None:
         if self._abx is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from PySide6.QtCore import QByteArray, QMargins, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QMargins, QPoint, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QSplitter,
     QTabBar,
+    QToolTip,
     QVBoxLayout,
     QWidget,
 )
@@ -30,7 +31,7 @@ from app.views.controls.deck import Deck
 from app.views.controls.focus_ring import FocusRing
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.parts import tool_button
-from app.views.controls.plain import Label
+from app.views.controls.plain import Label, plain_tip
 from app.views.controls.preset_bar import PresetBar
 from app.views.controls.sideways import Sideways
 from app.views.controls.transport_bar import TransportBar
@@ -46,7 +47,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("PgUp", "previous_asked", "previous preset"),
     ("PgDown", "next_asked", "next preset"),
     ("Ctrl+P", "browse_asked", "browse the presets"),
-    ("Ctrl+Z", "undo_asked", "undo: preset, pluck, listening point, duration"),
+    ("Ctrl+Z", "undo_asked", "undo: patch and its knobs, preset, pluck, listening point, duration"),
     ("Ctrl+Shift+Z", "redo_asked", "redo"),
     ("M", "motion_asked", "show or hide the string's motion"),
     ("N", "envelope_asked", "show or hide the envelope of the motion"),
@@ -65,6 +66,7 @@ WIDE, HIGH = 1100, 560  # below, the window is sparing
 ROOMY = 1240  # below, the controls stand closer
 ALL_HIGH, KNOBS_HIGH = 640, 170  # beside the instrument, and its knobs, there is room for the views above this height
 FACTS_HEIGHT = 20
+BRIEFLY_MS = 1_800
 TITLE_BAR = 40  # at most; how high it is, is known too late
 
 PLAYED_KEYS = (  # see `app/playing/keyboard.py`
@@ -252,6 +254,11 @@ class MainWindow(QMainWindow):
         """Which mode is heard alone; 0: all are heard."""
         self._solo.setText(f"Mode {mode} solo  ✕")
         self._solo.setVisible(mode > 0)
+
+    def say_briefly(self, text: str) -> None:
+        """Over the window for a moment: what a key has done that may not be seen."""
+        place = self.mapToGlobal(QPoint(self.width() // 2, self._head.geometry().bottom()))
+        QToolTip.showText(place, plain_tip(text), self, QRect(), BRIEFLY_MS)
 
     def geometry_text(self) -> str:
         """Size and place, for `restore_geometry`."""

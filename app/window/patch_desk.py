@@ -35,7 +35,7 @@ from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letter
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
-from app.session.instrument import choices_of
+from app.session.instrument import choices_of, heard_at
 from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
@@ -65,6 +65,7 @@ class PatchDesk(QObject):
     """
 
     told = Signal(str)
+    informed = Signal(str)  # of what went well
     _written = Signal(str)  # from a thread
 
     def __init__(
@@ -99,6 +100,7 @@ class PatchDesk(QObject):
         bar.save_asked.connect(self.save)
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)
+        bar.compare_asked.connect(self.compare)
         bar.record_asked.connect(self.record)
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
@@ -128,6 +130,8 @@ class PatchDesk(QObject):
 
     def reload(self) -> None:
         """The user may have put files into the folder meanwhile."""
+        if self._panel.bar.compare.isChecked():  # what is saved may be another
+            self.compare(False)
         self._entries, problems = list_patches()
         for problem in problems:
             self.told.emit(problem)
@@ -179,7 +183,8 @@ class PatchDesk(QObject):
         except (ValueError, AttributeError):  # a knob at its end asks for a hair more
             self._show_patch()
             return
-        self._session.update(patch=changed)
+        heard = heard_at(changed) if changed.pickup != patch.pickup else {}
+        self._session.update(patch=changed, **heard)
 
     def save(self) -> None:
         """Under its own name where it is the user's, else under one that is asked for."""
@@ -239,6 +244,12 @@ class PatchDesk(QObject):
         if (entry := self.entry) is not None:
             self._session.update(**choices_of(entry.patch))
 
+    def compare(self, saved: bool) -> None:
+        """Keys play the patch as it was saved, or as it is now; what is chosen stays. Any change of it ends that."""
+        entry = self.entry if saved else None
+        self._performance.hear_patch(None if entry is None else entry.patch)
+        self._panel.bar.show_comparing(entry is not None)
+
     def take_file(self, file: Path) -> None:
         """One of TAKEN_FILES that was dropped: a patch or a string is chosen, a MIDI file played, a scale tunes."""
         try:
@@ -282,18 +293,18 @@ class PatchDesk(QObject):
                 "; the scale before does not fit it" if other == "scale" else "; the mapping before does not fit it"
             )
         self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
-        self.told.emit(f"{file.name} tunes {patch.name}{left_out}.")
+        self.informed.emit(f"{file.name} tunes {patch.name}{left_out}.")
 
     def take_body(self, name: str) -> None:
         """One of the user's own that has come: the strings of the patch stand on it."""
         self._panel.bar.set_bodies([(each, each) for each in body_names()])
         if self.patch is None:
-            self.told.emit(f"{name} is a body for patches now; choose a patch, and it in the patch's bar.")
+            self.informed.emit(f"{name} is a body for patches now; choose a patch, and it in the patch's bar.")
             return
         if self.patch.body.name == name:  # its file was missing
             self._performance.choices_changed(frozenset({"patch"}))
         self._choose_body(name)
-        self.told.emit(f"{self.patch.name} stands on the body {name}.")
+        self.informed.emit(f"{self.patch.name} stands on the body {name}.")
 
     def stop(self) -> None:
         """Of a MIDI file that is played."""
@@ -346,6 +357,8 @@ class PatchDesk(QObject):
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & {"patch", "preset"}:
             self._show_patch()
+        if "patch" in names:
+            self._panel.bar.show_comparing(False)
         if names & {"octave", "keys_play", "patch"}:
             choices = self._session.choices
             self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)

@@ -18,6 +18,7 @@ from PySide6.QtCore import QObject
 from app.audio.sound import Sound
 from app.instrument.events import Event
 from app.instrument.player import Struck
+from app.patches.patch import Patch
 from app.playing.chosen import mix_of, render_request, stroke_of, subject_of
 from app.playing.keyboard import PLACES, Reach
 from app.playing.live import Live
@@ -30,6 +31,7 @@ from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices, Session
 from app.session.ears import heard_ear
+from app.session.instrument import choices_of
 from app.session.silence import why_ran_away
 from app.window.main_window import MainWindow
 from app.window.panels import Panel
@@ -232,6 +234,13 @@ class Performance(QObject):
         if entry is not None and render_request(choices, entry.path, self._library) != self._asked:
             self.render()
         self.follow()
+
+    def hear_patch(self, patch: Patch | None) -> None:
+        """Keys play this one until another is chosen; None: the chosen one. What is shown stays."""
+        choices = self._session.choices
+        if patch is not None:
+            choices = choices.model_copy(update=choices_of(patch))
+        self.live.set_patch(choices.patch, heard_ear(choices))
 
     def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
         """Model and truth of a pluck as they are heard, (frames, channels), in the background."""

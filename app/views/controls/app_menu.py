@@ -8,8 +8,10 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.views.controls.parts import tool_button
 from app.views.look import Look
+from engine.plain_text import one_line
 
 FACES = {"system": "Follow system", "dark": "Dark", "light": "Light"}
+LONGEST_STEP = 60  # characters
 SIZES_PERCENT = (100, 115, 125, 150)
 
 
@@ -24,7 +26,9 @@ class AppMenu(QMenu):
         self._add_choices("Theme", "face", {name: face for face, name in FACES.items()})
         self._add_choices("UI scale (after restart)", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         self.addSeparator()
-        self.asked = {
+        self._undo, self._redo = self.addAction("Undo"), self.addAction("Redo")
+        self.addSeparator()
+        self.asked = {self._undo: "undo_asked", self._redo: "redo_asked"} | {
             self.addAction(text): signal
             for text, signal in (
                 ("Instrument: keys and patch\tCtrl+K", "instrument_asked"),
@@ -40,6 +44,16 @@ class AppMenu(QMenu):
     def show_look(self, look: Look) -> None:
         for (field, value), action in self._choices.items():
             action.setChecked(getattr(look, field) == value)
+
+    def show_steps(self, undo: str, redo: str) -> None:
+        """What would be undone and done again; "" where there is nothing."""
+        for action, what, step, keys in (
+            (self._undo, "Undo", undo, "Ctrl+Z"),
+            (self._redo, "Redo", redo, "Ctrl+Shift+Z"),
+        ):
+            name = f": {one_line(step, LONGEST_STEP)}".replace("&", "&&") if step else ""
+            action.setText(f"{what}{name}\t{keys}")
+            action.setEnabled(bool(step))
 
     def _add_choices(self, title: str, field: str, values: dict[str, object]) -> None:
         menu = self.addMenu(title)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MOST_MACROS = 8
 ROOMY_MACROS = 6  # more of them stand closer
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
+COMPARE_TIP = "Hear the patch as it was saved, while this is pressed; its knobs stay. Any change ends it"
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
     "body.mix": ("mix", SHARE, "How much is heard of the body that the strings stand on"),
@@ -40,6 +41,7 @@ class PatchBar(QFrame):
     save_asked = Signal()
     rename_asked = Signal()
     revert_asked = Signal()
+    compare_asked = Signal(bool)  # whether the saved one is to be heard
     record_asked = Signal()  # begin or end
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
@@ -107,12 +109,17 @@ class PatchBar(QFrame):
             button.setObjectName("small")
             button.setEnabled(False)
             button.clicked.connect(signal)
+        self.compare = tool_button("Compare", "Hear the saved patch", COMPARE_TIP)
+        self.compare.setObjectName("small")
+        self.compare.setCheckable(True)
+        self.compare.setEnabled(False)
+        self.compare.clicked.connect(self.compare_asked)
         above = QHBoxLayout()
         above.setSpacing(6)
         for widget in (previous, self.name, following, self.category):
             above.addWidget(widget, 1000 if widget is self.name else 0)
         above.addStretch(1)
-        for button in (self.save, self.rename, self.revert):
+        for button in (self.save, self.rename, self.revert, self.compare):
             above.addWidget(button)
         column = QVBoxLayout()
         column.setSpacing(4)
@@ -203,6 +210,7 @@ class PatchBar(QFrame):
         self.category.setText(patch.category)
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)
+        self.compare.setEnabled(changed)
         self.rename.setEnabled(own)
         self._show_macros(patch.macros)
         self.knobs["body.mix"].set_value(patch.body.mix)
@@ -211,6 +219,10 @@ class PatchBar(QFrame):
         self.knobs["level_db"].set_value(patch.level_db)
         with QSignalBlocker(self.body):
             self._show_body(patch.body.name)
+
+    def show_comparing(self, comparing: bool) -> None:
+        """Whether keys play the patch as it was saved."""
+        self.compare.setChecked(comparing)
 
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
         for number, knob in enumerate(self.macros):

@@ -15,6 +15,7 @@ from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes, read_midi
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
+from app.patches.patch import Patch
 from app.window.controller import Controller
 from engine.presets.finding import SHIPPED
 from engine.presets.of_string import STRINGS, read_string
@@ -184,3 +185,62 @@ def test_what_is_beyond_training_is_told(qtbot: QtBot, played: Controller) -> No
     played.patches.change("knobs.gauge", 3.0)
     played.window.instrument.pressed.emit(80, 100)
     qtbot.waitUntil(lambda: bool(notes) and "outside the trained" in notes[-1], timeout=5_000)
+
+
+def heard(played: Controller) -> Patch:
+    """What keys play."""
+    player = played.performance.live._player
+    assert player is not None
+    return player.patch
+
+
+def test_the_saved_patch_is_heard_while_it_is_compared(qtbot: QtBot, played: Controller) -> None:
+    saved, button = played.session.choices.patch, played.window.instrument.bar.compare
+    assert saved is not None
+    assert not button.isEnabled()
+    played.patches.change("knobs.stiffness", 4.0)
+    mine = played.session.choices.patch
+    assert mine is not None
+    button.click()
+    assert (button.isChecked(), heard(played), played.session.choices.patch) == (True, saved, mine)
+    assert played.history.undo_words == "stiffness"
+    button.click()
+    assert (button.isChecked(), heard(played)) == (False, mine)
+    button.click()
+    played.patches.change("knobs.decay", 2.0)  # of what is chosen, not of what is heard
+    changed = played.session.choices.patch
+    assert changed is not None
+    assert (changed.knobs.stiffness, changed.knobs.decay) == (4.0, 2.0)
+    assert (button.isChecked(), heard(played)) == (False, changed)
+    button.click()
+    played.history.undo()
+    assert (button.isChecked(), heard(played)) == (False, mine)
+    button.click()
+    played.patches.revert()
+    assert (button.isChecked(), button.isEnabled(), heard(played)) == (False, False, saved)
+
+
+def test_a_patch_that_is_saved_while_it_is_compared_is_heard(
+    played: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Mine", True))
+    played.patches.save()
+    played.patches.change("knobs.stiffness", 4.0)
+    mine, button = played.session.choices.patch, played.window.instrument.bar.compare
+    button.click()
+    played.patches.save()  # over the one that is heard
+    assert (button.isChecked(), button.isEnabled(), heard(played)) == (False, False, mine)
+
+
+def test_the_pick_ups_knob_moves_where_the_string_is_heard(played: Controller) -> None:
+    before = played.session.choices
+    played.window.instrument.knobs.changed.emit("pickup.points.0", 0.11)
+    choices = played.session.choices
+    assert choices.patch is not None
+    assert (choices.patch.pickup.points[0], choices.listen) == (0.11, 0.11)
+    played.window.instrument.pressed.emit(60, 100)
+    player = played.performance.live._player
+    assert player is not None
+    assert [each.ear.points[0] for each in player.sounding()] == [0.11]
+    played.history.undo()
+    assert (played.session.choices.patch, played.session.choices.listen) == (before.patch, before.listen)

@@ -1,0 +1,103 @@
+"""What a step of undo changed, in plain words: the field of the pluck, or of the patch, or which patch was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+from app.patches.patch import Patch
+
+MOST_NAMED = 2  # fields in one step's name
+SEVERAL = "several settings"
+CHOICES = {  # fields of `Choices`
+    "position": "pluck position",
+    "amplitude_mm": "amplitude",
+    "shape": "pluck shape",
+    "width": "pluck width",
+    "seconds": "duration",
+    "listen": "listening point",
+    "listen_right": "right listening point",
+    "stereo": "stereo",
+    "pickup": "pick-up",
+    "string": "string",
+}
+PATCH = {  # fields of a patch, by their path; of those that are not here the path's last word is told
+    "name": "name of the patch",
+    "preset": "model",
+    "knobs.brightness_decay": "dulling",
+    "range": "range of keys",
+    "pluck.position": "pluck position",
+    "pluck.width": "soft width",
+    "pluck.width_hard": "hard width",
+    "pluck.softest_mm": "softest amplitude",
+    "pluck.hardest_mm": "hardest amplitude",
+    "pluck.shape": "pluck shape",
+    "pluck.curve": "velocity curve",
+    "pickup.points": "listening point",
+    "pickup.kind": "pick-up",
+    "damping.release_t60_s": "release",
+    "mode": "playing mode",
+    "bend_semitones": "range of bends",
+    "mod_wheel": "modulation wheel",
+    "tuning.a4_hz": "pitch of A4",
+    "tuning.keymap": "keyboard mapping",
+    "tuning.transpose": "transposition",
+    "body.name": "body",
+    "body.mix": "body mix",
+    "body.size": "body size",
+    "room.mix": "room",
+    "room.t60_s": "reverberation time",
+    "level_db": "level",
+}
+
+
+def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """Of the values of the same fields of `Choices` before and after a step; "" where nothing changed."""
+    changed = [name for name in after if before[name] != after[name]]
+    if "patch" in changed:
+        return _of_patch(before["patch"], after["patch"])
+    if "preset" in changed:
+        return f"preset {after['preset']}"
+    return _together([words for name, words in CHOICES.items() if name in changed])
+
+
+def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
+    """Which fields a change turned: `names` of `Choices`, and within a patch that stays the same one its own."""
+    found = set(names)
+    old, new = before.get("patch"), after.get("patch")
+    if "patch" in found and old is not None and new is not None and old.name == new.name:
+        found |= {f"patch.{field}" for field in _changed(old, new)}
+    return frozenset(found)
+
+
+def _of_patch(before: Patch | None, after: Patch | None) -> str:
+    if after is None:
+        return "no patch"
+    if before is None:
+        return f"patch {after.name}"
+    fields = list(_changed(before, after))
+    if "name" in fields and len(fields) > 1:
+        return f"patch {after.name}"
+    if "macros" in fields:
+        turned = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
+        return _together(turned or ["macros"])
+    return _together([PATCH.get(field, field.rpartition(".")[2].replace("_", " ")) for field in fields])
+
+
+def _changed(before: BaseModel, after: BaseModel, path: str = "") -> Iterator[str]:
+    """The paths of fields that differ, parts of the same kind looked into but for strings."""
+    for name in type(after).model_fields:
+        old, new = getattr(before, name), getattr(after, name)
+        if old == new:
+            continue
+        if isinstance(new, BaseModel) and type(old) is type(new) and name != "strings":
+            yield from _changed(old, new, f"{path}{name}.")
+        else:
+            yield f"{path}{name}"
+
+
+def _together(words: list[str]) -> str:
+    words = list(dict.fromkeys(words))
+    return SEVERAL if len(words) > MOST_NAMED else " and ".join(words)

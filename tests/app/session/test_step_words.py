@@ -1,0 +1,122 @@
+"""Steps of undo in plain words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from app.patches.library import SHIPPED, read_patch
+from app.patches.patch import ASSIGNABLE, Body, Patch, TuningChoice
+from app.session.choices import Session
+from app.session.history import RECORDED, History
+from app.session.instrument import choices_of
+from app.session.step_words import SEVERAL, step_words
+
+
+@pytest.fixture(scope="module")
+def guitar() -> Patch:
+    return read_patch(SHIPPED / "classical_guitar.json")
+
+
+@pytest.fixture(scope="module")
+def harp() -> Patch:
+    return read_patch(SHIPPED / "concert_harp.json")
+
+
+def words(before: Patch | None, after: Patch | None) -> str:
+    return step_words({"patch": before}, {"patch": after})
+
+
+def with_part(patch: Patch, **parts: Any) -> Patch:
+    return Patch.model_validate({**dict(patch), **parts})
+
+
+def test_fields_of_a_patch(guitar: Patch, harp: Patch) -> None:
+    assert words(guitar, guitar) == ""
+    assert words(guitar, harp) == f"patch {harp.name}"
+    assert words(None, guitar) == "patch Classical guitar"
+    assert words(guitar, with_part(guitar, name="Mine")) == "name of the patch"
+    assert words(guitar, guitar.with_value("knobs.stiffness", 2.0)) == "stiffness"
+    assert words(guitar, guitar.with_value("pluck.position", 0.31)) == "pluck position"
+    assert words(guitar, with_part(guitar, body=Body(name="mine", mix=guitar.body.mix))) == "body"
+    scale = "! a\n!\nhalves\n 2\n!\n 600.\n 2/1\n"
+    assert words(guitar, with_part(guitar, tuning=TuningChoice(scale=scale))) == "scale"
+    assert words(guitar, with_part(guitar, strings=harp.strings)) == "strings"
+    two = guitar.with_values({"knobs.stiffness": 2.0, "level_db": -3.0})
+    assert words(guitar, two) == "stiffness and level"
+    assert words(guitar, two.with_value("knobs.gauge", 2.0)) == SEVERAL
+
+
+def test_whatever_a_knob_turns_has_words_without_marks(guitar: Patch) -> None:
+    for field in ASSIGNABLE:
+        if field == "pickup.points.1":
+            continue
+        value = guitar.value(field)
+        for turned in (0.9 * value + 0.011, 0.9 * value - 0.011):
+            try:
+                told = words(guitar, guitar.with_value(field, turned))
+            except ValueError:
+                continue
+            assert told and "_" not in told and "." not in told, field
+
+
+def test_a_macro_is_told_by_its_name(guitar: Patch) -> None:
+    target = {"field": "knobs.decay", "low": 1.0, "high": 3.0}
+    patch = with_part(guitar, macros=({"name": "Damp", "value": 0.5, "targets": (target,)},))
+    assert words(patch, patch.turned(0, 0.9)) == "Damp"
+
+
+def test_choices_of_the_pluck() -> None:
+    start = {"position": 0.3, "amplitude_mm": 2.0, "preset": "a", "string": None, "width": 0.1}
+    assert step_words(start, {**start, "position": 0.5}) == "pluck position"
+    assert step_words(start, {**start, "position": 0.5, "amplitude_mm": 4.0}) == "pluck position and amplitude"
+    assert step_words(start, {**start, "preset": "b"}) == "preset b"
+    every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"patch"}}
+    assert all(told and "_" not in told for told in every.values()), every
+
+
+def test_history_names_the_next_step_each_way(guitar: Patch, harp: Patch) -> None:
+    session = Session()
+    clock = iter(range(1000))
+    history = History(session, lambda: float(next(clock)))
+    assert (history.undo_words, history.redo_words) == ("", "")
+    session.update(**choices_of(guitar))
+    session.update(**choices_of(harp))
+    session.update(patch=harp.with_value("knobs.decay", 3.0))
+    session.play(position=0.2)
+    session.update(position=0.5)
+    found = []
+    while history.undo_words:
+        found.append(history.undo_words)
+        history.undo()
+        assert history.redo_words == found[-1]
+    assert found == ["pluck position", "decay", f"patch {harp.name}", "patch Classical guitar"]
+    history.redo()
+    assert (history.undo_words, history.redo_words) == ("patch Classical guitar", f"patch {harp.name}")
+
+
+def test_a_drag_that_came_back_is_not_told(guitar: Patch) -> None:
+    session = Session()
+    history = History(session)
+    session.update(seconds=2.0)
+    history.hold()
+    session.update(position=0.6)
+    session.update(position=0.35)
+    history.let_go()
+    assert history.undo_words == "duration"
+
+
+def test_two_knobs_of_a_patch_are_two_steps_however_quick_and_notches_of_one_are_one(guitar: Patch) -> None:
+    session = Session()
+    history = History(session, lambda: 0.0)
+    session.update(patch=guitar)
+    for field, value in (("knobs.decay", 2.0), ("knobs.decay", 3.0), ("knobs.stiffness", 2.0)):
+        patch = session.choices.patch
+        assert patch is not None
+        session.update(patch=patch.with_value(field, value))
+    found = []
+    while history.undo_words:
+        found.append(history.undo_words)
+        history.undo()
+    assert found == ["stiffness", "decay", "patch Classical guitar"]

@@ -1,0 +1,48 @@
+"""The menu says what would be undone, and the key what was."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QToolTip
+from pytestqt.qtbot import QtBot
+
+from app.window.controller import Controller
+
+CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
+
+
+def actions(controller: Controller) -> list[QAction]:
+    menu = controller.window.menu
+    menu.aboutToShow.emit()
+    return [action for action in menu.actions() if action.text().startswith(("Undo", "Redo"))]
+
+
+def test_the_menu_names_both_steps_and_takes_them(controller: Controller) -> None:
+    assert [(each.text(), each.isEnabled()) for each in actions(controller)] == [
+        ("Undo\tCtrl+Z", False),
+        ("Redo\tCtrl+Shift+Z", False),
+    ]
+    controller.patches.choose("classical_guitar")
+    controller.session.update(position=0.77)
+    undo, redo = actions(controller)
+    assert undo.text() == "Undo: pluck position\tCtrl+Z"
+    undo.trigger()
+    assert controller.session.choices.position != 0.77
+    undo, redo = actions(controller)
+    assert undo.text() == "Undo: patch Classical guitar\tCtrl+Z"
+    assert (redo.text(), redo.isEnabled()) == ("Redo: pluck position\tCtrl+Shift+Z", True)
+    redo.trigger()
+    assert controller.session.choices.position == 0.77
+
+
+def test_the_key_says_what_it_has_done(qtbot: QtBot, controller: Controller) -> None:
+    qtbot.waitUntil(controller.window.isActiveWindow, timeout=5_000)
+    controller.session.update(width=0.2)
+    for modifiers, told in (
+        (CONTROL, "Undone: pluck width"),
+        (CONTROL, "Nothing to undo"),
+        (CONTROL | SHIFT, "Done again: pluck width"),
+    ):
+        qtbot.keyClick(controller.window, Qt.Key.Key_Z, modifiers)
+        assert QToolTip.text() == told
