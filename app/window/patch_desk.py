@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QUrl, Signal
@@ -28,7 +29,7 @@ from app.patches.library import (
     rename_patch,
     save_patch,
 )
-from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet, TuningChoice
+from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice
 from app.patches.tuning import SCALA_FILES, read_scala
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
 from app.playing.playback import Playback
@@ -41,15 +42,19 @@ from app.views.instrument.patch_browser import PatchBrowser
 from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
+from engine.plain_text import one_line
 from engine.presets import PresetError, PresetInfo, load_preset
+from engine.presets.of_string import of_string, read_string
 from engine.resonators.family import inharmonicity
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
+MANY_STRINGS = "studio_any_string"
 RECORDED = "WAV and MIDI (*.wav)"
-MIDI_FILES = (".mid", ".midi")
-TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 PLACES = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
+MIDI_FILES = (".mid", ".midi")
+STRING_FILE = ".toml"
+TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
 
 
 class PatchDesk(QObject):
@@ -246,16 +251,31 @@ class PatchDesk(QObject):
         self._panel.bar.show_comparing(entry is not None)
 
     def take_file(self, file: Path) -> None:
-        """One of TAKEN_FILES that was dropped: a patch is chosen, a MIDI file played, a scale or a mapping tunes."""
+        """One of TAKEN_FILES that was dropped: a patch or a string is chosen, a MIDI file played, a scale tunes."""
         try:
             if file.suffix.lower() in MIDI_FILES:
                 self._playback.play(read_midi(file))
             elif file.suffix.lower() in SCALA_FILES:
                 self._tune(file)
+            elif file.suffix.lower() == STRING_FILE:
+                self._take_string(file)
             else:
                 self._session.update(**choices_of(read_patch(file)))
-        except (MidiFileError, PatchError, ValueError) as error:
-            self.told.emit(str(error))
+        except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
+            self.told.emit(one_line(str(error)))
+
+    def _take_string(self, file: Path) -> None:
+        """A string by its physical parameters is plucked, by the model of many strings."""
+        many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
+        if many is None:
+            self.told.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
+            return
+        string = read_string(file)
+        of_string(load_preset(many.path), string)  # it can be plucked
+        self._session.update(preset=many.name, string=PhysicalString(**asdict(string)))
+        outside = many.info.family.outside(string) if many.info.family is not None else []
+        beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""
+        self.told.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
 
     def _tune(self, file: Path) -> None:
         """The patch by a Scala file. Of a scale and a mapping that do not go together, the new one stays."""

@@ -9,19 +9,17 @@ Enter, Escape     close
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, MutableSequence, Sequence
 from html import escape
 
-from PySide6.QtCore import QEvent, QModelIndex, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QModelIndex, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QApplication,
     QFrame,
     QGridLayout,
     QHBoxLayout,
     QHeaderView,
-    QLineEdit,
     QScrollArea,
     QTreeWidget,
     QTreeWidgetItem,
@@ -32,38 +30,31 @@ from app.presets.filter import PresetFilter
 from app.presets.heard_words import heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
+from app.views.controls.browser import KEYS, MOVES, Browser
 from app.views.controls.parts import combo_box, tool_button
 from app.views.controls.plain import Label
 from app.views.dialogs.preset_card import preset_card
 
-_KEYS = Qt.Key
-_MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
 _STAR, _TITLE, _RATE, _ERROR, _HEARD = range(5)
 _HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}
 _HINT = "Type to search   ·   ↑ ↓ load   ·   Space plucks   ·   Ctrl+D favourite   ·   Enter closes"
 
 
-class PresetBrowser(QFrame):
+class PresetBrowser(Browser):
     """Shows what it is given; hidden at first."""
+
+    list: QTreeWidget
 
     filter_changed = Signal(object)  # PresetFilter
     preset_chosen = Signal(str)
     favourite_asked = Signal(str)  # to be one, or no longer
     pluck_asked = Signal()
     folder_asked = Signal()
-    opened = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("browser")
-        self.setAccessibleName("Preset browser")
-        self._entries: list[PresetEntry] = []
-        self._rows: list[QTreeWidgetItem] = []  # of the entries, without the headings
-        self._before: QWidget | None = None  # had the keyboard
-        self.search = QLineEdit(placeholderText="Search presets")
-        self.search.setAccessibleName("Search presets")
-        self.search.setToolTip("Words in any order, separated by spaces or commas")
-        self.search.setClearButtonEnabled(True)
+        super().__init__("preset", "Words in any order, separated by spaces or commas", parent)
+        self._entries: Sequence[PresetEntry] = ()
+        self._rows: MutableSequence[QTreeWidgetItem] = []  # of the entries, without the headings
         self.search.textChanged.connect(self._tell_filter)
         self._strings = combo_box(
             "String", [("All strings", ""), ("Linear", "linear"), ("With pitch glide", "nonlinear")]
@@ -90,11 +81,7 @@ class PresetBrowser(QFrame):
         self._state = Label()
         self._state.setObjectName("faint")
         self._lay_out()
-        for widget in (self.search, self.list):
-            widget.installEventFilter(self)
-        if parent is not None:
-            parent.installEventFilter(self)
-        self.hide()
+        self.watch_keys()
 
     def _build_list(self) -> QTreeWidget:
         made = QTreeWidget()
@@ -172,7 +159,7 @@ class PresetBrowser(QFrame):
                 box.setCurrentIndex(max(0, box.findData(chosen)))
 
     def show_entries(
-        self, entries: list[PresetEntry], favourites: Collection[str], chosen: str, total: int, folder: str
+        self, entries: Sequence[PresetEntry], favourites: Collection[str], chosen: str, total: int, folder: str
     ) -> None:
         """The presets that passed the filter, of `total`; `folder` is where the user's own lie."""
         self._entries = entries
@@ -226,24 +213,8 @@ class PresetBrowser(QFrame):
 
     # What is asked
 
-    def show_over(self) -> None:
-        """Opens with the keyboard in the search."""
-        self._before = QApplication.focusWidget()
-        self.opened.emit()
-        self._place()
-        self.show()
-        self.raise_()
-        self.search.setFocus()
-        self.search.selectAll()
-        if (item := self.list.currentItem()) is not None:
-            self.list.scrollToItem(item)
-
-    def dismiss(self) -> None:
-        self.hide()
-        if self._before is not None and self._before.isVisible():
-            self._before.setFocus()
-        if not self._entries:  # next and previous would lead nowhere
-            self.clear_filter()
+    def lists_any(self) -> bool:
+        return bool(self._entries)
 
     def clear_filter(self) -> None:
         """All presets are listed again; told once."""
@@ -283,51 +254,17 @@ class PresetBrowser(QFrame):
 
     # Keys and place
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self.parent():
-            if event.type() == QEvent.Type.Resize and self.isVisible():
-                self._place()
-            return False
-        if not isinstance(event, QKeyEvent):
-            return False
-        if event.type() == QEvent.Type.ShortcutOverride:
-            if self._is_ours(watched, event) or (event.text() and event.text().isprintable()):
-                event.accept()  # the window's own keys rest meanwhile
-                return True
-        elif event.type() == QEvent.Type.KeyPress:
-            if self._is_ours(watched, event):
-                self._press(event)
-                return True
-            typed = event.key() == _KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
-            if watched is self.list and typed:
-                self.search.setFocus()
-                return QApplication.sendEvent(self.search, event)
-        return False
-
-    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
-        control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
-        if event.key() == _KEYS.Key_D:
-            return control
-        if event.key() == _KEYS.Key_Space and watched is self.search and self._search_begun():
-            return False
-        keys = (_KEYS.Key_Return, _KEYS.Key_Enter, _KEYS.Key_Escape, _KEYS.Key_Space, *_MOVES)
-        return event.key() in keys and not control
-
-    def _search_begun(self) -> bool:
-        """Something is in it that the next letter will not replace."""
-        return self.search.selectedText() != self.search.text()
-
-    def _press(self, event: QKeyEvent) -> None:
-        key = _KEYS(event.key())
-        if key in _MOVES:
+    def press(self, event: QKeyEvent) -> None:
+        key = KEYS(event.key())
+        if key in MOVES:
             self._move(key)
-        elif key == _KEYS.Key_Space:
+        elif key == KEYS.Key_Space:
             self.pluck_asked.emit()
-        elif key == _KEYS.Key_D:
+        elif key == KEYS.Key_D:
             if name := self._current_name():
                 self.favourite_asked.emit(name)
         else:
-            if key != _KEYS.Key_Escape and not self._current_name() and self._entries:
+            if key != KEYS.Key_Escape and not self._current_name() and self._entries:
                 self.preset_chosen.emit(self._entries[0].name)
             self.dismiss()
 
@@ -336,13 +273,12 @@ class PresetBrowser(QFrame):
         if rows == 0:
             return
         self.list.setFocus()  # where Space plucks
-        page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
-        step = {_KEYS.Key_Up: -1, _KEYS.Key_Down: 1, _KEYS.Key_PageUp: -page, _KEYS.Key_PageDown: page}[key]
+        step = self.step(key)
         here = self._row_of(self._current_name())
         row = here + step if here >= 0 else (0 if step > 0 else rows - 1)
         self._mark(min(max(row, 0), rows - 1))
 
-    def _place(self) -> None:
+    def place(self) -> None:
         """Under the bar of the presets; what moves the string and the sound stays in sight."""
         parent = self.parentWidget()
         if parent is not None:

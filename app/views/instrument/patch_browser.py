@@ -12,15 +12,12 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QApplication,
-    QFrame,
     QGridLayout,
     QHBoxLayout,
-    QLineEdit,
     QListWidget,
     QListWidgetItem,
     QPushButton,
@@ -29,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.views import theme
+from app.views.controls.browser import KEYS, MOVES, Browser
 from app.views.controls.parts import combo_box, label, tool_button
 from app.views.controls.plain import Label, plain_tip
 from app.views.instrument.playable import note_name
@@ -36,17 +34,16 @@ from app.views.instrument.playable import note_name
 if TYPE_CHECKING:
     from app.patches.library import PatchEntry
 
-_KEYS = Qt.Key
-_MOVES = (_KEYS.Key_Up, _KEYS.Key_Down, _KEYS.Key_PageUp, _KEYS.Key_PageDown)
-_CLOSES = (_KEYS.Key_Return, _KEYS.Key_Enter, _KEYS.Key_Escape)
 _HINT = "Type to search   ·   ↑ ↓ load and play   ·   Space plays   ·   Ctrl+D favourite   ·   Enter closes"
 _NAME = Qt.ItemDataRole.UserRole
 REST_MS = 160  # an arrow key that is held down loads, and plays when it rests
 DELETE, REALLY = "Delete", "Delete it for good?"
 
 
-class PatchBrowser(QFrame):
+class PatchBrowser(Browser):
     """Shows what it is given; hidden at first."""
+
+    list: QListWidget
 
     chosen = Signal(str)  # the name of an entry: to be loaded
     audition_asked = Signal(str)  # to be heard
@@ -56,23 +53,15 @@ class PatchBrowser(QFrame):
     folder_asked = Signal()
     file_dropped = Signal(str)  # the path of a .json
     listed_changed = Signal()
-    opened = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("browser")
-        self.setAccessibleName("Patch browser")
+        super().__init__("patch", "Words in any order: name, category, description, author", parent)
         self.setAcceptDrops(True)
         self._entries: dict[str, PatchEntry] = {}
         self._favourites: Collection[str] = ()
         self._chosen = ""
-        self._before: QWidget | None = None  # had the keyboard
         self._rest = QTimer(self, interval=REST_MS, singleShot=True)
         self._rest.timeout.connect(self._audition)
-        self.search = QLineEdit(placeholderText="Search patches")
-        self.search.setAccessibleName("Search patches")
-        self.search.setToolTip("Words in any order: name, category, description, author")
-        self.search.setClearButtonEnabled(True)
         self.search.textChanged.connect(self._filter)
         self._category = combo_box("Category", [("All categories", "")])
         self._category.setToolTip("Show only patches of this category")
@@ -93,11 +82,7 @@ class PatchBrowser(QFrame):
         self.list.itemClicked.connect(lambda item: self._rest.start() if _name_of(item) else None)
         self.list.itemDoubleClicked.connect(lambda item: self.dismiss() if _name_of(item) else None)
         self._lay_out()
-        for widget in (self.search, self.list):
-            widget.installEventFilter(self)
-        if parent is not None:
-            parent.installEventFilter(self)
-        self.hide()
+        self.watch_keys()
 
     def _lay_out(self) -> None:
         close = tool_button("✕", "Close the browser", "Close (Escape)")
@@ -271,25 +256,12 @@ class PatchBrowser(QFrame):
 
     # What is asked
 
-    def show_over(self) -> None:
-        """Opens with the keyboard in the search."""
-        self._before = QApplication.focusWidget()
-        self.opened.emit()
-        self._place()
-        self.show()
-        self.raise_()
-        self.search.setFocus()
-        self.search.selectAll()
-        if (item := self.list.currentItem()) is not None:
-            self.list.scrollToItem(item)
-
     def dismiss(self) -> None:
         self._rest.stop()
-        self.hide()
-        if self._before is not None and self._before.isVisible():
-            self._before.setFocus()
-        if not self.listed:  # next and previous would lead nowhere
-            self.clear_filter()
+        super().dismiss()
+
+    def lists_any(self) -> bool:
+        return bool(self.listed)
 
     def _row_changed(self, item: QListWidgetItem | None) -> None:
         if name := _name_of(item):
@@ -314,46 +286,17 @@ class PatchBrowser(QFrame):
 
     # Keys, drops and place
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self.parent():
-            if event.type() == QEvent.Type.Resize and self.isVisible():
-                self._place()
-            return False
-        if not isinstance(event, QKeyEvent):
-            return False
-        if event.type() == QEvent.Type.ShortcutOverride:
-            if self._is_ours(watched, event) or (event.text() and event.text().isprintable()):
-                event.accept()  # the window's own keys rest meanwhile
-                return True
-        elif event.type() == QEvent.Type.KeyPress:
-            if self._is_ours(watched, event):
-                self._press(event)
-                return True
-            typed = event.key() == _KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
-            if watched is self.list and typed:
-                self.search.setFocus()
-                return QApplication.sendEvent(self.search, event)
-        return False
-
-    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
-        control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
-        if event.key() == _KEYS.Key_D:
-            return control
-        if event.key() == _KEYS.Key_Space and watched is self.search:
-            return not control and self.search.selectedText() == self.search.text()  # nothing is being written
-        return event.key() in (*_CLOSES, _KEYS.Key_Space, *_MOVES) and not control
-
-    def _press(self, event: QKeyEvent) -> None:
-        key = _KEYS(event.key())
-        if key in _MOVES:
+    def press(self, event: QKeyEvent) -> None:
+        key = KEYS(event.key())
+        if key in MOVES:
             self._move(key)
-        elif key == _KEYS.Key_Space:
+        elif key == KEYS.Key_Space:
             self._audition()
-        elif key == _KEYS.Key_D:
+        elif key == KEYS.Key_D:
             self._tell(self.favourite_asked)
         else:
             listed = self.listed
-            if key != _KEYS.Key_Escape and listed and self._chosen not in listed:
+            if key != KEYS.Key_Escape and listed and self._chosen not in listed:
                 self._mark(listed[0])
             self.dismiss()
 
@@ -362,8 +305,7 @@ class PatchBrowser(QFrame):
         if not listed:
             return
         self.list.setFocus()  # where Space plays
-        page = max(1, self.list.viewport().height() // max(1, self.list.sizeHintForRow(0)) - 1)
-        step = {_KEYS.Key_Up: -1, _KEYS.Key_Down: 1, _KEYS.Key_PageUp: -page, _KEYS.Key_PageDown: page}[key]
+        step = self.step(key)
         here = listed.index(self._chosen) + step if self._chosen in listed else (0 if step > 0 else len(listed) - 1)
         self._mark(listed[min(max(here, 0), len(listed) - 1)])
         self._rest.start()
@@ -379,7 +321,7 @@ class PatchBrowser(QFrame):
         for path in _patches(event):
             self.file_dropped.emit(path)
 
-    def _place(self) -> None:
+    def place(self) -> None:
         """Above the instrument, whose keys stay in sight and in reach."""
         parent = self.parentWidget()
         if parent is not None:

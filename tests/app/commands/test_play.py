@@ -27,3 +27,39 @@ def test_a_body_that_is_not_here_is_told_and_the_rest_is_played(
     assert "is played without its body: the body a cello is not here" in found.err
     sound, _ = soundfile.read(out)
     assert abs(sound).max() > 0.01
+
+
+EVENTS = [TimedEvent(0.0, NoteOn(57, 90)), TimedEvent(0.2, NoteOff(57))]
+
+
+def test_a_midi_file_is_played_by_model_and_truth_the_same_each_time(run, tmp_path: Path) -> None:
+    (tmp_path / "one.mid").write_bytes(midi_bytes(EVENTS))
+
+    def played(name: str, *more: str) -> bytes:
+        found = run("play", tmp_path / "one.mid", "--patch", "jazz_guitar", "--out", tmp_path / name, *more)
+        assert found.status == 0, found.err
+        return (tmp_path / name).read_bytes()[-20_000:]
+
+    assert played("a.wav") == played("b.wav")
+    played("truth.wav", "--source", "truth")
+    model, rate_hz = soundfile.read(tmp_path / "a.wav")
+    truth, _ = soundfile.read(tmp_path / "truth.wav")
+    assert rate_hz == 48_000
+    shortest = min(len(model), len(truth))
+    assert abs(model[:shortest] - truth[:shortest]).max() < 1e-4 * abs(truth).max()
+    assert 0.2 < len(model) / rate_hz < 20
+    assert abs(model[-480:]).max() < 1e-3
+
+
+def test_what_cannot_be_played_is_told_in_a_line(run, tmp_path: Path) -> None:
+    (tmp_path / "one.mid").write_bytes(midi_bytes(EVENTS))
+    out = tmp_path / "one.wav"
+    for arguments in (
+        (tmp_path / "none.mid", "--patch", "jazz_guitar", "--out", out),
+        (tmp_path / "one.mid", "--patch", "no such patch", "--out", out),
+        (tmp_path / "one.mid", "--patch", "jazz_guitar", "--out", tmp_path / "nowhere" / "one.wav"),
+    ):
+        found = run("play", *arguments)
+        assert found.status == 1
+        assert found.err.count("\n") == 1
+    assert not out.exists()

@@ -18,6 +18,7 @@ from app.patches.library import own_patches, read_patch
 from app.patches.patch import Patch
 from app.window.controller import Controller
 from engine.presets.finding import SHIPPED
+from engine.presets.of_string import STRINGS, read_string
 
 
 @pytest.fixture
@@ -142,6 +143,13 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     assert played.session.choices.patch == read_patch(harp)
     told: list[str] = []
     played.patches.told.connect(told.append)
+    played.take_file(STRINGS / "steel_g3.toml")
+    assert played.session.choices.string is not None
+    assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
+    assert "steel_g3.toml is plucked" in told.pop()
+    (tmp_path / "bad.toml").write_text("length_m = -1")
+    played.take_file(tmp_path / "bad.toml")
+    assert "bad.toml" in told.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
     played.take_file(tmp_path / "bad.mid")
     assert "bad.mid" in told[0]
