@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
 from app.playing.keyboard import KeyPress, place_of, semitone_of
 
+LEAVE_MS = 20  # a release is told so much later: X11 repeats a key that is held by releases and presses
+REPEAT_MS = 5  # between these two
 _WRITING = (QLineEdit, QAbstractSpinBox, QPlainTextEdit, QTextEdit)
 _HELD = (
     Qt.KeyboardModifier.ControlModifier
@@ -36,6 +38,9 @@ class PlayingKeys(QObject):
         self._watched: QWidget | None = None
         self.piano = False
         self._down: dict[int, KeyPress] = {}  # by Qt's key, or the platform's code
+        self._leaving: dict[int, int] = {}  # keys that were let go just now, and when, in ms of the platform's clock
+        self._leave = QTimer(self, interval=LEAVE_MS, singleShot=True)
+        self._leave.timeout.connect(self._let_go)
         window.installEventFilter(self)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
@@ -56,9 +61,8 @@ class PlayingKeys(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.WindowDeactivate:
-            for press in (*self._down.values(),):
-                self.released.emit(press)
-            self._down.clear()
+            self._leaving = dict.fromkeys(self._down, 0)
+            self._let_go()
             return False
         if not isinstance(event, QKeyEvent):
             return False
@@ -70,17 +74,32 @@ class PlayingKeys(QObject):
         notes = (semitone_of(press) if self.piano else place_of(press)) is not None
         if not notes and (watched is not self._window or not press.letter):
             return False
+        number = _number(event)
+        repeats = number in self._leaving and event.timestamp() - self._leaving[number] <= REPEAT_MS
+        if repeats and event.nativeScanCode():
+            del self._leaving[number]  # it repeats by itself, which a busy Qt does not tell
+            event.accept()
+            return notes
         if not event.isAutoRepeat():
-            self._down[_number(event)] = press
+            self._let_go()
+            self._down[number] = press
             self.pressed.emit(press)
         event.accept()
         return notes
 
+    def _let_go(self) -> None:
+        """Keys that have not come back."""
+        leaving, self._leaving = self._leaving, {}
+        for number in leaving:
+            if (press := self._down.pop(number, None)) is not None:
+                self.released.emit(press)
+
     def _release(self, event: QKeyEvent) -> bool:
-        press = self._down.pop(_number(event), None)
+        press = self._down.get(_number(event))
         if press is None:
             return False
-        self.released.emit(press)
+        self._leaving[_number(event)] = event.timestamp()
+        self._leave.start()
         return (semitone_of(press) if self.piano else place_of(press)) is not None
 
 

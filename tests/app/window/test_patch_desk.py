@@ -56,7 +56,7 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
     (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
     assert not struck.damped
     qtbot.keyRelease(played.window, Qt.Key.Key_A)
-    assert struck.damped
+    qtbot.waitUntil(lambda: struck.damped, timeout=5_000)
 
 
 def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:

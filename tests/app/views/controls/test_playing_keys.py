@@ -57,3 +57,34 @@ def test_a_key_that_is_held_down_is_told_once_and_shortcuts_are_not_notes(
         QApplication.sendEvent(window, repeated)
     qtbot.keyClick(window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
     assert heard == ["S"]
+
+
+def native(kind: QEvent.Type, time_ms: int) -> QKeyEvent:
+    """As X11 gives it: with the key's code and the server's time."""
+    event = QKeyEvent(kind, Qt.Key.Key_S, Qt.KeyboardModifier.NoModifier, 39, 0, 0, "s")
+    event.setTimestamp(time_ms)
+    return event
+
+
+def test_a_repetition_that_looks_like_a_release_and_a_press_is_neither(qtbot: QtBot, window: QWidget) -> None:
+    keys, told = PlayingKeys(window), list[str]()
+    keys.pressed.connect(lambda press: told.append("down"))
+    keys.released.connect(lambda press: told.append("up"))
+    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
+    for time_ms in (1_660, 1_700, 1_740):
+        QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, time_ms))
+        QApplication.sendEvent(window, native(QEvent.Type.KeyPress, time_ms))
+    qtbot.wait(60)
+    assert told == ["down"]
+    QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 2_000))
+    qtbot.waitUntil(lambda: told == ["down", "up"], timeout=2_000)
+
+
+def test_a_key_struck_fast_again_is_let_go_first(window: QWidget) -> None:
+    keys, told = PlayingKeys(window), list[str]()
+    keys.pressed.connect(lambda press: told.append("down"))
+    keys.released.connect(lambda press: told.append("up"))
+    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
+    QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_030))
+    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_042))
+    assert told == ["down", "up", "down"]
