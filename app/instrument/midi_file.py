@@ -59,7 +59,10 @@ def read_midi(path: Path) -> list[TimedEvent]:
     found: list[TimedEvent] = []
     time_s, messages = 0.0, 0
     try:
-        for message in mido.MidiFile(file=io.BytesIO(raw)):
+        song = mido.MidiFile(file=io.BytesIO(raw))
+        if song.ticks_per_beat < 1:  # mido reads a count of frames as a negative number
+            raise MidiFileError(f"{path}: counts frames, not beats (SMPTE); save it with ticks a beat")
+        for message in song:
             time_s, messages = time_s + message.time, messages + 1
             if messages > MOST_EVENTS or not time_s <= LONGEST_S:
                 told = f"more than {MOST_EVENTS} messages" if messages > MOST_EVENTS else "more than an hour of music"

@@ -67,10 +67,10 @@ class Live:
         with self._lock:
             self._ear = ear
             player = self._player
+            self._wish_effects(patch)
             if patch is None:
                 self._player = None
                 return
-            self._wish_effects(patch)
             self._note_down(PatchTurned(patch))
             if player is not None and player.patch.preset == patch.preset:
                 try:
@@ -134,7 +134,7 @@ class Live:
             if self._player is not None:
                 self._wish_effects(self._player.patch)
 
-    def _wish_effects(self, patch: Patch) -> None:
+    def _wish_effects(self, patch: Patch | None) -> None:
         """In the background: to make an impulse response takes milliseconds. The latest wish counts."""
         wish = self._wished = object()
         dry = self._dry
@@ -142,11 +142,11 @@ class Live:
         def work() -> None:
             if wish is not self._wished:
                 return
-            effects = None if dry else effects_of(patch)
+            effects = None if dry or patch is None else effects_of(patch)
             if effects != self._effects:
                 self._effects = effects
                 self._set_effects(effects)
-            problem, told = body_problem(patch), self._told_body
+            problem, told = body_problem(patch) if patch is not None else "", self._told_body
             self._told_body = problem
             if problem and problem != told:
                 self._report(problem, "")

@@ -24,11 +24,15 @@ from app.export.files import ExportError, SoundRequest
 from app.export.recipe import Recipe, RecipeError, read_recipe, request_of
 from app.export.sampled.store import SampleIndex, StoredSample, read_index
 from app.export.wav import WavSettings
+from app.instrument.bodies import own_bodies
+from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, list_patches, read_patch
 from app.patches.patch import TuningChoice
 from app.patches.tuning import Tuning, read_scala
-from app.presets.library import list_presets
+from app.presets.library import Library, list_presets
+from app.window.dropped_files import receive
 from app.window.settings import Settings, load_settings
 from engine.effects import Body, Effects
 from engine.pluck import Pluck
@@ -239,6 +243,24 @@ def scala_or_bytes(whole: bytes, draw: random.Random) -> bytes:
     return "\n".join(lines).encode()
 
 
+def song(path: Path) -> None:
+    """Reads a MIDI file, and writes what it says."""
+    events = read_midi(path)
+    assert all(0 <= each.time_s <= LONGEST_S for each in events) and len(events) <= MOST_EVENTS
+    for each in events:
+        if isinstance(each.event, Bend):
+            assert -1 <= each.event.value <= 1
+    midi_bytes(events)
+
+
+SONG = midi_bytes(
+    [
+        *(TimedEvent(0.1 * n, NoteOn(40 + n, 90, n % 3)) for n in range(12)),
+        *(TimedEvent(0.1 * n + 0.05, Bend(n / 12, n % 3)) for n in range(12)),
+        *(TimedEvent(0.1 * n + 0.3, NoteOff(40 + n, n % 3)) for n in range(12)),
+        TimedEvent(0.2, Controller(64, 127)),
+    ]
+)
 PATCH = min(PATCHES.glob("*.json"))
 SCALE = b"! a.scl\n!\nfifths and thirds\n 5\n!\n 9/8\n 386.3\n 3/2\n 5/3\n 2/1\n"
 KEYMAP = b"7\n0\n127\n60\n69\n440.0\n12\n0\n2\n4\n5\n7\n9\n11\n"
@@ -291,6 +313,7 @@ TARGETS = (
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
     Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
     Target("index.json", sample_index, read_index, (ExportError,), json_or_bytes),
+    Target("song.mid", lambda p: SONG, song, (MidiFileError,)),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),
     Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),
@@ -333,6 +356,26 @@ def test_recipes(of: str, small_preset: Path, tmp_path: Path, rounds: int, seed:
             in_one_line(error, path)
 
     attacked(f"recipes of {of}", rounds // 4, seed, attack)
+
+
+def test_what_is_dropped(
+    small_preset: Path, tmp_path: Path, rounds: int, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sound is a recipe's, a body, or told: the reader that a file is given to is chosen by what is in it."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    library = Library([])
+    wholes = (wav(tmp_path, recipe_text(small_preset)), impulse(tmp_path, "WAV", "PCM_16"))
+    path = tmp_path / "dropped.wav"
+
+    def attack(draw: random.Random) -> None:
+        path.write_bytes(damaged_bytes(draw.choice(wholes), draw))
+        dropped = receive(path, library)
+        assert dropped.notice.isprintable() and len(dropped.notice) <= 600
+        assert dropped.body in ("", "dropped") or dropped.body.startswith("dropped_")
+        for body in own_bodies().glob("*"):
+            body.unlink()
+
+    attacked("dropped sounds", rounds // 16, seed, attack)
 
 
 def test_damage_depends_on_its_seed_alone() -> None:

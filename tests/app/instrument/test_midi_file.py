@@ -70,6 +70,7 @@ def test_what_strings_do_not_answer_is_left_out() -> None:
         (midi_bytes(PLAYED)[:40], "no MIDI file"),
         (midi_bytes([]), "no note"),
         (b"MThd\0\0\0\6\0\0\0\1\0\0MTrk\0\0\0\4\0\xff\x2f\0", "no"),
+        (midi_bytes(PLAYED)[:12] + b"\xe7\x28" + midi_bytes(PLAYED)[14:], "SMPTE"),  # its times were negative
         (midi_bytes([TimedEvent(4000.0, NoteOn(1, 1))]), "an hour"),
     ],
 )
