@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,7 +134,7 @@ class SampledPlan:
     def digest(self, zone: Zone) -> str:
         """Of all that decides how a zone's file sounds; names and descriptions do not."""
         told = {
-            "patch": self._heard,
+            "patch": self.patch.model_dump(mode="json", exclude=UNHEARD_FIELDS),
             "preset": self.preset_sha256,
             **({"body": self.body_sha256} if self.body_sha256 else {}),
             "source": self.source,
@@ -144,10 +143,6 @@ class SampledPlan:
             "version": program_version(),
         }
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
-
-    @cached_property
-    def _heard(self) -> dict[str, Any]:
-        return self.patch.model_dump(mode="json", exclude=UNHEARD_FIELDS)
 
     def _key_spans(self) -> list[tuple[int, int]]:
         low, high = self.key_range
