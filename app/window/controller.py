@@ -48,6 +48,7 @@ from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
+from app.window.sampled_export import SampledExport
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
@@ -145,6 +146,9 @@ class Controller(QObject):
             window.transport.export, lambda: (self.library.entries, self.session.choices, self._settings.export)
         )
         self.dragged.told.connect(window.notices.tell)
+        self.sampled = SampledExport(self.session, self.library, settings.sampled, window)
+        self.sampled.told.connect(window.notices.tell)
+        window.sampled_asked.connect(self.sampled.open)
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -312,6 +316,7 @@ class Controller(QObject):
         self._deck_timer.stop()
         self.dragged.close()
         self.keeper.close()
+        self.sampled.close()
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:
@@ -324,6 +329,7 @@ class Controller(QObject):
         return self._settings.model_copy(
             update={
                 "choices": self.session.choices,
+                "sampled": self.sampled.choices,
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.appearance.look,
@@ -357,6 +363,7 @@ class Controller(QObject):
             panel.choices_changed(names)
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
+        self.sampled.choices_changed(names)
         if "volume_db" in names:
             self.sound.set_volume_db(choices.volume_db)
         self._wake()

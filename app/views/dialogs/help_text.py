@@ -44,7 +44,11 @@ TOUR = (
         "Ctrl+P browses the presets, the most accurate sound first; a preset file dropped on the window is "
         "added to your own. Ctrl+T is a blind test: can you tell model and truth apart?",
     ),
-    ("Export", "Ctrl+E saves WAV files that store their settings. Drop one on the window to restore them."),
+    (
+        "Export",
+        "Ctrl+E saves WAV files that store their settings. Drop one on the window to restore them. Ctrl+Shift+E "
+        "exports the patch as an instrument for samplers.",
+    ),
 )
 
 GESTURES = (
