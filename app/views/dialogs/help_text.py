@@ -116,6 +116,13 @@ MODELS = (
     ),
 )
 
+FAULTS = (
+    "What nobody expected is shown in one dialog, whose text can be copied into a report. The window goes on where "
+    "it can; what was chosen is kept.",
+    "The same text is in the log, with the version and the system; where compiled code ended the program, a file "
+    "beside it that ends in .crash tells where each thread was. Please send both. The log is here:",
+)
+
 CITATION = (
     "R. Diaz, C. De La Vega Martin and M. Sandler, “Towards Efficient Modelling of String Dynamics: A Comparison "
     "of State Space and Koopman based Deep Learning Methods”, Proceedings of the 27th International Conference "
