@@ -112,7 +112,8 @@ MODELS = (
     (
         "FRNN",
         "The same Fourier convolutions in a plain recurrent cell without gates, several layers a step. Each step "
-        "adds a map of every point to the convolution; small errors feed on through the recurrence.",
+        "adds a map of every point to the convolution; small errors feed on through the recurrence, and may hum on "
+        "softly, some 60 dB below full scale, where the string has long been silent.",
     ),
 )
 
