@@ -26,6 +26,7 @@ from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices, Session
 from app.session.history import History
 from app.session.slots import missing_presets
+from app.shared.log import log_file
 from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
@@ -283,7 +284,8 @@ class Controller(QObject):
     def show_help(self) -> None:
         if self._help is None:
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
-            self._help = HelpDialog([*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)], views, self.window)
+            keys = [*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)]
+            self._help = HelpDialog(keys, views, log_file(), self.window)
         self._help.show()
         self._help.raise_()
 
