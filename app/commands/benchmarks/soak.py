@@ -247,7 +247,7 @@ class _User(QObject):
             tuple(controller.library.names),
             tuple(panel.key for panel in LEFT),
             tuple(panel.key for panel in RIGHT),
-            tuple(entry.patch for entry in list_patches()[0]),
+            tuple(e.patch for e in list_patches()[0] if controller.library.find(e.patch.preset) is not None),
         )
         self._timer = QTimer(self, interval=round(1000 * EVERY_S))
         self._timer.timeout.connect(self._act)
