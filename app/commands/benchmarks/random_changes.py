@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
+from app.patches.patch import Patch, PhysicalString, StringSet
 from app.session.choices import SPEED_RANGE, Choices
+from app.session.instrument import choices_of
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
 
@@ -18,16 +20,24 @@ HIGHEST_SOLO = 10
 
 @dataclass(frozen=True)
 class Repertoire:
-    """What there is to choose from: names of presets, keys of views."""
+    """What there is to choose from: names of presets, keys of views, patches."""
 
     presets: tuple[str, ...]
     left_views: tuple[str, ...]
     right_views: tuple[str, ...]
+    patches: tuple[Patch, ...] = ()
 
 
 def random_change(random: Random, choices: Choices, repertoire: Repertoire) -> Mapping[str, Any]:
     """One field of `Choices`, or those of a slot, with another value."""
     return random.choice(_CHANGES)(random, choices, repertoire)
+
+
+def _strings(patch: Patch) -> list[PhysicalString | None]:
+    found = patch.strings
+    if isinstance(found, StringSet):
+        return [None, *(each.string for each in found.strings)]
+    return [None, found.string]
 
 
 def _held(random: Random, repertoire: Repertoire) -> str:
@@ -59,4 +69,9 @@ _CHANGES: tuple[_Change, ...] = (
     lambda r, c, of: {"right_view": r.choice(of.right_views)},
     lambda r, c, of: {"motion": not c.motion},
     lambda r, c, of: {"envelope": not c.envelope},
+    lambda r, c, of: choices_of(r.choice(of.patches)) if of.patches else {},
+    lambda r, c, of: {"octave": r.randint(-4, 4)},
+    lambda r, c, of: {"velocity": r.randint(1, 127)},
+    lambda r, c, of: {"keys_play": r.choice(("pitch", "place"))},
+    lambda r, c, of: {"string": None if c.patch is None else r.choice(_strings(c.patch))},
 )

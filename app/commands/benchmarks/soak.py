@@ -48,6 +48,7 @@ from app.commands.benchmarks.play.recording import recording_aside
 from app.commands.benchmarks.play.sound_server import RATE_HZ, sound_server
 from app.commands.benchmarks.random_changes import Repertoire, random_change
 from app.commands.benchmarks.stage import Stage, opened
+from app.patches.library import list_patches
 from app.session.choices import Choices
 from app.window.main_window import MainWindow
 from app.window.panels.rack import LEFT, RIGHT
@@ -246,6 +247,7 @@ class _User(QObject):
             tuple(controller.library.names),
             tuple(panel.key for panel in LEFT),
             tuple(panel.key for panel in RIGHT),
+            tuple(entry.patch for entry in list_patches()[0]),
         )
         self._timer = QTimer(self, interval=round(1000 * EVERY_S))
         self._timer.timeout.connect(self._act)

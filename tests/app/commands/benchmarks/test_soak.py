@@ -17,9 +17,11 @@ from PySide6.QtCore import qWarning
 
 from app.commands.benchmarks.random_changes import Repertoire, random_change
 from app.commands.benchmarks.soak import PROGRAMS, _holes, collected_faults
+from app.patches.library import list_patches
 from app.session.choices import Choices, Session
 
-REPERTOIRE = Repertoire(("first", "second"), ("spectrum", "partials"), ("waveform", "compare"))
+PATCHES = tuple(entry.patch for entry in list_patches()[0][:3])
+REPERTOIRE = Repertoire(("first", "second"), ("spectrum", "partials"), ("waveform", "compare"), PATCHES)
 
 
 RUN = """
