@@ -3,7 +3,7 @@
 
 python3 run.py                 open the app
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
-python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones
+python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
 python3 run.py setup           only prepare
 python3 run.py -- render ...   the command line: everything after -- goes to learned-strings
 

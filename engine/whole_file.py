@@ -18,16 +18,29 @@ def whole_file(path: Path) -> Iterator[Path]:
     What a process that was killed has left of the same file is removed first.
 
     Raises:
-        OSError: the folder is not there or cannot be written, or the disk is full.
+        OSError: the folder is not there or cannot be written, or the disk is full; it names `path`.
     """
-    stem = f".{path.name[:100]}.{zlib.crc32(platform.node().encode()):08x}"
+    stem = f".{path.name[:100]}.{this_computer()}"
     _remove_left_over(path.parent, stem)
     unfinished = path.with_name(f"{stem}-{os.getpid()}.unfinished")
     try:
-        yield unfinished
-        unfinished.replace(path)
+        with naming(path):
+            yield unfinished
+            unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Within, an OSError of the system's names what was to be written: of a full disk it names no file at all."""
+    try:
+        yield
+    except OSError as error:
+        nobodys = error.filename is None or ".unfinished" in str(error.filename)
+        if error.errno is not None and nobodys:
+            error.filename = str(path)
+        raise
 
 
 def _remove_left_over(folder: Path, stem: str) -> None:
@@ -36,11 +49,17 @@ def _remove_left_over(folder: Path, stem: str) -> None:
     with suppress(OSError):
         for name in os.listdir(folder):  # noqa: PTH208 - names alone: the folder may be large
             found = pattern.fullmatch(name)
-            if found and not _is_alive(int(found[1])):
+            if found and not is_alive(int(found[1])):
                 (folder / name).unlink(missing_ok=True)
 
 
-def _is_alive(process: int) -> bool:
+def this_computer() -> str:
+    """In a name, what tells processes of this computer from those of others."""
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def is_alive(process: int) -> bool:
+    """Whether there is such a process on this computer."""
     import psutil  # only where something was left
 
     return bool(psutil.pid_exists(process))

@@ -27,7 +27,7 @@ from engine.excitation import (
 from engine.metrics import ErrorSums, RelativeError
 from engine.presets import Preset, PresetInfo, TrainedRange, load_preset, save_preset
 from engine.schema import read, write
-from engine.whole_file import whole_file
+from engine.whole_file import naming, whole_file
 from training import provenance
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
@@ -292,7 +292,7 @@ class TrainingLog:
         if not self._trimmed:
             self._keep_before(progress.epoch)
             self._trimmed = True
-        with self.path.open("a", newline="", encoding="utf-8") as file:
+        with naming(self.path), self.path.open("a", newline="", encoding="utf-8") as file:
             csv.writer(file).writerow(_row(progress))
 
     def _keep_before(self, epoch: int) -> None:

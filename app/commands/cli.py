@@ -6,10 +6,12 @@ environment variable LEARNED_STRINGS_DEBUG set, the traceback comes before it), 
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -33,6 +35,7 @@ from app.commands import (
 )
 from app.commands.console import say, use_any_output
 from app.shared.thread_priority import wait_asleep
+from app.shared.whole_file import explain
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
 NAME = "learned-strings"
@@ -115,6 +118,10 @@ def describe(error: Exception) -> str:
     if isinstance(error, ImportError) and error.name:
         return f"this needs {error.name}, which cannot be imported ({error}); install it, or use another command"
     if isinstance(error, OSError):
+        if error.filename and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
+            return explain(Path(os.fsdecode(error.filename)), error)
+        if error.errno is None and str(error):  # of this program's own words
+            return str(error)
         place = f"{error.filename}: " if error.filename else ""
         return f"{place}{error.strerror or error}; check the path, its permissions and the free space"
     if isinstance(error, MemoryError):

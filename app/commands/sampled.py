@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from app.commands.console import Failure, progress, say
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from app.export.sampled.plan import SampledPlan
-    from app.patches.patch import Patch
 
 ASKED_ABOVE_BYTES = 2**30
 
@@ -51,8 +44,9 @@ def sampled(
 
     An export that was stopped goes on with the same command: whole samples are kept while the patch is the same.
     """
-    from app.export.sampled.job import export_sampled, planned
+    from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
+    from app.export.sampled.words import counted, largest_bytes, megabytes, notes
     from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
@@ -88,41 +82,22 @@ def sampled(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     size = largest_bytes(plan, soundfont)
-    words = f"{_counted(plan)}, at most {_megabytes(size)}"
+    words = f"{counted(plan)}, at most {megabytes(size)}"
     if size_only:
         print(f"{out}: {words}")
         return
     if size > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
     say(words)
-    from app.instrument.offline import render_note
     from engine.presets import load_preset
 
-    preset = load_preset(preset_path)
-
-    def render(
-        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
-    ) -> NDArray[np.float32]:
-        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source)
-
+    render = note_renderer(load_preset(preset_path), source)
     with progress("sampled") as report:
         made = export_sampled(plan, out, render, progress=report)
-    if chosen.room.mix > 0 and not chosen.damping.let_ring:
-        say("note: a key that is let go ends the room's tail as well; --dry leaves the room to the sampler")
-    if made.cut:
-        say(f"note: {made.cut} samples still rang after {seconds:g} s and were faded out")
-    if abs(made.gain_db) >= 0.05:
-        words = "softer than the patch, so that no note clips"
-        if made.gain_db > 0:
-            words = "louder than the patch, at the full level of 16 bits"
-        say(f"note: all of it is {abs(made.gain_db):.1f} dB {words}")
+    for note in notes(plan, made, "--dry leaves"):
+        say(f"note: {note}")
     kept = made.samples - made.rendered
-    print(f"{out}: {made.rendered} samples rendered, {kept} kept, {_megabytes(made.size_bytes)}")
-
-
-def largest_bytes(plan: SampledPlan, soundfont: bool) -> int:
-    """Of what is written, at most; a SoundFont of 16 bits has its samples beside it until it is whole."""
-    return plan.largest_bytes * (16 + 24 if soundfont else int(plan.bits)) // int(plan.bits)
+    print(f"{out}: {made.rendered} samples rendered, {kept} kept, {megabytes(made.size_bytes)}")
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:
@@ -132,14 +107,3 @@ def _keys(text: str | None) -> tuple[int, int] | None:
     if not found:
         raise typer.BadParameter(f"must be two MIDI keys as in 40-76, not {text!r}", param_hint="--keys")
     return int(found[1]), int(found[2] or found[1])
-
-
-def _counted(plan: SampledPlan) -> str:
-    zones = plan.zones
-    keys, layers = len({zone.key for zone in zones}), plan.layers
-    between = "" if plan.every == 1 else f", each for {plan.every} keys"
-    return f"{len(zones)} samples ({keys} keys{between}, {layers} velocity layers)"
-
-
-def _megabytes(size: int) -> str:
-    return f"{size / 1e6:,.0f} MB" if size >= 1e7 else f"{size / 1e6:.1f} MB"

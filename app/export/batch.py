@@ -1,7 +1,7 @@
 """A batch: positions × amplitudes × presets × strings × sources, a WAV file each, and an index of them as CSV.
 
-A batch that was stopped goes on where it was: a file that is there with the same recipe is kept. The index is written
-anew after every pluck, so it is never behind the files.
+A batch that was stopped goes on where it was: a file that is there with the same recipe and has its row is kept. The
+index is written anew after every pluck; files that a kill left without their rows are made again, as they were.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import soundfile
 
 from app.export.batch_index import INDEX, BatchIndex, BatchRow
 from app.export.files import ExportError, WavReport, default_file_name, export_sounds, settings_of
@@ -217,10 +216,8 @@ def _kept(
         return replace(
             row, message=f"{path}: there is another sound of this name; overwrite it, or choose another folder"
         )
-    if (former := index.rows.get(row.file)) is not None and former.status != "failed":
-        return replace(former, status="kept")
-    with soundfile.SoundFile(path) as file:
-        return replace(row, status="kept", seconds=file.frames / file.samplerate)
+    former = index.rows.get(row.file)
+    return None if former is None or former.status == "failed" else replace(former, status="kept")
 
 
 def _essence(recipe: Recipe) -> dict[str, object]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 PROGRAM = "Learned Strings"
 
 
+@cache
 def program_version() -> str:
     """The installed version; "development" where the source runs without being installed."""
     try:

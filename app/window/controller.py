@@ -26,6 +26,7 @@ from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices, Session
 from app.session.history import History
 from app.session.slots import missing_presets
+from app.shared.log import log_file
 from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
@@ -48,6 +49,7 @@ from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
+from app.window.sampled_export import SampledExport
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
@@ -145,6 +147,9 @@ class Controller(QObject):
             window.transport.export, lambda: (self.library.entries, self.session.choices, self._settings.export)
         )
         self.dragged.told.connect(window.notices.tell)
+        self.sampled = SampledExport(self.session, self.library, settings.sampled, window)
+        self.sampled.told.connect(window.notices.tell)
+        window.sampled_asked.connect(self.sampled.open)
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -279,7 +284,8 @@ class Controller(QObject):
     def show_help(self) -> None:
         if self._help is None:
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
-            self._help = HelpDialog([*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)], views, self.window)
+            keys = [*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)]
+            self._help = HelpDialog(keys, views, log_file(), self.window)
         self._help.show()
         self._help.raise_()
 
@@ -312,6 +318,7 @@ class Controller(QObject):
         self._deck_timer.stop()
         self.dragged.close()
         self.keeper.close()
+        self.sampled.close()
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:
@@ -324,6 +331,7 @@ class Controller(QObject):
         return self._settings.model_copy(
             update={
                 "choices": self.session.choices,
+                "sampled": self.sampled.choices,
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.appearance.look,
@@ -357,6 +365,7 @@ class Controller(QObject):
             panel.choices_changed(names)
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
+        self.sampled.choices_changed(names)
         if "volume_db" in names:
             self.sound.set_volume_db(choices.volume_db)
         self._wake()

@@ -52,6 +52,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("M", "motion_asked", "show or hide the string's motion"),
     ("N", "envelope_asked", "show or hide the envelope of the motion"),
     ("Ctrl+E", "export_asked", "export WAV"),
+    ("Ctrl+Shift+E", "sampled_asked", "export the patch as an instrument for samplers (SFZ, SoundFont)"),
     ("Ctrl+T", "abx_asked", "blind listening test (ABX)"),
     ("Ctrl+,", "audio_asked", "audio settings"),
     ("F8", "notices_asked", "notices since the start"),
@@ -93,6 +94,7 @@ class MainWindow(QMainWindow):
     motion_asked = Signal()
     envelope_asked = Signal()
     export_asked = Signal()
+    sampled_asked = Signal()
     abx_asked = Signal()
     audio_asked = Signal()
     notices_asked = Signal()

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from app.analysis.abx.choices import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
+from app.export.sampled.choices import SampledChoices
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.look import Look
@@ -46,6 +47,7 @@ class Settings(BaseModel):
     version: Literal[1] = 1
     choices: Choices = Choices()
     export: ExportChoices = ExportChoices()
+    sampled: SampledChoices = SampledChoices()
     abx: AbxChoices = AbxChoices()
     device: DeviceChoice | None = None
     sound: SoundChoice = SoundChoice()

@@ -64,7 +64,10 @@ def save_preset(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
     text = json.dumps(write(info), allow_nan=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished:
-        save_file(tensors, unfinished, metadata={METADATA_KEY: text})
+        try:
+            save_file(tensors, unfinished, metadata={METADATA_KEY: text})
+        except SafetensorError as error:  # its words for a full disk
+            raise OSError(f"{path}: cannot be written ({error}); free some space, or choose another disk") from error
         unfinished.chmod(0o644)
 
 

@@ -25,6 +25,7 @@ from torch import Tensor
 from engine.excitation import DRAWS
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
+from engine.whole_file import naming
 from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
 
 CHUNK = 50  # trajectories a step of the progress
@@ -157,15 +158,16 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
     """Writes into another folder that is renamed when it is whole; the caller holds the lock."""
     unfinished = folder.with_suffix(".unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
-    unfinished.mkdir()
     try:
-        facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
-        facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", progress)
-        values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
-        facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
-        del values  # an open mapping would hold the folder on Windows
-        (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
-        unfinished.rename(folder)
+        with naming(folder):
+            unfinished.mkdir()
+            facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
+            facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", progress)
+            values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
+            facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
+            del values  # an open mapping would hold the folder on Windows
+            (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
+            unfinished.rename(folder)
         progress(configuration.count, configuration.count)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from pathlib import Path
 
@@ -34,8 +35,10 @@ def true_motion(plucked: PluckedString, rate_hz: int, steps: int, cache: Path | 
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         motion = solve(plucked, rate_hz, steps).float().numpy()
-        with whole_file(file) as unfinished, unfinished.open("wb") as opened:
-            np.save(opened, motion)
+        buffer = io.BytesIO()  # what NumPy writes itself fails without the system's reason
+        np.save(buffer, motion)
+        with whole_file(file) as unfinished:
+            unfinished.write_bytes(buffer.getbuffer())
     try:
         motion = np.load(file)
     except (ValueError, EOFError) as error:

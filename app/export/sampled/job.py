@@ -8,16 +8,24 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import soundfile
 
 from app.export.files import ExportError
-from app.export.sampled.plan import NoteRenderer, SampledPlan
+from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
-from app.export.sampled.store import SampledProgress, SampleStore
-from app.export.sound import Cancelled
+from app.export.sampled.store import INDEX, SampledProgress, SampleStore, read_index
+from app.export.sound import Cancelled, ExportCancelled
 from app.shared.whole_file import WriteError, explain, whole_file
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from app.patches.patch import Patch
+    from engine.presets import Preset
 
 SUFFIXES = (".sfz", ".sf2")
 LONGEST_STEM = 60
@@ -33,6 +41,7 @@ class SampledReport:
         cut: samples that still rang at their end, and were faded out.
         gain_db: what all of it is louder than the patch: an SFZ is softer where a note would clip, a SoundFont is
             raised to full level.
+        peak_db: of its loudest note as a sampler plays it, in dB of full scale.
     """
 
     path: Path
@@ -41,6 +50,7 @@ class SampledReport:
     size_bytes: int
     cut: int
     gain_db: float
+    peak_db: float
 
 
 def plain_stem(text: str) -> str:
@@ -80,13 +90,18 @@ def export_sampled(
 
     Raises:
         ValueError: see `planned`.
-        ExportCancelled: `cancelled` said so; samples that are whole stay, for the next time.
+        ExportCancelled: `cancelled` said so; samples that are whole stay for the next time; without any, nothing.
         ExportError: a file cannot be written, or a note not rendered.
     """
     plan = planned(plan, out)
     store = SampleStore(sample_folder(out), out.name)
     with store.locked():
-        samples, rendered = store.fill(plan, render, progress, cancelled)
+        try:
+            samples, rendered = store.fill(plan, render, progress, cancelled)
+        except ExportCancelled:
+            if store.empty:
+                store.remove()
+            raise
         try:
             with whole_file(out) as file:
                 if out.suffix.lower() == ".sfz":
@@ -106,4 +121,32 @@ def export_sampled(
     if out.suffix.lower() == ".sf2":
         store.remove()
     cut = sum(sample.cut for sample in samples.values())
-    return SampledReport(out, len(samples), rendered, size, cut, gain_db)
+    loudest_db = max(sample.peak_db for sample in samples.values())
+    return SampledReport(out, len(samples), rendered, size, cut, gain_db, loudest_db + gain_db)
+
+
+def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
+    """Renders notes of a patch by its model, or by the solved string of the same keys."""
+    from app.instrument.offline import render_note  # compiled code, and torch
+
+    def rendered(
+        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
+    ) -> NDArray[np.float32]:
+        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source)
+
+    return rendered
+
+
+def kept_samples(plan: SampledPlan, out: Path) -> int:
+    """How many samples of a plan an export that was stopped has left, as its index tells.
+
+    Raises:
+        ValueError: see `planned`.
+        ExportError: there is an index that cannot be read.
+    """
+    plan = planned(plan, out)
+    index = read_index(sample_folder(out) / INDEX)
+    if index is None or index.instrument != out.name:
+        return 0
+    found = ((zone, index.samples.get(plan.file_name(zone))) for zone in plan.zones)
+    return sum(sample is not None and sample.made_from == plan.digest(zone) for zone, sample in found)

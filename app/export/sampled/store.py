@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.export.files import ExportError
 from app.export.sampled.plan import NoteRenderer, SampledPlan, Zone
-from app.export.sampled.sample import encoded, sample_of
+from app.export.sampled.sample import INAUDIBLE_DBFS, PEAK_DBFS, encoded, sample_of
 from app.export.sound import Cancelled, ExportCancelled
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
@@ -46,6 +46,11 @@ class StoredSample(BaseModel):
     gain_db: float = Field(ge=-200, le=200)
     level_db: float = Field(ge=-200, le=200)
     cut: bool = False
+
+    @property
+    def peak_db(self) -> float:
+        """As it was rendered, in dB of full scale."""
+        return PEAK_DBFS - self.gain_db if self.level_db > INAUDIBLE_DBFS else INAUDIBLE_DBFS
 
 
 class SampleIndex(BaseModel):
@@ -95,6 +100,10 @@ class SampleStore:
             yield
         finally:
             lock.release()
+
+    @property
+    def empty(self) -> bool:
+        return not self._index.samples
 
     def path(self, name: str) -> Path:
         return self.folder / name

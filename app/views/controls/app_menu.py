@@ -32,6 +32,7 @@ class AppMenu(QMenu):
             self.addAction(text): signal
             for text, signal in (
                 ("Instrument: keys and patch\tCtrl+K", "instrument_asked"),
+                ("Export instrument …\tCtrl+Shift+E", "sampled_asked"),
                 ("Audio settings …\tCtrl+,", "audio_asked"),
                 ("MIDI …\tCtrl+M", "midi_asked"),
                 ("Notices …\tF8", "notices_asked"),

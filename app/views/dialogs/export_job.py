@@ -14,9 +14,10 @@ from app.shared.thread_priority import Rank, step_back
 from engine.presets import PresetError
 from engine.sources import Runaway
 
-Tell = Callable[[float, str, float | None], None]  # share, what is done, seconds left where known
+Tell = Callable[..., None]  # share, what is done, seconds left (None: not known; left out: by share)
 Work = Callable[[Tell, Callable[[], bool]], object]  # is given `Tell` and whether it is cancelled
 TELL_EVERY_S = 0.05
+BY_SHARE = -1.0  # seconds left: as long a share as it took until now
 
 
 class ExportJob(QObject):
@@ -44,13 +45,13 @@ class ExportJob(QObject):
     def wait(self) -> None:
         self._thread.join()
 
-    def _tell(self, share: float, text: str = "", left_s: float | None = None) -> None:
+    def _tell(self, share: float, text: str = "", left_s: float | None = BY_SHARE) -> None:
         now_s = time.monotonic()
         if now_s - self._told_s < TELL_EVERY_S:
             return  # the window draws no faster
         self._told_s = now_s
-        if left_s is None and share > 0:
-            left_s = (now_s - self._started_s) * (1 - share) / share
+        if left_s == BY_SHARE:
+            left_s = (now_s - self._started_s) * (1 - share) / share if share > 0 else None
         self.progressed.emit(share, text, left_s)
 
     def _run(self) -> None:

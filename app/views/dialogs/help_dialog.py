@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QTabWidget, QTextBrowser, QVBoxLayout, QWidget
 
-from app.views.dialogs.help_text import GESTURES, MODELS, TOUR
+from app.views.dialogs.help_text import FAULTS, GESTURES, MODELS, TOUR
 
 Pairs = Iterable[tuple[str, str]]
 
@@ -18,9 +19,12 @@ class HelpDialog(QDialog):
     Args:
         keys: (key, what it does).
         views: (title, what it shows).
+        log: the file that faults are written to.
     """
 
-    def __init__(self, keys: Pairs, views: Sequence[tuple[str, str]], parent: QWidget | None = None) -> None:
+    def __init__(
+        self, keys: Pairs, views: Sequence[tuple[str, str]], log: Path, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Help")
         self.resize(680, 560)
@@ -35,6 +39,7 @@ class HelpDialog(QDialog):
             "<p>Every model is given the initial displacement of the string and computes the motion that follows.</p>"
             + _sections(MODELS),
         )
+        self._add("Faults", "<h3>When something goes wrong</h3>" + _paragraphs(FAULTS) + _path(log))
         close = QPushButton("Close", default=True)
         close.clicked.connect(self.accept)
         buttons = QHBoxLayout()
@@ -55,6 +60,14 @@ class HelpDialog(QDialog):
 
 def _items(pairs: Pairs) -> str:
     return "".join(f"<li style='margin-bottom: 8px'><b>{escape(a)}.</b> {escape(b)}</li>" for a, b in pairs)
+
+
+def _paragraphs(texts: Iterable[str]) -> str:
+    return "".join(f"<p>{escape(text)}</p>" for text in texts)
+
+
+def _path(path: Path) -> str:
+    return f"<p><code>{escape(str(path))}</code></p>"
 
 
 def _table(pairs: Pairs) -> str:

@@ -44,7 +44,11 @@ TOUR = (
         "Ctrl+P browses the presets, the most accurate sound first; a preset file dropped on the window is "
         "added to your own. Ctrl+T is a blind test: can you tell model and truth apart?",
     ),
-    ("Export", "Ctrl+E saves WAV files that store their settings. Drop one on the window to restore them."),
+    (
+        "Export",
+        "Ctrl+E saves WAV files that store their settings. Drop one on the window to restore them. Ctrl+Shift+E "
+        "exports the patch as an instrument for samplers.",
+    ),
 )
 
 GESTURES = (
@@ -112,8 +116,16 @@ MODELS = (
     (
         "FRNN",
         "The same Fourier convolutions in a plain recurrent cell without gates, several layers a step. Each step "
-        "adds a map of every point to the convolution; small errors feed on through the recurrence.",
+        "adds a map of every point to the convolution; small errors feed on through the recurrence, and may hum on "
+        "softly, some 60 dB below full scale, where the string has long been silent.",
     ),
+)
+
+FAULTS = (
+    "What nobody expected is shown in one dialog, whose text can be copied into a report. The window goes on where "
+    "it can; what was chosen is kept.",
+    "The same text is in the log, with the version and the system; where compiled code ended the program, a file "
+    "beside it that ends in .crash tells where each thread was. Please send both. The log is here:",
 )
 
 CITATION = (

@@ -141,6 +141,11 @@ def test_an_interruption_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (ModuleNotFoundError("No module named 'soxr'", name="soxr"), "this needs soxr"),
         (PermissionError(13, "Permission denied", "/x/y"), "/x/y: Permission denied; check the path"),
+        (
+            OSError(28, "No space left on device", "/x/y"),
+            "/x/y: cannot be written (No space left on device); free some",
+        ),
+        (OSError("/x/y: cannot be written; free some space"), "/x/y: cannot be written; free some space"),
         (MemoryError(), "not enough memory"),
         (KeyError("z"), "internal error: KeyError 'z'; set LEARNED_STRINGS_DEBUG=1"),
         (RuntimeError(), "internal error: RuntimeError"),

@@ -53,7 +53,7 @@ def test_a_soundfont_is_one_file(run, notes: list[tuple], folder: Path) -> None:
     assert found.status == 0
     assert [path.name for path in folder.iterdir()] == ["a.sf2"]
     assert {key for _, _, key, *_ in notes} == {61}
-    assert "2 samples (1 keys, each for 3 keys, 2 velocity layers)" in found.err
+    assert "2 samples (1 key, each for 3 keys, 2 velocity layers)" in found.err
 
 
 def test_format_and_bits(run, notes: list[tuple], folder: Path) -> None:

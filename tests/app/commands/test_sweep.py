@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import io
 import json
 from collections.abc import Callable, Iterator
@@ -13,7 +14,9 @@ import pytest
 
 from app.commands import sweep as command
 from app.commands.sweep import Board
+from app.shared.whole_file import REMEDIES
 from engine.metrics import RelativeError
+from tests.app.commands.conftest import FullDisk
 from training.cell import Cell, configuration_of
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
@@ -200,6 +203,19 @@ def test_files_of_other_machines_are_merged(run, tmp_path: Path) -> None:
     assert f"{there}: not a results file" in run("results", "merge", elsewhere, there, "--results", here).failure
     assert "does not exist" in run("results", "merge", tmp_path / "no.csv", "--results", here).usage
     assert here.read_bytes() == before
+
+
+@pytest.mark.parametrize("bytes_left", [0, 700])
+def test_a_full_disk_leaves_the_rows_as_they_were(run, tmp_path: Path, bytes_left: int, full_disk: FullDisk) -> None:
+    here, there = tmp_path / "here.csv", tmp_path / "there.csv"
+    add_rows(here, [row_of("a")])
+    add_rows(there, [row_of("b")])
+    before = here.read_bytes()
+    with full_disk(bytes_left):
+        told = run("results", "merge", there, "--results", here).failure
+    assert told == f"learned-strings: {here}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
+    assert here.read_bytes() == before
+    assert not list(tmp_path.glob("*.unfinished"))
 
 
 def test_rows_are_filled_from_presets(run, tmp_path: Path) -> None:

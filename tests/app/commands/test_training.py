@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,9 @@ import pytest
 import torch
 
 from app.presets.heard_words import heard_word
+from app.shared.whole_file import REMEDIES
 from engine.presets import load_preset, preset_digest
+from tests.app.commands.conftest import FullDisk
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
 
@@ -131,6 +135,21 @@ def test_a_data_set_is_described(run, place: Place) -> None:
     assert 0 < facts["tension_rise"]["median"] < facts["tension_rise"]["max"] < 1
     told = run("dataset", place.configuration, *place.cache)
     assert (told.status, facts["key"] in told.out, "tension rise" in told.out) == (0, True, True)
+
+
+@pytest.mark.parametrize("bytes_left", [0, 100, 15_000])
+def test_a_full_disk_leaves_no_half_data_set(run, place: Place, bytes_left: int, full_disk: FullDisk) -> None:
+    words = ["dataset", place.configuration, *place.cache]
+    run(*words)
+    (made,) = (path for path in (place.folder / "cache" / "datasets").iterdir() if path.is_dir())
+    whole = {path.name: path.read_bytes() for path in made.iterdir()}
+    shutil.rmtree(made)
+    with full_disk(bytes_left):
+        told = run(*words).failure
+    assert told == f"learned-strings: {made}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
+    assert [path.suffix for path in made.parent.iterdir()] == [".lock"]
+    assert run(*words).status == 0
+    assert {path.name: path.read_bytes() for path in made.iterdir()} == whole
 
 
 @pytest.mark.parametrize("command", ["dataset", "train"])

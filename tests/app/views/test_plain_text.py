@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QLabel, QListWidget, QTextEdit, QTreeWidget, QWidg
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
+from app.export.sampled.choices import SampledChoices
 from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
@@ -24,6 +25,7 @@ from app.views.controls.readout import Readout
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.preset_browser import PresetBrowser
+from app.views.dialogs.sampled_dialog import SampledDialog
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
 from engine.presets import read_info
@@ -67,7 +69,9 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), PresetBrowser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
     dialog = ExportDialog([entry], Choices(preset=entry.name), export)
-    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
+    patch = read_patch(SHIPPED / "classical_guitar.json")
+    sampled = SampledDialog(patch, entry, SampledChoices(folder=str(tmp_path / EVIL)))
+    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog, sampled]
     for view in views:
         qtbot.addWidget(view)
     notices.tell(f"{EVIL}: tensor {EVIL} is unknown", EVIL)

@@ -6,6 +6,7 @@ import pytest
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
+from app.export.sampled.choices import SampledChoices
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.look import Look
@@ -17,6 +18,7 @@ def test_round_trip(tmp_path: Path) -> None:
     settings = Settings(
         choices=Choices(position=0.7, heard="b", b="difference", loop=True),
         export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
+        sampled=SampledChoices(folder="/music", form="sf2", keys=(40, 76), layers=8, dry=True),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         sound=SoundChoice(rate_hz=44_100, buffer=512),
         look=Look(face="light", size_percent=125),
@@ -48,6 +50,7 @@ def test_a_file_of_a_version_without_midi_is_read(tmp_path: Path) -> None:
         ('{"choices": {"position": 9}}', "choices.position"),
         ('{"colour": 1}', "colour"),
         ('{"midi": {"controllers": {"colour": 1}}}', "midi.controllers"),
+        ('{"sampled": {"layers": 1e30}}', "sampled.layers"),
         ('{"version": 2}', "version"),
     ],
 )

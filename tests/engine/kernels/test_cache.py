@@ -55,6 +55,29 @@ def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_no
     assert not Path(folder).exists()  # once the process has ended
 
 
+def test_what_a_killed_run_left_in_the_temporary_folder_goes_at_the_next_start(tmp_path: Path) -> None:
+    code = (
+        "import os; from pathlib import Path; from engine.kernels import cache;"
+        "cache._places = lambda: [Path('/dev/null/there')];"
+        "print(cache.folder().name, flush=True);"
+    )
+    killed = code + "os._exit(0)"  # as after a kill, nothing is tidied
+    first = told(killed, TMPDIR=str(tmp_path))
+    stem, _, _ = first.rpartition("-")
+    stem, _, _ = stem.rpartition("-")
+    alive = tmp_path / f"{stem}-{os.getpid()}-abcdefgh"
+    others = tmp_path / f"{stem.rpartition('-')[0]}-00000000-1-abcdefgh"  # of another computer
+    aside = tmp_path / "aside"
+    for folder in (alive, others, aside):
+        folder.mkdir()
+    (tmp_path / f"{stem}-999999999-abcdefgh").symlink_to(aside)
+    second = told(killed, TMPDIR=str(tmp_path))
+    kept = {path.name for path in tmp_path.iterdir() if path.name.startswith("learned-strings-kernels")}
+    assert kept == {second, alive.name, others.name, f"{stem}-999999999-abcdefgh"}
+    told(code, TMPDIR=str(tmp_path))
+    assert not (tmp_path / second).exists() and aside.is_dir()
+
+
 def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
     code = (
         "import tempfile; from pathlib import Path; from engine.kernels import cache;"

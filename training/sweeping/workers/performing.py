@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from training.fitting.fit import Progress
 
 TELL_EVERY_S = 1.0  # of a run's progress
+FAILURE = "failure.txt"  # in the run's folder: why it failed, in full
 _one_at_a_time = threading.Lock()  # a worker of several threads still trains one model: they would share its cores
 
 
@@ -34,11 +35,14 @@ def perform(plain: Mapping[str, Any], tell: Callable[[dict[str, Any]], None]) ->
         try:
             task = read(Task, plain, "task")
             folder = _runs(task) / task.name
-            return {"row": write(_train(task, folder, tell))}
+            row = _train(task, folder, tell)
+            with suppress(OSError):  # of an earlier try, or of a worker whose coordinator was killed
+                (folder / FAILURE).unlink(missing_ok=True)
+            return {"row": write(row)}
         except Exception as error:
             if folder is not None:
                 with suppress(OSError):
-                    folder.joinpath("failure.txt").write_text(traceback.format_exc(), encoding="utf-8")
+                    folder.joinpath(FAILURE).write_text(traceback.format_exc(), encoding="utf-8")
             _leave_if_broken(str(plain.get("device")))
             return {"error": " ".join(f"{type(error).__name__}: {error}".split())}
 

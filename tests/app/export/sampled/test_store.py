@@ -13,7 +13,7 @@ import pytest
 from filelock import FileLock
 
 from app.export.files import ExportCancelled, ExportError
-from app.export.sampled.job import export_sampled, sample_folder
+from app.export.sampled.job import export_sampled, kept_samples, sample_folder
 from app.export.sampled.plan import MOST_LAYERS, SampledPlan
 from app.export.sampled.store import INDEX, LOCK, SampleIndex, StoredSample, read_index
 from app.patches.patch import Patch
@@ -145,7 +145,31 @@ def test_cancelling_keeps_what_is_whole(kind: str, patch: Patch, render: Render,
     assert [share for share, _, _ in told] == [0.0, 0.1, 0.2, 0.3]
     assert told[0][1:] == ("key 50, velocity 63", None)
     assert [left_s is None for _, _, left_s in told] == [True, True, False, False]  # the first note also compiles
+    assert kept_samples(small(patch), out) == 4
+    assert kept_samples(SampledPlan(patch, (50, 53), layers=2, seconds=0.3), out) == 4
+    assert kept_samples(small(patch, source="truth"), out) == 0
+    assert kept_samples(small(patch), out.with_stem("b")) == 0
     assert export_sampled(small(patch), out, render).rendered == 6
+
+
+@KINDS
+def test_cancelled_before_a_whole_sample_nothing_is_left(
+    kind: str, patch: Patch, render: Render, tmp_path: Path
+) -> None:
+    with pytest.raises(ExportCancelled):
+        export_sampled(small(patch), tmp_path / f"a.{kind}", render, cancelled=lambda: True)
+    assert list(tmp_path.iterdir()) == []
+
+
+@KINDS
+def test_peak_and_gain_are_those_of_the_notes(kind: str, patch_of: Callable, render: Render, tmp_path: Path) -> None:
+    for level_db in (0.0, 12.0):
+        patch = patch_of(level_db=level_db)
+        report = export_sampled(small(patch), tmp_path / f"a{level_db:g}.{kind}", render)
+        loudest = max(np.abs(render(patch, key, 127, 0.3, 0.3, 48_000)).max() for key in range(50, 55))
+        assert report.peak_db - report.gain_db == pytest.approx(20 * np.log10(loudest), abs=0.02)
+        if kind == "sfz":
+            assert report.peak_db <= -0.98
 
 
 def test_a_folder_of_something_else_stays(patch: Patch, render: Render, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
+from app.shared.log import log_file
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.help_text import MODELS
 from app.window.about import about_text, library_versions
@@ -32,6 +33,7 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
     assert len(MODELS) == len(KNOWN_MODELS)
     for title, _ in MODELS:
         assert title in texts["Models"]
+    assert str(log_file()) in texts["Faults"]
     dialog.close()
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,9 @@ def test_a_damaged_data_cache_is_told(plan, task: Task, options: Options) -> Non
     assert f"{folder}: damaged data cache" in error and "delete" in error
     told = Path(task.runs or "") / task.group / task.name / "failure.txt"
     assert "Traceback" in told.read_text(encoding="utf-8")
+    shutil.rmtree(folder)
+    assert "row" in perform(write(task), lambda told: None)
+    assert not told.exists()  # it did not fail in the end
 
 
 def test_a_checkpoint_of_another_configuration_is_told(plan, task: Task, options: Options) -> None:

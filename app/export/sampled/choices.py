@@ -1,0 +1,29 @@
+"""What the dialog that exports an instrument was last set to."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampleBits, SampledSource
+from app.patches.patch import Key
+
+SampledForm = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
+
+
+class SampledChoices(BaseModel):
+    """The dialog's last state. Without `keys`, all of the patch's range."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    folder: str = ""
+    form: SampledForm = "flac"
+    bits: SampleBits = "24"
+    rate_hz: int = 48_000
+    keys: tuple[Key, Key] | None = None
+    every: int = Field(1, ge=1, le=WIDEST_STEP)
+    layers: int = Field(4, ge=1, le=MOST_LAYERS)
+    seconds: float = Field(8.0, ge=SECONDS_RANGE[0], le=SECONDS_RANGE[1])
+    source: SampledSource = "model"
+    dry: bool = False

@@ -1,0 +1,47 @@
+"""What an export of samples takes and what came of it, in words; the same on the command line and in the window."""
+
+from __future__ import annotations
+
+from app.export.sampled.job import SampledReport
+from app.export.sampled.plan import SampledPlan
+
+SMALLEST_TOLD_DB = 0.05
+
+
+def number_of(count: int, thing: str) -> str:
+    """As in 1 key, 2 keys."""
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def largest_bytes(plan: SampledPlan, soundfont: bool) -> int:
+    """Of what is written, at most; a SoundFont of 16 bits has its samples beside it until it is whole."""
+    return plan.largest_bytes * (16 + 24 if soundfont else int(plan.bits)) // int(plan.bits)
+
+
+def counted(plan: SampledPlan) -> str:
+    """How many samples, and of what."""
+    zones = plan.zones
+    keys = number_of(len({zone.key for zone in zones}), "key")
+    between = "" if plan.every == 1 else f", each for {plan.every} keys"
+    layers = number_of(plan.layers, "velocity layer")
+    return f"{number_of(len(zones), 'sample')} ({keys}{between}, {layers})"
+
+
+def megabytes(size: int) -> str:
+    return f"{size / 1e6:,.0f} MB" if size >= 1e7 else f"{size / 1e6:.1f} MB"
+
+
+def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
+    """What a musician should know of what was written. `dry`: what takes the room out, as in "--dry leaves"."""
+    told = []
+    if plan.patch.room.mix > 0 and not plan.patch.damping.let_ring:
+        told.append(f"a key that is let go ends the room's tail as well; {dry} the room to the sampler")
+    if report.cut:
+        rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "
+        told.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))
+    if abs(report.gain_db) >= SMALLEST_TOLD_DB:
+        why = "softer than the patch, so that no note clips"
+        if report.gain_db > 0:
+            why = "louder than the patch, at the full level of 16 bits"
+        told.append(f"all of it is {abs(report.gain_db):.1f} dB {why}")
+    return told

@@ -1,0 +1,350 @@
+"""The dialog that exports an instrument: what it says, writes, keeps when cancelled, and says when it cannot."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import soundfile
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QFileDialog
+from pytestqt.qtbot import QtBot
+
+from app.export.sampled.choices import SampledChoices
+from app.patches.library import find_patch
+from app.patches.patch import Patch
+from app.presets.library import PresetEntry, list_presets
+from app.views.dialogs.sampled_dialog import RESUMES, SampledDialog
+
+SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
+MADE = 3 * 2
+
+
+class Notes:
+    """In place of the instrument: decaying sines. Each note waits while `gate` is closed."""
+
+    def __init__(self) -> None:
+        self.rendered: list[tuple] = []
+        self.gate = threading.Event()
+        self.gate.set()
+        self.last = 10**6  # notes that pass before it closes by itself
+
+    def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source):
+        if len(self.rendered) >= self.last:
+            self.gate.clear()
+        assert self.gate.wait(20)
+        self.rendered.append((patch, key, velocity, seconds, rate_hz, source))
+        time_s = np.arange(round(seconds * rate_hz)) / rate_hz
+        sound = velocity / 127 * np.exp(-40 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
+        return np.stack([sound] * len(patch.pickup.points), axis=1).astype(np.float32)
+
+
+@pytest.fixture
+def notes(monkeypatch: pytest.MonkeyPatch) -> Iterator[Notes]:
+    made = Notes()
+    monkeypatch.setitem(sys.modules, "app.instrument.offline", SimpleNamespace(render_note=made.render_note))
+    yield made
+    made.gate.set()
+
+
+@pytest.fixture
+def patch() -> Patch:
+    return find_patch("Classical guitar").patch
+
+
+@pytest.fixture
+def preset(preset_folder: Path) -> PresetEntry:
+    return list_presets(preset_folder)[0][0]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    made = tmp_path / "instruments"
+    made.mkdir()
+    return made
+
+
+@pytest.fixture
+def made(
+    qtbot: QtBot, patch: Patch, preset: PresetEntry, notes: Notes, folder: Path
+) -> Iterator[Callable[..., SampledDialog]]:
+    dialogs = []
+
+    def make(**choices: object) -> SampledDialog:
+        remembered = SampledChoices.model_validate({"folder": str(folder), **SMALL, **choices})
+        dialog = SampledDialog(patch, preset, remembered)
+        dialogs.append(dialog)
+        qtbot.addWidget(dialog)
+        dialog.show()
+        return dialog
+
+    yield make
+    notes.gate.set()
+    for dialog in dialogs:
+        dialog.abandon()
+
+
+def run(qtbot: QtBot, dialog: SampledDialog, words: str) -> None:
+    dialog.save.click()
+    qtbot.waitUntil(lambda: words in dialog.state.text(), timeout=20_000)
+
+
+def test_an_sfz_is_written_as_it_was_told(
+    qtbot: QtBot, made, folder: Path, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = made(rate_hz=44_100, source="truth", form="wav", bits="16")
+    assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.size_text.text()
+    assert dialog.what.text().startswith(patch.name)
+    assert dialog.state.text() == RESUMES
+    run(qtbot, dialog, "Saved")
+    out = folder / "Classical_guitar.sfz"
+    assert f"Saved {out} (6 samples rendered, 0 kept" in dialog.state.text()
+    assert "peak -1.0 dBFS" in dialog.state.text()
+    assert "softer than the patch, so that no note clips" in dialog.state.text()
+    wanted = [(key, velocity, 0.2, 44_100, "truth") for key in (60, 61, 62) for velocity in (63, 127)]
+    assert [note[1:] for note in notes.rendered] == wanted
+    samples = sorted((folder / "Classical_guitar_samples").glob("*.wav"))
+    assert len(samples) == MADE
+    assert (soundfile.info(samples[0]).samplerate, soundfile.info(samples[0]).subtype) == (44_100, "PCM_16")
+    assert dialog.save.text() == "Replace"
+    opened: list[str] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or True)
+    dialog.show_folder.click()
+    assert opened == [str(folder)]
+
+
+def test_a_soundfont_is_one_file(qtbot: QtBot, made, folder: Path) -> None:
+    dialog = made()
+    dialog.form.form.setCurrentIndex(dialog.form.form.findData("sf2"))
+    assert not dialog.form.bits.isVisible()
+    run(qtbot, dialog, "Saved")
+    assert [path.name for path in folder.iterdir()] == ["Classical_guitar.sf2"]
+    assert "louder than the patch" in dialog.state.text() or "softer" in dialog.state.text()
+
+
+def test_size_follows_the_choices_and_nothing_is_written(made, folder: Path, notes: Notes) -> None:
+    dialog = made()
+    before = dialog.size_text.text()
+    dialog.form.layers.setValue(8)
+    assert "24 samples (3 keys, 8 velocity layers)" in dialog.size_text.text() != before
+    dialog.form.every.setValue(3)
+    assert "8 samples (1 key, each for 3 keys, 8 velocity layers)" in dialog.size_text.text()
+    dialog.form.highest.setValue(60)
+    dialog.form.every.setValue(1)
+    dialog.form.layers.setValue(1)
+    dialog.form.seconds.setValue(10)
+    assert dialog.size_text.text() == "1 sample (1 key, 1 velocity layer), at most 2.9 MB"
+    dialog.close_button.click()
+    assert not dialog.isVisible()
+    assert list(folder.iterdir()) == [] and notes.rendered == []
+
+
+def test_more_than_there_is_room_for_is_told(made, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.views.dialogs.sampled_dialog.disk_usage", lambda path: SimpleNamespace(free=100_000))
+    assert "; 0.1 MB are free there" in made().size_text.text()
+
+
+def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch) -> None:
+    assert patch.room.mix > 0
+    dialog = made(keys=(60, 60), layers=1)
+    run(qtbot, dialog, "Dry leaves the room to the sampler")
+    dialog.form.dry.setChecked(True)
+    run(qtbot, dialog, "1 sample rendered, 0 kept")
+    assert "the room" not in dialog.state.text()
+    assert [note[0].room.mix for note in notes.rendered] == [patch.room.mix, 0.0]
+
+
+def test_a_body_that_is_not_here_is_told(made, patch: Patch, preset: PresetEntry) -> None:
+    dialog = made()
+    gone = patch.model_copy(update={"body": patch.body.model_copy(update={"name": "gone", "mix": 0.5})})
+    dialog.show_patch(gone, preset)
+    assert "the body gone is not here" in dialog.what.text()
+
+
+def test_progress_is_shown_and_the_choices_wait(
+    qtbot: QtBot, made, notes: Notes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.views.dialogs.export_job.TELL_EVERY_S", 0.0)
+    notes.last = 3
+    dialog = made()
+    dialog.save.click()
+    assert not dialog.form.isEnabled()
+    assert not dialog.save.isEnabled()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3, timeout=20_000)
+    qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500, timeout=20_000)
+    assert "key 61, velocity 127, about " in dialog.state.text()
+    assert " s left. You can play on meanwhile." in dialog.state.text()
+    notes.last = 100
+    notes.gate.set()
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text(), timeout=20_000)
+    assert dialog.form.isEnabled()
+    assert dialog.bar.isHidden()
+
+
+@pytest.mark.parametrize("form", ["flac", "sf2"])
+def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Notes, folder: Path, form: str) -> None:
+    notes.last = 3
+    dialog = made(form=form)
+    dialog.save.click()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3, timeout=20_000)
+    assert dialog.close_button.text() == "Cancel"
+    dialog.close()  # as its cross does: it stays, to tell what was kept
+    assert dialog.isVisible()
+    notes.last = 100
+    notes.gate.set()
+    told = f"of {MADE} samples are kept; export again to go on from there"
+    qtbot.waitUntil(lambda: told in dialog.state.text(), timeout=20_000)
+    kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
+    assert kept == len(notes.rendered) < MADE
+    assert not dialog.form.out.exists()
+    assert dialog.save.text() == "Continue"
+    again = made(form=form)  # the window was started anew
+    assert f"{kept} of {MADE} samples are there already, and are kept" in again.state.text()
+    run(qtbot, again, f"{MADE - kept} samples rendered, {kept} kept")
+    assert len(notes.rendered) == MADE
+    assert again.form.out.is_file()
+
+
+def test_other_choices_have_nothing_to_go_on_from(qtbot: QtBot, made, notes: Notes) -> None:
+    dialog = made()
+    run(qtbot, dialog, "Saved")
+    dialog.form.path.setText(str(dialog.form.out))
+    assert dialog.save.text() == "Replace"
+    dialog.form.source.setCurrentIndex(1)
+    assert dialog.state.text() == RESUMES
+
+
+def test_cancelled_before_a_whole_sample_nothing_is_left(
+    qtbot: QtBot, made, notes: Notes, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded = threading.Event()
+    monkeypatch.setattr("app.views.dialogs.sampled_dialog.load_preset", lambda path: loaded.wait(20))
+    dialog = made()
+    dialog.save.click()
+    dialog.close_button.click()
+    loaded.set()
+    qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text(), timeout=20_000)
+    assert list(folder.iterdir()) == [] and notes.rendered == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda form, folder: form.lowest.setValue(63), "the lowest is above the highest"),
+        (lambda form, folder: edit(form, str(folder / "x.wav")), "must end with .sfz"),
+        (lambda form, folder: edit(form, ""), "choose where"),
+        (lambda form, folder: edit(form, str(folder / "nowhere" / "x.sfz")), "make the folder first"),
+        (lambda form, folder: (form.form.setCurrentIndex(2), form.rate.setCurrentIndex(2)), "a SoundFont's rate"),
+        (lambda form, folder: broken_index(form, folder), "no index of samples"),
+    ],
+)
+def test_what_cannot_be_is_told_before_it_begins(made, folder: Path, change: Callable, words: str) -> None:
+    dialog = made()
+    change(dialog.form, folder)
+    assert words in dialog.state.text()
+    assert dialog.state.objectName() == "warning"
+    assert not dialog.save.isEnabled()
+    assert dialog.size_text.text() == ""
+    edit(dialog.form, str(folder / f"y{dialog.form._suffix}"))
+    dialog.form.rate.setCurrentIndex(1)
+    dialog.form.lowest.setValue(60)
+    assert dialog.save.isEnabled()
+
+
+def edit(form, text: str) -> None:
+    form.path.setText(text)
+    form.path.textEdited.emit(text)
+
+
+def broken_index(form, folder: Path) -> None:
+    (folder / "b_samples").mkdir()
+    (folder / "b_samples" / "index.json").write_text("{}")
+    edit(form, str(folder / "b.sfz"))
+
+
+def test_an_error_of_the_work_is_one_line(qtbot: QtBot, made, notes: Notes, folder: Path) -> None:
+    (folder / "Classical_guitar_samples").mkdir()
+    (folder / "Classical_guitar_samples" / "mine.txt").write_text("mine")
+    dialog = made()
+    run(qtbot, dialog, "holds other files; remove it, or choose another name")
+    assert dialog.state.objectName() == "warning"
+    assert "\n" not in dialog.state.text()
+    assert dialog.save.isEnabled()
+    assert dialog.show_folder.isHidden()
+    assert notes.rendered == []
+
+
+def test_a_preset_that_is_gone_is_told(qtbot: QtBot, made, preset: PresetEntry) -> None:
+    dialog = made()
+    preset.path.unlink()
+    run(qtbot, dialog, preset.path.name)
+    assert dialog.state.objectName() == "warning"
+
+
+def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
+    dialog = made()
+    form = dialog.form
+    for box, data in ((form.form, "wav"), (form.bits, "16"), (form.rate, 44_100), (form.source, "truth")):
+        box.setCurrentIndex(box.findData(data))
+    form.every.setValue(2)
+    form.dry.setChecked(True)
+    choices = dialog.choices()
+    assert choices == SampledChoices(
+        folder=str(folder), form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
+    )
+    assert made(**choices.model_dump()).choices() == choices
+    assert json.loads(choices.model_dump_json())["keys"] == [60, 62]
+    whole = made(keys=None)
+    assert (whole.form.lowest.value(), whole.form.highest.value()) == patch.range
+    assert whole.choices().keys is None
+    assert made(keys=(0, 127)).choices().keys is None  # not of this patch
+
+
+def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
+    made, folder: Path, patch: Patch, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = made()
+    other = find_patch("Concert harp").patch
+    dialog.show_patch(other, preset)
+    assert dialog.form.out == folder / "Concert_harp.sfz"
+    assert dialog.what.text().startswith("Concert harp")
+    assert dialog.choices().keys == (60, 62)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *words: (str(folder / "mine"), words[-1]))
+    dialog.form._browse()
+    assert dialog.form.out == folder / "mine.sfz"
+    dialog.form.form.setCurrentIndex(2)
+    assert dialog.form.out == folder / "mine.sf2"
+    dialog.show_patch(patch, preset)
+    assert dialog.form.out == folder / "mine.sf2"
+
+
+def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
+    qtbot: QtBot, made, notes: Notes, patch: Patch, preset: PresetEntry
+) -> None:
+    notes.last = 1
+    dialog = made()
+    dialog.save.click()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 1, timeout=20_000)
+    dialog.show_patch(patch.with_value("knobs.decay", 3.0), preset)
+    notes.last = 100
+    notes.gate.set()
+    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text(), timeout=20_000)
+    assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}
+    run(qtbot, dialog, "Loading")
+    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text(), timeout=20_000)
+    assert notes.rendered[-1][0].knobs.decay == 3.0
+
+
+def test_every_control_of_the_dialog_has_a_name_and_a_tip(made) -> None:
+    dialog = made()
+    for kind in (QAbstractButton, QComboBox, QAbstractSpinBox):
+        for control in dialog.findChildren(kind):
+            assert control.accessibleName() or getattr(control, "text", lambda: "")(), control
+            assert control.toolTip(), control.accessibleName()
+    assert dialog.form.path.accessibleName() and dialog.form.path.toolTip()

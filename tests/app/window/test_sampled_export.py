@@ -1,0 +1,102 @@
+"""The patch exported from the window, which goes on playing."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import soundfile
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.export.sampled.choices import SampledChoices
+from app.patches.library import find_patch
+from app.session.instrument import choices_of
+from app.window.controller import Controller
+from app.window.settings import load_settings
+from engine.presets.finding import SHIPPED
+
+PATCH = "Classical guitar"
+
+
+@pytest.fixture
+def patched(controller: Controller, preset_folder: Path, tmp_path: Path) -> Controller:
+    """With a patch, and choices that are soon rendered."""
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
+    controller.library.refresh()
+    controller.sampled._choices = SampledChoices(folder=str(tmp_path), keys=(60, 61), layers=1, seconds=0.2)
+    controller.session.update(**choices_of(find_patch(PATCH).patch))
+    return controller
+
+
+def open_dialog(qtbot: QtBot, controller: Controller):
+    controller.window.activateWindow()
+    qtbot.keyClick(
+        controller.window, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    )
+    return controller.sampled.dialog
+
+
+def test_without_a_patch_it_says_so(controller: Controller) -> None:
+    controller.session.update(patch=None)
+    action = next(action for action in controller.window.menu.asked if action.text().startswith("Export instrument"))
+    action.trigger()
+    assert controller.sampled.dialog is None
+    assert "There is no patch to export" in controller.window.notices.kept[-1][0]
+
+
+def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Controller, tmp_path: Path) -> None:
+    dialog = open_dialog(qtbot, patched)
+    assert dialog.isVisible()
+    assert not dialog.isModal()
+    open_dialog(qtbot, patched)
+    assert patched.sampled.dialog is dialog
+    assert dialog.what.text().startswith(PATCH)
+    patched.session.update(**choices_of(find_patch("Concert harp").patch))
+    assert dialog.what.text().startswith("Concert harp")
+    qtbot.waitUntil(lambda: patched.performance.live.ready, timeout=20_000)
+    dialog.save.click()
+    qtbot.keyPress(patched.window, Qt.Key.Key_A)
+    assert patched.performance.live.sounding()
+    qtbot.keyRelease(patched.window, Qt.Key.Key_A)
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text(), timeout=60_000)
+    assert "Concert_harp.sfz" in dialog.state.text()
+    samples = sorted((tmp_path / "Concert_harp_samples").glob("*.flac"))
+    assert [path.name for path in samples] == ["key060_vel127.flac", "key061_vel127.flac"]
+    assert soundfile.info(samples[0]).frames == 9_600
+
+
+def test_what_was_chosen_is_remembered(qtbot: QtBot, patched: Controller, tmp_path: Path) -> None:
+    dialog = open_dialog(qtbot, patched)
+    dialog.form.layers.setValue(7)
+    assert patched.settings().sampled.layers == 7  # should the process be killed now
+    dialog.close()
+    assert patched.sampled.dialog is None
+    assert open_dialog(qtbot, patched).form.layers.value() == 7
+    patched.window.close()
+    remembered = load_settings(tmp_path / "settings.json")[0].sampled
+    assert (remembered.layers, remembered.keys, remembered.folder) == (7, (60, 61), str(tmp_path))
+
+
+def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def export(plan, out, render, progress, cancelled):
+        begun.set()
+        while not cancelled():
+            time.sleep(0.01)
+        ended.set()
+        raise ValueError("told to nobody")
+
+    monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
+    dialog = open_dialog(qtbot, patched)
+    dialog.save.click()
+    assert begun.wait(60)
+    patched.window.close()
+    assert ended.is_set()
+    QApplication.processEvents()
+    assert not [thread for thread in threading.enumerate() if thread.name == "export"]

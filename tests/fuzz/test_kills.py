@@ -1,0 +1,94 @@
+"""Any order of kill and rerun ends with the same files: works are killed at random moments, and begun again."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz import works
+from tests.fuzz.conftest import LONG
+
+KILLS = {  # 200 in all with `run.py test --fuzz`
+    "render": (2, 40),
+    "batch": (2, 40),
+    "dataset": (2, 30),
+    "train": (1, 20),
+    "train_lru": (1, 15),
+    "sweep": (0, 10),  # its workers load torch anew each time
+    "save_patches": (2, 20),
+    "save_many_settings": (2, 25),
+}
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs POSIX processes")
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[multiprocessing.context.BaseContext]:
+    """Processes whose parent has loaded all that they need, and holds nothing of this one."""
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
+    found = multiprocessing.get_context("forkserver")
+    found.set_forkserver_preload(["tests.fuzz.works"])
+    yield found
+    if before is None:
+        del os.environ["PYTHONPATH"]
+    else:
+        os.environ["PYTHONPATH"] = before
+
+
+def begun(context: multiprocessing.context.BaseContext, name: str, folder: Path) -> multiprocessing.Process:
+    process = context.Process(target=getattr(works, name), args=(folder,))  # type: ignore[attr-defined]
+    process.start()
+    return process
+
+
+def emptied(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+
+
+@pytest.mark.parametrize("name", works.WORKS)
+def test_a_killed_work_ends_as_if_it_had_not_been(
+    name: str, context: multiprocessing.context.BaseContext, tmp_path: Path, seed: int
+) -> None:
+    folder, kills = tmp_path / "work", KILLS[name][LONG]
+    if not kills:
+        pytest.skip("run.py test --fuzz has it")
+    emptied(folder)
+    begun(context, name, folder).join()  # the first loads what is loaded late
+    emptied(folder)
+    started = time.monotonic()
+    process = begun(context, name, folder)
+    process.join()
+    assert process.exitcode == 0
+    lasted_s, undisturbed = time.monotonic() - started, works.contents(folder)
+    assert undisturbed
+    draw, found, tries = random.Random(f"{seed}:{name}"), 0, 0
+    while found < kills:
+        tries += 1
+        assert tries <= 5 * kills, f"{name} ends before it can be killed"
+        emptied(folder)
+        again = draw.choice((1, 1, 2))  # the rerun may be killed too
+        for _ in range(again):
+            process = begun(context, name, folder)
+            process.join(lasted_s * draw.random())
+            process.kill()
+            process.join()
+            found += process.exitcode == -signal.SIGKILL
+        process = begun(context, name, folder)
+        process.join()
+        assert process.exitcode == 0, f"{name} after {found} kills, seed {seed}"
+        left = works.contents(folder)
+        assert left.keys() == undisturbed.keys(), f"{name} after {found} kills, seed {seed}"
+        unlike = [file for file in left if left[file] != undisturbed[file]]
+        assert not unlike, f"{name} after {found} kills, seed {seed}: {unlike}"
+    print(f"\n{name}: {found} kills survived of {found} (an undisturbed run takes {lasted_s:.2g} s, seed {seed})")

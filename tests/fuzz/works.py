@@ -1,0 +1,171 @@
+"""Work that may be killed: each writes files of a folder, and begun again in it ends with the same ones.
+
+A process that has imported this has loaded all that the works need, so that its children begin at once.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from safetensors.torch import save
+
+from app.commands.cli import main
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch, save_patch
+from app.patches.patch import Patch
+from app.window.settings import Settings, save_settings
+from engine.kernels import warm
+from engine.presets import SHIPPED, load_preset
+from training.by_name import load
+from training.results import read_results
+from training.run import run_row
+
+PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+CONFIGURATION = """title = "Tiny"
+model = "{model}"
+model_configuration = {sizes}
+[data]
+initial = "gaussian"
+rate_hz = 4000
+modes = 5
+steps = 50
+count = {count}
+[recipe]
+epochs = 4
+batch_size = 8
+steps_per_batch = 8
+first_horizon = 10
+validate_every = 1
+"""
+PLAN = """description = "Two runs."
+[data]
+count = 10
+steps = 60
+[[block]]
+models = ["dmd"]
+strings = ["linear", "nonlinear"]
+initials = ["noise"]
+rates_hz = [4000]
+horizons = [60]
+"""
+MANY = 100  # times that a small file is saved
+WORKS = ("render", "batch", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
+UNLIKE = ("seconds", "training_seconds", "finished")  # of two runs, however equal
+
+
+def render(folder: Path) -> None:
+    _done(
+        main(
+            [
+                "render",
+                str(PRESET),
+                str(folder / "out.wav"),
+                "--position",
+                "0.4",
+                "--amplitude-mm",
+                "2",
+                "--seconds",
+                "4",
+            ]
+        )
+    )
+
+
+def batch(folder: Path) -> None:
+    words = ["--positions", "0.3,0.45", "--amplitudes", "1,2", "--seconds", "0.5", "--sources", "model,truth"]
+    _done(main(["batch", "--presets", str(PRESET), *words, "--out", str(folder / "out")]))
+
+
+def dataset(folder: Path) -> None:
+    configuration = _configuration(folder, "koopman_var", "{ state_size = 8, multiplier_widths = [4] }", 400)
+    _done(main(["dataset", str(configuration), "--cache", str(folder / "cache")]))
+
+
+def train(folder: Path) -> None:
+    _train(folder, "koopman_var", "{ state_size = 8, multiplier_widths = [4] }")
+
+
+def train_lru(folder: Path) -> None:
+    _train(folder, "lru", "{ state_size = 8, layers = 1 }")
+
+
+def sweep(folder: Path) -> None:
+    plan = folder / "two.toml"
+    plan.write_text(PLAN, encoding="utf-8")
+    rows = folder / "rows.csv"
+    words = ["--runs", str(folder / "runs"), "--cache", str(folder / "cache"), "--results", str(rows)]
+    _done(main(["sweep", str(plan), *words, "--workers", "1", "--threads", "1"]))
+
+
+def save_patches(folder: Path) -> None:
+    os.environ["LEARNED_STRINGS_PRESETS"] = str(folder)
+    for number in range(MANY, -1, -1):
+        save_patch(patch_of(number), replace=True)
+
+
+def save_many_settings(folder: Path) -> None:
+    for number in range(MANY, -1, -1):
+        save_settings(folder / "settings.json", settings_of(number))
+
+
+def patch_of(number: int) -> Patch:
+    patch = read_patch(min(PATCHES.glob("*.json")))
+    return Patch.model_validate({**dict(patch), "name": "Mine", "description": f"{number} " * (1 + number % 9)})
+
+
+def settings_of(number: int) -> Settings:
+    return Settings(favourites=tuple(f"preset {each}" for each in range(number)))
+
+
+def contents(folder: Path) -> dict[str, object]:
+    """What a work has made, by the names of its files; without times, and what another start may add to."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".lock", ".png"))
+    return {str(path.relative_to(folder)): _content(path) for path in files if path.name != "checkpoint.safetensors"}
+
+
+def _content(path: Path) -> object:
+    if path.suffix == ".safetensors":
+        preset = load_preset(path)
+        return replace(preset.info, training_seconds=None), save(preset.model.state_dict())
+    if path.name == "rows.csv":
+        return [replace(row, seconds=None, finished="") for row in read_results(path)]
+    if path.name == "row.json":
+        return {name: value for name, value in json.loads(path.read_text()).items() if name not in UNLIKE}
+    if path.name in ("log.csv", "index.csv"):  # a batch tells which files it kept
+        unlike = UNLIKE if path.name == "log.csv" else ("status",)
+        with path.open(newline="") as file:
+            return [{name: line[name] for name in line if name not in unlike} for line in csv.DictReader(file)]
+    return path.read_bytes()
+
+
+def _train(folder: Path, model: str, sizes: str) -> None:
+    configuration = load(str(_configuration(folder, model, sizes, 40)))
+    run_row(
+        "tiny",
+        "",
+        configuration,
+        folder / "runs",
+        cache=folder / "cache",
+        preset=folder / "tiny.safetensors",
+        checkpoint_every_s=0.0,
+    )
+
+
+def _configuration(folder: Path, model: str, sizes: str, count: int) -> Path:
+    path = folder / "tiny.toml"
+    path.write_text(CONFIGURATION.format(model=model, sizes=sizes, count=count), encoding="utf-8")
+    return path
+
+
+def _done(status: int) -> None:
+    if status:
+        raise SystemExit(status)
+
+
+torch.set_num_threads(1)  # a child has no threads of its parent's
+warm.voices()
