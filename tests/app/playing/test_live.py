@@ -1,88 +1,127 @@
-"""Body and room of the patch that keys play: as long as it is played, and not where models are compared."""
+"""A patch played through the notes of the app, with a mixer that the test turns."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from app.instrument.events import SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
 from app.playing.live import Live
 from app.playing.notes import Notes
 from app.playing.sources import Sources
+from app.playing.stroke import Mix
 from engine.effects import Effects
-from engine.presets import SHIPPED
+from engine.presets.finding import SHIPPED
 from engine.voices import Ear
 
 Wait = Callable[[Callable[[], bool]], None]
-EAR = Ear((0.37,))
+EAR = Ear((0.3,))
 
 
 @pytest.fixture
 def patch() -> Patch:
-    patch = read_patch(PATCHES / "steel_string_acoustic.json")
-    return patch.model_copy(update={"body": Body(name="guitar", mix=0.4)})
-
-
-class Stage:
-    """A player's effects and reports, and the sound that they would go to."""
-
-    def __init__(self, sound: Any) -> None:
-        self.effects: list[Effects | None] = []
-        self.reports: list[str] = []
-        self.notes = Notes(sound, Sources(), lambda message, detail: self.reports.append(message))
-        self.live = Live(
-            self.notes,
-            Sources(),
-            lambda name: SHIPPED / f"{name}.safetensors",
-            lambda message, detail: self.reports.append(message),
-            self.effects.append,
-        )
-
-    def settle(self, wait: Wait) -> None:
-        """Until all that was asked for is done."""
-        done: list[None] = []
-        self.notes.in_background(lambda: done.append(None))
-        wait(lambda: bool(done))
+    return read_patch(PATCHES / "steel_string_acoustic.json").model_copy(update={"body": Body()})
 
 
 @pytest.fixture
-def stage(sound: Any) -> Iterator[Stage]:
-    made = Stage(sound)
+def wishes() -> list[Effects | None]:
+    return []
+
+
+@pytest.fixture
+def live(notes: Notes, patch: Patch, wait: Wait, wishes: list[Effects | None]) -> Iterator[Live]:
+    def find(name: str) -> Path | None:
+        path = SHIPPED / f"{name}.safetensors"
+        return path if path.is_file() else None
+
+    made = Live(notes, Sources(), find, lambda message, details: told.append(message), wishes.append)
+    told: list[str] = []
+    made.told = told  # type: ignore[attr-defined]
+    made.set_patch(patch, EAR)
+    wait(lambda: made.ready)
     yield made
-    made.notes.close()
 
 
-def test_they_are_set_once_and_go_with_the_patch(stage: Stage, patch: Patch, wait: Wait) -> None:
-    for _ in range(2):
-        stage.live.set_patch(patch, EAR)
-        stage.settle(wait)
-    (effects,) = stage.effects
-    assert effects is not None and effects.body is not None
-    assert (effects.body.name, effects.body.mix) == ("guitar", 0.4)
-    stage.live.set_patch(None, EAR)
-    stage.settle(wait)
-    assert stage.effects[1:] == [None]
+def test_a_key_sounds_with_the_next_frame_and_is_damped_when_let_go(live: Live, sound: Any, notes: Notes) -> None:
+    made = live.handle(NoteOn(45, 100))
+    assert made is not None
+    struck, note = made
+    assert not note.pending
+    assert set(note.voices) == {"model", "truth"}
+    heard = sound.mixer.render(24_000)[:, 0]
+    assert np.abs(heard[:200]).max() > 1e-4
+    assert live.sounding()[45] > 0.2
+    live.handle(NoteOff(45))
+    sound.mixer.render(48_000)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-3 * np.abs(heard).max()
+    assert struck.damped
 
 
-def test_they_are_off_while_models_are_compared(stage: Stage, patch: Patch, wait: Wait) -> None:
-    stage.live.set_patch(patch, EAR)
-    wait(lambda: stage.live.ready)
-    for dry in (True, False):
-        stage.live.hear_dry(dry)
-        stage.settle(wait)
-        assert (stage.effects[-1] is None) == dry
+def test_model_truth_and_difference_are_of_one_moment(live: Live, sound: Any, notes: Notes) -> None:
+    live.handle(NoteOn(45, 100))
+    loud = np.abs(sound.mixer.render(9_600)).max()
+    notes.set_mix(Mix("truth"))
+    assert np.abs(sound.mixer.render(9_600)).max() > 0.1 * loud
+    notes.set_mix(Mix("difference"))
+    sound.mixer.render(9_600)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-4 * loud
 
 
-def test_a_body_that_is_not_here_is_told_once_however_its_knobs_are_turned(
-    stage: Stage, patch: Patch, wait: Wait
+def test_pedal_bend_and_another_patch_reach_strings_that_ring(
+    live: Live, sound: Any, patch: Patch, wishes: list[Effects | None], wait: Wait
 ) -> None:
-    for mix in (0.2, 0.3, 0.4):
-        stage.live.set_patch(patch.model_copy(update={"body": Body(name="a cello", mix=mix)}), EAR)
-        stage.settle(wait)
-    (told,) = stage.reports
-    assert "is played without its body: the body a cello is not here" in told
-    assert all(effects is None or effects.body is None for effects in stage.effects)
+    live.handle(Controller(SUSTAIN, 127))
+    made = live.handle(NoteOn(45, 60))
+    assert made is not None
+    struck, _ = made
+    live.handle(NoteOff(45))
+    assert not struck.damped
+    before = struck.parameters
+    live.handle(Bend(1.0))
+    assert struck.parameters.tension_n > before.tension_n
+    live.handle(Controller(SUSTAIN, 0))
+    assert struck.damped
+    stiff = patch.with_value("knobs.stiffness", 3.0).model_copy(update={"body": Body(name="guitar", mix=0.5)})
+    live.set_patch(stiff, EAR)
+    assert struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
+    wait(lambda: len(wishes) == 1 and wishes[0] is not None)
+    live.hear_dry(True)
+    wait(lambda: wishes[-1] is None)
+
+
+def test_what_is_played_is_recorded_from_its_first_note_on(live: Live, patch: Patch) -> None:
+    live.begin_recording()
+    assert live.recording
+    live.handle(NoteOn(45, 60))
+    live.handle(NoteOff(45))
+    events = live.end_recording()
+    assert [type(each.event) for each in events] == [PatchTurned, NoteOn, NoteOff]
+    assert events[1].time_s == 0
+    live.begin_recording()
+    assert live.end_recording() == []
+
+
+def test_the_strings_end_with_the_devices_rate_and_new_ones_sound(live: Live, sound: Any, notes: Notes) -> None:
+    made = live.handle(NoteOn(45, 60))
+    assert made is not None
+    sound.mixer = type(sound.mixer)(44_100)
+    again = live.handle(NoteOn(45, 60))
+    assert again is not None
+    assert again[0].continues is None
+    assert np.abs(sound.mixer.render(4_410)).max() > 1e-4
+    notes.poll()
+    assert made[1].cut
+
+
+def test_a_preset_that_is_not_there_is_told(live: Live, patch: Patch, wait: Wait) -> None:
+    live.set_patch(patch.model_copy(update={"preset": "gone"}), EAR)
+    wait(lambda: bool(live.told))  # type: ignore[attr-defined]
+    assert "gone" in live.told[0]  # type: ignore[attr-defined]
+    assert live.handle(NoteOn(45, 60)) is None

@@ -1,0 +1,88 @@
+"""Body and room of the patch that keys play: as long as it is played, and not where models are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import Body, Patch
+from app.playing.live import Live
+from app.playing.notes import Notes
+from app.playing.sources import Sources
+from engine.effects import Effects
+from engine.presets import SHIPPED
+from engine.voices import Ear
+
+Wait = Callable[[Callable[[], bool]], None]
+EAR = Ear((0.37,))
+
+
+@pytest.fixture
+def patch() -> Patch:
+    patch = read_patch(PATCHES / "steel_string_acoustic.json")
+    return patch.model_copy(update={"body": Body(name="guitar", mix=0.4)})
+
+
+class Stage:
+    """A player's effects and reports, and the sound that they would go to."""
+
+    def __init__(self, sound: Any) -> None:
+        self.effects: list[Effects | None] = []
+        self.reports: list[str] = []
+        self.notes = Notes(sound, Sources(), lambda message, detail: self.reports.append(message))
+        self.live = Live(
+            self.notes,
+            Sources(),
+            lambda name: SHIPPED / f"{name}.safetensors",
+            lambda message, detail: self.reports.append(message),
+            self.effects.append,
+        )
+
+    def settle(self, wait: Wait) -> None:
+        """Until all that was asked for is done."""
+        done: list[None] = []
+        self.notes.in_background(lambda: done.append(None))
+        wait(lambda: bool(done))
+
+
+@pytest.fixture
+def stage(sound: Any) -> Iterator[Stage]:
+    made = Stage(sound)
+    yield made
+    made.notes.close()
+
+
+def test_they_are_set_once_and_go_with_the_patch(stage: Stage, patch: Patch, wait: Wait) -> None:
+    for _ in range(2):
+        stage.live.set_patch(patch, EAR)
+        stage.settle(wait)
+    (effects,) = stage.effects
+    assert effects is not None and effects.body is not None
+    assert (effects.body.name, effects.body.mix) == ("guitar", 0.4)
+    stage.live.set_patch(None, EAR)
+    stage.settle(wait)
+    assert stage.effects[1:] == [None]
+
+
+def test_they_are_off_while_models_are_compared(stage: Stage, patch: Patch, wait: Wait) -> None:
+    stage.live.set_patch(patch, EAR)
+    wait(lambda: stage.live.ready)
+    for dry in (True, False):
+        stage.live.hear_dry(dry)
+        stage.settle(wait)
+        assert (stage.effects[-1] is None) == dry
+
+
+def test_a_body_that_is_not_here_is_told_once_however_its_knobs_are_turned(
+    stage: Stage, patch: Patch, wait: Wait
+) -> None:
+    for mix in (0.2, 0.3, 0.4):
+        stage.live.set_patch(patch.model_copy(update={"body": Body(name="a cello", mix=mix)}), EAR)
+        stage.settle(wait)
+    (told,) = stage.reports
+    assert "is played without its body: the body a cello is not here" in told
+    assert all(effects is None or effects.body is None for effects in stage.effects)
