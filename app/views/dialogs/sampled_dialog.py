@@ -168,7 +168,11 @@ class SampledDialog(QDialog):
 
     def _tell_cancelled(self, plan: SampledPlan) -> None:
         self._wait()
-        kept = kept_samples(plan, self._out)
+        try:
+            kept = kept_samples(plan, self._out)
+        except ExportError as error:
+            self._end(str(error), failed=True)
+            return
         told = f"{kept} of {len(plan.zones)} samples are kept; export again to go on from there."
         self._end(f"Cancelled; {told if kept else 'nothing was written.'}")
 

@@ -211,6 +211,26 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     assert again.form.out.is_file()
 
 
+def test_cancelled_where_the_index_is_gone_bad_it_says_so(
+    qtbot: QtBot, made, notes: Notes, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes.last = 3
+    dialog = made()
+    dialog.save.click()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3, timeout=20_000)
+    dialog.close_button.click()
+    notes.gate.set()
+    notes.last = 100
+    job = dialog._job
+    assert job is not None
+    job.wait()  # what it tells has not arrived
+    (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
+    qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text(), timeout=20_000)
+    assert dialog.state.objectName() == "warning"
+    assert dialog.form.isEnabled()
+    assert dialog.close_button.text() == "Close"
+
+
 def test_other_choices_have_nothing_to_go_on_from(qtbot: QtBot, made, notes: Notes) -> None:
     dialog = made()
     run(qtbot, dialog, "Saved")
