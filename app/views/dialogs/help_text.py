@@ -4,14 +4,23 @@ from __future__ import annotations
 
 TOUR = (
     (
+        "Play",
+        "Press A S D F … as on a piano, black keys above them, or click the keys at the bottom. Hold a key and the "
+        "string rings, let go and it is damped. Z and X change the octave. You hear the model.",
+    ),
+    (
+        "Choose an instrument",
+        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs turn its stiffness, "
+        "gauge, damping and pluck while it rings; Record keeps what you play; a dropped MIDI file is played.",
+    ),
+    (
         "Pluck",
-        "Drag on the string and let go. The white handle shows the position and amplitude of the pluck. You hear the "
-        "model.",
+        "Drag on the string in the picture and let go. The white handle shows the position and amplitude of the pluck.",
     ),
     (
         "Compare",
-        "Press X to hear the truth, the numerical solution of the string's equation, at the same playhead and "
-        "level. X again returns. The small arrows beside A and B select their sources: model, truth, the amplified "
+        "Press B to hear the truth, the numerical solution of the string's equation, at the same playhead and "
+        "level. B again returns. The small arrows beside A and B select their sources: model, truth, the amplified "
         "difference, or another preset.",
     ),
     (
