@@ -5,12 +5,12 @@ from __future__ import annotations
 TOUR = (
     (
         "Play",
-        "Press A S D F … as on a piano, black keys above them, or click the keys at the bottom. Hold a key and the "
-        "string rings, let go and it is damped. Z and X change the octave. You hear the model.",
+        "Press A S D F … as on a piano, black keys above, or click the keys at the bottom. Hold a key and the string "
+        "rings, let go and it is damped. Z and X change the octave. You hear the model.",
     ),
     (
         "Choose an instrument",
-        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs turn its stiffness, "
+        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs turn stiffness, "
         "gauge, damping and pluck while it rings; Record keeps what you play; a dropped MIDI file is played.",
     ),
     (
