@@ -15,7 +15,7 @@ TOUR = (
     ),
     (
         "Pluck",
-        "Drag on the string in the picture and let go. The white handle shows the position and amplitude of the pluck.",
+        "Drag on the string in the picture and let go. The white handle shows the pluck's position and amplitude.",
     ),
     (
         "Compare",
