@@ -13,6 +13,8 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+LARGEST_KEPT = 65_536  # numbers of a table that is remembered: 64 MB of all
+
 
 def mode_shapes(positions: Tensor, modes: int) -> Tensor:
     """sin(μπx) at `positions` (points,) in units of the length: float64 (modes, points)."""
@@ -28,6 +30,8 @@ def grid_positions(grid_points: int) -> Tensor:
 def synthesis_matrix(grid_points: int, modes: int) -> Tensor:
     """float64 (modes, grid_points): amplitudes @ synthesis = displacement, with exact zeros at the ends."""
     _check(grid_points, modes)
+    if grid_points * modes > LARGEST_KEPT:
+        return _sines.__wrapped__(grid_points, modes)
     return _sines(grid_points, modes).clone()
 
 

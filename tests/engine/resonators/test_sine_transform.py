@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from engine.resonators import sine_transform
 from engine.resonators.sine_transform import listening_weights, mode_shapes, to_grid, to_modes
 
 
@@ -31,3 +32,11 @@ def test_listening_between_points_is_exact_for_band_limited_shapes() -> None:
 def test_too_many_modes_are_refused() -> None:
     with pytest.raises(ValueError, match="holds 1 to 99 modes, not 100"):
         to_modes(torch.zeros(101), 100)
+
+
+def test_large_tables_are_not_remembered() -> None:
+    """A hundred of a stranger's largest strings would be gigabytes."""
+    before = sine_transform._sines.cache_info().currsize
+    large = sine_transform.synthesis_matrix(1_003, 1_001)
+    assert sine_transform._sines.cache_info().currsize == before
+    assert torch.equal(large[:7], sine_transform.synthesis_matrix(1_003, 7))
