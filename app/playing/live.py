@@ -67,7 +67,6 @@ class Live:
         with self._lock:
             self._ear = ear
             player = self._player
-            self._wish_effects(patch)
             if patch is None:
                 self._player = None
                 return
@@ -79,10 +78,13 @@ class Live:
                 except ValueError as error:
                     self._report(str(error), "")
                     return
+                self._wish_effects(patch)
                 self._prepare(player)
                 return
             self._player = None
-        self._notes.in_background(lambda: self._begin(patch))
+        self._notes.in_background(lambda: self._begin(patch))  # first: a key shall sound at once
+        with self._lock:
+            self._wish_effects(patch)
 
     def listen(self, ear: Ear) -> None:
         """Keys are heard from there."""
