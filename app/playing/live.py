@@ -69,6 +69,7 @@ class Live:
             player = self._player
             if patch is None:
                 self._player = None
+                self._wish_effects(None)
                 return
             self._note_down(PatchTurned(patch))
             if player is not None and player.patch.preset == patch.preset:
