@@ -57,9 +57,15 @@ def write_played(
     return PlayedFile(len(sound) / rate_hz, level)
 
 
+def recorded_files(path: Path) -> tuple[Path, Path]:
+    """The WAV and the MIDI file that what was played is written to, of a name that was chosen."""
+    sound = path if path.suffix.lower() == ".wav" else path.with_name(f"{path.name}.wav")
+    return sound, sound.with_suffix(".mid")
+
+
 def write_recorded(path: Path, patch: Patch, preset: Preset, events: Sequence[TimedEvent], source: str) -> str:
-    """PATH.wav and PATH.mid; what was written, in words. Raises as `write_played`."""
-    sound_file, midi_file = path.with_suffix(".wav"), path.with_suffix(".mid")
+    """Both `recorded_files`; what was written, in words. Raises as `write_played`."""
+    sound_file, midi_file = recorded_files(path)
     written = write_played(sound_file, patch, preset, events, source)
     with whole_file(midi_file) as file:
         file.write(midi_bytes(events))

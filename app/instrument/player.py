@@ -62,7 +62,6 @@ class Struck:
     Attributes:
         place: which string of the instrument it is.
         parameters: of the string, with what hands do to it.
-        continues: the one whose motion it goes on with.
         held: whether the key is down.
         kept: it was let go while the pedal was down.
     """
@@ -75,7 +74,6 @@ class Struck:
     gain: float
     voices: dict[str, Voice]
     parameters: StringParameters
-    continues: Struck | None = None
     held: bool = True
     kept: bool = False
     damped: bool = False
@@ -309,7 +307,7 @@ class Player:
             for source, voice in voices.items():
                 if not before.voices[source].over:
                     voice.continues(before.voices[source])
-        struck = Struck(place, event, key, pluck, self._ear, key.gain, voices, key.string.parameters, before)
+        struck = Struck(place, event, key, pluck, self._ear, key.gain, voices, key.string.parameters)
         parameters = self._with_hands(struck)
         if parameters != key.string.parameters:
             struck.retune(parameters, 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import contextlib
 from pathlib import Path
 
 from app.playing.stroke import Mix, Stroke
@@ -14,7 +14,7 @@ from app.session.ears import heard_ear
 from app.session.slots import other_preset
 from app.shared.vocabulary import DIFFERENCE
 from engine.presets import PresetInfo
-from engine.presets.of_string import HIGHEST_HZ
+from engine.presets.of_string import info_of_string
 
 
 def mix_of(choices: Choices) -> Mix:
@@ -28,12 +28,11 @@ def subject_of(choices: Choices, preset: Path) -> Subject:
 
 
 def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
-    """What a preset says of the string that is plucked."""
-    if choices.string is None or entry.info.family is None:
-        return entry.info
-    info, string = entry.info, choices.string.parameters
-    modes = max(1, min(string.modes_below(min(HIGHEST_HZ, info.rate_hz / 2)), info.grid_points - 2))
-    return replace(info, string=string, modes=modes, model_configuration={**info.model_configuration, "modes": modes})
+    """What a preset says of the string that is plucked; of its own where that cannot be, which is told elsewhere."""
+    if choices.string is not None and entry.info.family is not None:
+        with contextlib.suppress(ValueError):
+            return info_of_string(entry.info, choices.string.parameters)
+    return entry.info
 
 
 def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:

@@ -17,6 +17,7 @@ from app.playing.stroke import Stroke
 from app.rendering.subject import StringOf
 from engine.effects import Effects
 from engine.presets import PresetError
+from engine.resonators.string import StringParameters
 from engine.voices import Ear
 
 SEEN_DB = 70.0  # below full scale a string is seen at rest
@@ -55,6 +56,7 @@ class Live:
         self._dry = False
         self._told_body = ""  # what is wrong with it, which is told once
         self._preparing: object = None
+        self._loud: tuple[StringParameters, float] | None = None  # the string that was played last, and its gain
         self.seconds = 4.0  # that a picture of a note lasts
 
     @property
@@ -129,6 +131,11 @@ class Live:
             share = min(max(1 + level / SEEN_DB, 0.0), 1.0)
             found[struck.event.key] = max(found.get(struck.event.key, 0.0), share)
         return found
+
+    def gain_of(self, string: StringParameters) -> float:
+        """With which a string that was played sounds: a pluck by hand is as loud as its key. 1 for another."""
+        loud = self._loud
+        return loud[1] if loud is not None and loud[0] == string else 1.0
 
     def hear_dry(self, dry: bool) -> None:
         """Without body and room, as long as models are compared with the truth."""
@@ -216,5 +223,6 @@ class Live:
     def _deliver(self, struck: Struck) -> None:
         """In the event's thread, within `handle`."""
         subject = StringOf(self._path, struck.key.string.parameters)
+        self._loud = subject.string, struck.gain
         stroke = Stroke(subject, struck.pluck, struck.ear, self.seconds, SOURCES, gain=struck.gain)
         self._made = struck, self._notes.adopt(stroke, struck.voices, self._struck_s)

@@ -136,7 +136,7 @@ class Controller(QObject):
         )
         self.patches.told.connect(window.notices.tell)
         self.patches.informed.connect(window.notices.inform)
-        self.instruments.struck.connect(self.patches.show_struck)
+        self.instruments.played.connect(self.patches.show_played)
         window.show_instrument(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)

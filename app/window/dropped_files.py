@@ -40,8 +40,8 @@ def receive(file: Path, library: Library) -> Dropped:
         return _body(file)
     except (InstallError, RecipeError, ImpulseError, WriteError) as error:
         return Dropped(notice=str(error))
-    kinds = f"a preset ({SUFFIX}), a patch, a scale, a MIDI file, an exported WAV or an impulse response"
-    return Dropped(notice=f"{file}: neither {kinds}; drop one of these")
+    kinds = f"a preset ({SUFFIX}), a patch, a string, a scale, a MIDI file, an exported WAV, an impulse response"
+    return Dropped(notice=f"{file}: cannot be taken in; drop one of these: {kinds}")
 
 
 def _body(file: Path) -> Dropped:

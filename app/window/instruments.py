@@ -37,8 +37,6 @@ class Instruments(QObject):
     played = Signal()
     told = Signal(str)
 
-    struck = Signal(object)  # the latest `Struck`, in the window's thread
-
     _struck = Signal(dict)  # from any thread
 
     def __init__(
@@ -56,7 +54,6 @@ class Instruments(QObject):
         self._strike, self._handle = strike, handle
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # of notes, and not in the session yet
-        self._latest: Struck | None = None  # not told yet
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
@@ -113,7 +110,6 @@ class Instruments(QObject):
             }
             with self._lock:
                 self._told = {**self._told, **changes}
-                self._latest = struck
             self._struck.emit(changes)
         return True
 
@@ -132,12 +128,9 @@ class Instruments(QObject):
         """Once for all notes that were struck meanwhile."""
         with self._lock:
             told, self._told = self._told, {}
-            latest, self._latest = self._latest, None
         if told:
             self._session.play(**told)
             self.played.emit()
-        if latest is not None:
-            self.struck.emit(latest)
 
     def _press(self, press: KeyPress) -> None:
         if self.plays_pitches:

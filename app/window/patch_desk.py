@@ -13,11 +13,10 @@ from PySide6.QtCore import QObject, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QInputDialog
 
-from app.export.played import write_recorded
+from app.export.played import recorded_files, write_recorded
 from app.instrument.bodies import body_names
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import MidiFileError, read_midi
-from app.instrument.player import Struck
 from app.instrument.strings import Strings
 from app.patches.library import (
     SUFFIX,
@@ -31,6 +30,7 @@ from app.patches.library import (
 )
 from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice
 from app.patches.tuning import SCALA_FILES, read_scala
+from app.playing.chosen import info_of
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
 from app.playing.playback import Playback
 from app.presets.library import Library
@@ -43,7 +43,7 @@ from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from engine.plain_text import one_line
-from engine.presets import PresetError, PresetInfo, load_preset
+from engine.presets import PresetError, load_preset, outside_training
 from engine.presets.of_string import of_string, read_string
 from engine.resonators.family import inharmonicity
 
@@ -330,9 +330,16 @@ class PatchDesk(QObject):
         if not events or patch is None:
             self.told.emit("Nothing was played, so nothing was recorded.")
             return
-        chosen, _ = QFileDialog.getSaveFileName(self._panel, "Save what was played", f"{patch.name}.wav", RECORDED)
-        if chosen:
-            self.write(Path(chosen), events)
+        name = f"{patch.name}.wav"
+        while name:
+            name, _ = QFileDialog.getSaveFileName(self._panel, "Save what was played", name, RECORDED)
+            if not name:
+                return
+            taken = [each for each in recorded_files(Path(name)) if each.exists() and each != Path(name)]
+            if not taken:  # the dialog has asked for the name itself alone
+                self.write(Path(name), events)
+                return
+            self.told.emit(f"{taken[0]} exists already; choose another name.")
 
     def write(self, path: Path, events: list[TimedEvent]) -> threading.Thread | None:
         """What was played, as WAV and MIDI of one name, in the background."""
@@ -368,11 +375,12 @@ class PatchDesk(QObject):
         if names & {"heard", "a", "b"}:
             self._panel.show_source(self._session.source_heard)
 
-    def show_struck(self, struck: Struck) -> None:
-        """What is beyond training of a note that was played."""
-        entry = self._library.find(self._session.choices.preset)
-        if entry is not None:
-            self._panel.bar.show_note("; ".join(_beyond(entry.info, struck)))
+    def show_played(self) -> None:
+        """What is beyond training of a note that was played, which the session knows by now."""
+        choices = self._session.choices
+        entry = self._library.find(choices.preset)
+        if entry is not None and choices.string is not None:
+            self._panel.bar.show_note("; ".join(outside_training(info_of(choices, entry), choices.pluck)))
 
     def tick(self) -> None:
         """Now and then: which keys sound."""
@@ -465,14 +473,3 @@ def facts_of(patch: Patch) -> dict[str, str]:
         "inharmonicity": f"{inharmonicity(string):.1e}",
         "decay": f"{math.log(1000) / max(string.decay_rate(1), 1e-9):.1f} s",
     }
-
-
-def _beyond(info: PresetInfo, struck: Struck) -> list[str]:
-    """How a note is beyond what the model learned, in plain words."""
-    if info.family is None:
-        return []
-    found = info.family.outside(struck.parameters)
-    resonator = struck.key.resonator
-    rise = float(resonator.relative_tension_rise(resonator.to_modes(struck.pluck.displacement(resonator.points))))
-    limit = info.family.tension_rise[1]
-    return [*found, f"tension rise {rise:.0%} is outside the trained {limit:.0%}"] if rise > limit else found

@@ -152,7 +152,7 @@ class Performance(QObject):
         entry = self._library.find(choices.preset)
         if entry is None:
             return None
-        note = self.notes.strike(stroke_of(choices, entry.path, self._library))
+        note = self.notes.strike(self._stroke_of(choices, entry))
         self._latest = note
         return note
 
@@ -344,7 +344,13 @@ class Performance(QObject):
 
     def _stroke(self) -> Stroke | None:
         entry = self.entry
-        return None if entry is None else stroke_of(self._session.choices, entry.path, self._library)
+        return None if entry is None else self._stroke_of(self._session.choices, entry)
+
+    def _stroke_of(self, choices: Choices, entry: PresetEntry) -> Stroke:
+        """A string that keys have played is as loud by hand."""
+        stroke = stroke_of(choices, entry.path, self._library)
+        string = string_of(stroke.preset)
+        return stroke if string is None else replace(stroke, gain=self.live.gain_of(string))
 
     def _is_of(self, note: Note, choices: Choices) -> bool:
         entry = self._library.find(choices.preset)

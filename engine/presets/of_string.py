@@ -8,6 +8,7 @@ from pathlib import Path
 from engine.models.base import Physics
 from engine.presets.file import Preset, PresetError
 from engine.presets.finding import SHIPPED
+from engine.presets.info import PresetInfo
 from engine.resonators.string import StringParameters
 from engine.schema import read, read_toml
 
@@ -51,24 +52,33 @@ def of_string(
     """
     if string is None and rate_hz is None and modes is None:
         return preset
-    info = preset.info
-    name = f"{preset.path}: string"
+    try:
+        told = info_of_string(preset.info, string, rate_hz, modes)
+        model = preset.model.tuned(Physics(told.resonator, told.rate_hz, told.scale_m))
+    except ValueError as error:
+        raise PresetError(f"{preset.path}: string: {error}") from error
+    return replace(preset, info=told, model=model.eval())
+
+
+def info_of_string(
+    info: PresetInfo, string: StringParameters | None = None, rate_hz: int | None = None, modes: int | None = None
+) -> PresetInfo:
+    """What a preset of many strings says of one; arguments as of `of_string`.
+
+    Raises:
+        ValueError: the string has no such modes, or its motion is beyond what is computed.
+    """
     chosen, rate = string or info.string, rate_hz or info.rate_hz
     highest_hz = min(HIGHEST_HZ, rate / 2)
     if modes is None:
         modes = min(chosen.modes_below(highest_hz), info.grid_points - 2)
     if modes < 1:
-        raise PresetError(f"{name}: it has no mode below {highest_hz:g} Hz; lower its tension, or make it longer")
-    try:
-        told = replace(
-            info,
-            string=chosen,
-            rate_hz=rate,
-            modes=modes,
-            horizon_steps=max(1, round(info.horizon_s * rate)),
-            model_configuration={**info.model_configuration, "modes": modes},
-        )
-        model = preset.model.tuned(Physics(told.resonator, rate, info.scale_m))
-    except ValueError as error:
-        raise PresetError(f"{name}: {error}") from error
-    return replace(preset, info=told, model=model.eval())
+        raise ValueError(f"it has no mode below {highest_hz:g} Hz; lower its tension, or make it longer")
+    return replace(
+        info,
+        string=chosen,
+        rate_hz=rate,
+        modes=modes,
+        horizon_steps=max(1, round(info.horizon_s * rate)),
+        model_configuration={**info.model_configuration, "modes": modes},
+    )

@@ -110,6 +110,14 @@ def test_the_same_key_again_adds_to_the_string_and_leaves_the_loud_tail(patch: P
     assert np.abs(np.diff(again, 2))[joint].max() < 1.3 * np.abs(np.diff(alone, 2))[joint].max() + 1e-5
 
 
+def test_a_key_that_two_tracks_strike_at_once_is_one_string_and_is_let_go(patch: Patch, preset: Preset) -> None:
+    doubled = [(0.0, NoteOn(57, 90)), (0.0, NoteOn(57, 90)), (0.3, NoteOff(57)), (0.3, NoteOff(57))]
+    once = [(0.0, NoteOn(57, 90)), (0.3, NoteOff(57))]
+    two, one = play(patch, preset, 1.0, *doubled), play(patch, preset, 1.0, *once)
+    assert level_db(two, 0.1, 0.3) == pytest.approx(level_db(one, 0.1, 0.3) + 6, abs=1)
+    assert level_db(two, 0.6, 0.7) < level_db(two, 0.1, 0.3) - 60
+
+
 @pytest.mark.parametrize(("by", "semitones"), [("tension", 2.0), ("length", 2.0), ("tension", -2.0)])
 def test_the_wheel_bends_to_its_range_and_back(patch: Patch, preset: Preset, by: str, semitones: float) -> None:
     bending = changed(patch, bend_by=by)

@@ -59,6 +59,15 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
     qtbot.waitUntil(lambda: struck.damped, timeout=5_000)
 
 
+def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, played: Controller) -> None:
+    played.window.instrument.pressed.emit(52, 100)
+    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: played.session.choices.string is not None, timeout=5_000)
+    note = played.performance.strike(played.session.choices)
+    assert note is not None
+    assert note.stroke.gain == struck.gain != 1
+
+
 def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_X)
     press(qtbot, played, Qt.Key.Key_9)
@@ -175,6 +184,26 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
     assert rate_hz == 48_000
     assert 0.001 < abs(sound).max() < 1
     assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+
+
+def test_a_recording_replaces_no_file_that_nobody_asked_about(
+    qtbot: QtBot, played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "song.mid").write_bytes(b"mine")
+    (tmp_path / "take.wav").write_bytes(b"mine")
+    names = iter(["song.wav", "take", "take 1.5"])
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(tmp_path / next(names)), ""))
+    told: list[str] = []
+    played.patches.told.connect(told.append)
+    played.patches.record()
+    played.window.instrument.pressed.emit(60, 100)
+    played.window.instrument.released.emit(60)
+    played.patches.record()
+    qtbot.waitUntil(lambda: len(told) == 3, timeout=60_000)
+    assert "song.mid exists already" in told[0]
+    assert "take.wav exists already" in told[1]
+    assert (tmp_path / "song.mid").read_bytes() == (tmp_path / "take.wav").read_bytes() == b"mine"
+    assert {path.name for path in tmp_path.glob("take 1.5*")} == {"take 1.5.wav", "take 1.5.mid"}
 
 
 def test_what_is_beyond_training_is_told(qtbot: QtBot, played: Controller) -> None:
