@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +26,25 @@ class Effects:
         return not any(part is not None and part.mix > 0 for part in (self.body, self.room))
 
     def impulse(self, rate_hz: int) -> NDArray[np.float64]:
-        """(frames, 1 or 2): of pink noise the level stays, at any mix."""
-        found = np.ones((1, 1))
-        for part in (self.body, self.room):
-            if part is not None and part.mix > 0:
-                wet = part.mix * part.response(rate_hz)
-                wet[0] += 1 - part.mix
-                found = convolved(found, wet) if len(found) > 1 else wet
-        return found if self.neutral else as_loud(found, rate_hz)
+        """(frames, 1 or 2): of pink noise the level stays, at any mix; remembered, and not to be written."""
+        return _impulse(self, rate_hz)
 
     def tail_s(self, rate_hz: int) -> float:
         """For how long it sounds on after its input, at most."""
         return (len(self.impulse(rate_hz)) - 1) / rate_hz
+
+
+@lru_cache(maxsize=4)
+def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
+    found = np.ones((1, 1))
+    for part in (effects.body, effects.room):
+        if part is not None and part.mix > 0:
+            wet = part.mix * part.response(rate_hz)
+            wet[0] += 1 - part.mix
+            found = convolved(found, wet) if len(found) > 1 else wet
+    found = found if effects.neutral else as_loud(found, rate_hz)
+    found.setflags(write=False)
+    return found
 
 
 def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> NDArray[np.float64]:

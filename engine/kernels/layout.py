@@ -70,7 +70,7 @@ STEPS = 46  # W nodes, or sub-steps, of a frame, for which they were made
 DECAY = 47  # R of the largest energy in a frame
 LARGEST_ENERGY = 48  # R of latents that share a tension
 LARGEST_STRETCH = 49  # R
-PEAK = 50  # R m: of the displacement as it is let go
+PEAK = 50  # R m: of the displacement as it is let go, a least one
 JOINS = 51  # W whether its fade-in is the complement of the other's fade
 HEADER = 52
 
@@ -113,7 +113,10 @@ BANK_ROWS = 21
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
 FOLLOWING = 6
 TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
-TENSION_ROWS = FOLLOWING + 8 + 2  # of `kernels.tension.node`, κ p and ω²; two to spare
+PHYSICAL = (
+    FOLLOWING + 8
+)  # behind those of `kernels.tension.node`, κ p and ω²: amplitudes and speeds, between two moments
+TENSION_ROWS = PHYSICAL + 2
 
 # Slots of the modes that a voice is to have, then the four rows above
 B_QUANTA = 0  # W of the way there
@@ -204,7 +207,6 @@ M_TONE_SIDE = 19  # W 1 left, 2 right, 3 both
 M_GAPS = 20  # W gaps so far
 M_CHANNELS = 21  # W of the device, 1 or 2
 M_SMOOTHING = 22  # R what is left a frame of a change of volume
-M_OVERRUNS = 23  # W voices that were refused because all places were taken
 M_LIMITING = 24  # W whether the limiter is at work: not where a file is made
 M_CONVOLVER = 25  # W address of its memory, where there are effects; it stays
 M_EFFECTS = 26  # W address of the impulse response that is wanted; 0: none

@@ -57,7 +57,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)
         if whole[at.CONTINUES] != 0 and whole[at.BEGIN_AT] <= counts[at.M_FRAMES]:
-            take_over(voice, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+            take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0
     for place in range(counts[at.M_ACTIVE]):
@@ -88,7 +88,6 @@ def _take_up(counts: np.ndarray) -> None:
         else:
             voice = carray(pointer(address), (1 << 40,), np.int64)
             voice[at.STATE] = at.OVER
-            counts[at.M_OVERRUNS] += 1
         fence()
         counts[at.M_TAKEN] += 1
 

@@ -27,6 +27,13 @@ def row(voice: np.ndarray, modes: int, which: int) -> np.ndarray:
 
 
 @njit(inline="always", **COMPILED)
+def following(voice: np.ndarray, modes: int) -> np.ndarray:
+    """What follows from the modes of latents that share a tension, (8, modes): see `kernels.tension.prepare`."""
+    slot = at.state(modes) + at.FOLLOWING * modes
+    return voice[slot : slot + 8 * modes].reshape(8, modes)
+
+
+@njit(inline="always", **COMPILED)
 def gliding(voice: np.ndarray) -> bool:
     """Whether its modes are still to change."""
     counts = voice.view(np.int64)

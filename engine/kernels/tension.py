@@ -13,7 +13,7 @@ from numba import njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.modes import damped, glide, gliding, rest_above, row
+from engine.kernels.modes import damped, following, glide, gliding, rest_above, row
 
 SPARE = 1.5  # of the energy at the start, as in the model
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
@@ -128,8 +128,7 @@ def prepare(voice: np.ndarray, program: np.ndarray) -> None:
     n, rate = counts[at.MODES], program[at.S_RATE]
     squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
     couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
-    slot = at.state(n) + at.FOLLOWING * n
-    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    rows = following(voice, n)
     last = rest_above(voice, rate)
     highest = program[at.S_HIGHEST_PHASE]
     fastest = max(
@@ -181,8 +180,7 @@ def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     x, y = row(voice, n, 0), row(voice, n, 1)
-    slot = at.state(n) + at.FOLLOWING * n
-    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    rows = following(voice, n)
     sigmas, stretches = row(voice, n, at.SIGMA), row(voice, n, at.STRETCH)
     for m in range(n):
         q[m], v[m] = x[m], y[m]
@@ -202,13 +200,12 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
 
     Args:
-        bounded: the largest energy and stretch are there; otherwise they follow from what is given.
+        bounded: the largest energy is there, and may only fall; otherwise it follows from what is given.
     """
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     x, y = row(voice, n, 0), row(voice, n, 1)
-    slot = at.state(n) + at.FOLLOWING * n
-    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    rows = following(voice, n)
     sigmas, couplings, stretches = row(voice, n, at.SIGMA), row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
     tension = held = energy = widest = 0.0
     for m in range(n):
@@ -218,8 +215,8 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
         y[m] = -(v[m] + sigmas[m] * q[m]) / omega
         energy += rows[7, m] * (square + y[m] * y[m])
         widest = max(widest, stretches[m] / rows[7, m])
-    if not bounded:
-        voice[at.LARGEST_ENERGY] = SPARE * (energy + 0.5 * tension * held)
+    largest = SPARE * (energy + 0.5 * tension * held)
+    voice[at.LARGEST_ENERGY] = min(voice[at.LARGEST_ENERGY], largest) if bounded else largest
     voice[at.LARGEST_STRETCH] = voice[at.LARGEST_ENERGY] * widest
     for m in range(n):
         x[m] = q[m] * (1 + rows[6, m] * tension)
@@ -233,7 +230,7 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
     n = counts[at.MODES]
     if counts[at.PREPARED] and not gliding(voice):
         return
-    q, v, squares = row(voice, n, at.FOLLOWING + 8), row(voice, n, at.FOLLOWING + 9), row(voice, n, at.FOLLOWING + 7)
+    q, v, squares = row(voice, n, at.PHYSICAL), row(voice, n, at.PHYSICAL + 1), following(voice, n)[7]
     if counts[at.PREPARED]:
         physical(voice, q, v)
         glide(voice)
@@ -260,8 +257,7 @@ def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, 
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     x, y = row(voice, n, 0), row(voice, n, 1)
-    slot = at.state(n) + at.FOLLOWING * n
-    rows = voice[slot : slot + 8 * n].reshape(8, n)
+    rows = following(voice, n)
     moving, nodes, points = counts[at.MOVING], counts[at.STEPS], counts[at.POINTS]
     sets = 2 if fading else 1
     total = 0.0

@@ -75,7 +75,9 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
             for frame in range(quantum):
                 past[2 * quantum + frame] = out[point, frame]
             if begins and turn == 0 and counts[at.FRAME] == 0:
-                for frame in range(1, quantum):  # at rest: before the pluck lies the mirror of what follows
+                for frame in range(
+                    1, 1 if counts[at.JOINS] else quantum
+                ):  # at rest: before the pluck lies the mirror of what follows
                     past[2 * quantum - frame] = past[2 * quantum + frame]
                 counts[at.WARM] = WARMED - 1
     for point in range(counts[at.POINTS]):
@@ -89,19 +91,24 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 
 @njit(**COMPILED)
-def take_over(voice: np.ndarray, scratch: np.ndarray) -> None:
+def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
     """A pluck of a string that rings is added to its motion, as this voice begins; the voice that had it fades.
 
-    Where that one is over, or of another kind, the string is at rest.
+    One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
+    kind, the string is at rest.
     """
     counts = voice.view(np.int64)
     before = carray(pointer(counts[at.CONTINUES]), (1 << 40,), np.float64)
     befores = before.view(np.int64)
     rings = befores[at.STATE] == at.SOUNDING and befores[at.GENERATED] > 0
-    if rings and befores[at.KIND] == counts[at.KIND]:
+    waits = befores[at.STATE] == at.WAITING and befores[at.PREPARED] == 0
+    if (rings or waits) and befores[at.KIND] == counts[at.KIND]:
         n, m = counts[at.MODES], befores[at.MODES]
+        joins = rings or befores[at.JOINS] == 1
+        if joins and counts[at.VELOCITY]:
+            _past(voice, before)
         q, v = scratch[:m], scratch[m : 2 * m]
-        if counts[at.KIND] == at.TENSION:
+        if counts[at.KIND] == at.TENSION and rings:
             tension.physical(before, q, v)
         else:
             q[:], v[:] = row(before, m, 0), row(before, m, 1)
@@ -111,12 +118,35 @@ def take_over(voice: np.ndarray, scratch: np.ndarray) -> None:
             amplitudes[mode] += q[mode]
             speeds[mode] += v[mode]
             widest += math.sqrt(q[mode] ** 2 + v[mode] ** 2 / row(voice, n, at.OMEGA_SQUARED)[mode])
-        voice[at.LIMIT] *= 1 + widest / max(voice[at.PEAK], 1e-9)
-        if befores[at.RELEASE] == 0:
-            befores[at.RELEASE] = counts[at.ATTACK]
-        counts[at.JOINS] = 1
+        voice[at.LIMIT] *= 1 + widest / voice[at.PEAK]
+        if waits:
+            counts[at.BEGIN_AT] = max(counts[at.BEGIN_AT], befores[at.BEGIN_AT])
+            before[at.GAIN] = before[at.GAIN_TO] = before[at.WANTED_GAIN] = 0.0
+            befores[at.RELEASE] = 1
+        else:  # what senses velocity has been generated further than it is heard: so much later this one begins
+            counts[at.BEGIN_AT] = now + befores[at.GENERATED] - befores[at.FRAME]
+            befores[at.FADE_FRAMES] = max(1, counts[at.ATTACK])
+            befores[at.RELEASE_AT] = max(1, counts[at.BEGIN_AT])
+        counts[at.JOINS] = joins
     fence()
     counts[at.CONTINUES] = 0
+
+
+@njit(**COMPILED)
+def _past(voice: np.ndarray, before: np.ndarray) -> None:
+    """Displacement before the pluck: the motion so far, and the string held where the pluck begins."""
+    counts, befores = voice.view(np.int64), before.view(np.int64)
+    n = counts[at.MODES]
+    pulled = row(voice, n, 0)
+    for point in range(counts[at.POINTS]):
+        weights = voice[at.weights(n, 0, point, 0) : at.weights(n, 0, point, 0) + n]
+        held = 0.0
+        for mode in range(n):
+            held += weights[mode] * pulled[mode]
+        own = at.history(n, point)
+        other = at.history(befores[at.MODES], min(point, befores[at.POINTS] - 1))
+        for frame in range(3 * at.QUANTUM):
+            voice[own + frame] = before[other + frame] + held
 
 
 @njit(**COMPILED)

@@ -46,6 +46,7 @@ SERIES = 1 / 12  # r and p of small hω
 SPARE = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
+LEAST_PHASE = 0.02  # between nodes: a voice of more would take too much of the device's time
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,8 @@ class KoopmanTensionConfiguration:
         if not 0 <= self.degree <= 32:
             raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")
         for name in ("node_phase", "highest_phase"):
-            if not 0.001 <= getattr(self, name) <= math.pi:
-                raise ValueError(f"{name} must lie in 0.001 … π, not {getattr(self, name)}")
+            if not LEAST_PHASE <= getattr(self, name) <= math.pi:
+                raise ValueError(f"{name} must lie in {LEAST_PHASE} … π, not {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -254,10 +255,6 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         basis = torch.cos(torch.arange(len(self.A), dtype=torch.float64) * torch.arccos(argument)[:, None])
         growth = 1 + phase.square() * (basis @ self.A)
         return growth.clamp(0, 2), (basis @ self.r).clamp(-1, 1), (basis @ self.p).clamp(-1, 1)
-
-    def let_go(self, displacement: Tensor, step: Step) -> KoopmanTensionState:
-        """The state before the first frame of strings released at rest from displacements (batch, grid_points)."""
-        return self._let_go(self.release(displacement), step, Fraction(1))
 
     def _let_go(self, state: KoopmanTensionState, step: Step, size: Fraction) -> KoopmanTensionState:
         """The coordinates in which kicks act, half a kick before the first node."""

@@ -19,6 +19,7 @@ ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade w
 FADE_S = 0.020  # another source, another gain
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
 BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
+LEAST_PEAK_M = 1e-4  # of these
 BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
@@ -54,9 +55,8 @@ class Voice:
         counts[at.FADE_FRAMES] = round(FADE_S * program.rate_hz)
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
-        peak = float(displacement_m.abs().max())
-        memory[at.PEAK] = peak
-        memory[at.LIMIT] = BELIEVED * max(peak, 1e-4) / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
+        memory[at.PEAK] = peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        memory[at.LIMIT] = BELIEVED * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second
@@ -203,7 +203,12 @@ class Voice:
         """Before it is handed over: it is the same string, plucked again while `before` rings.
 
         Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
+
+        Raises:
+            ValueError: a voice has no modes of its own.
         """
+        if self.program.resonator is None or before.program.resonator is None:
+            raise ValueError("a voice without modes of its own has no string that is plucked again")
         before.forget_before()
         self._before = before
         self._counts[at.CONTINUES] = before.address

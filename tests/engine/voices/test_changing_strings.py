@@ -182,6 +182,49 @@ def test_a_pluck_of_a_string_that_has_ended_is_a_fresh_one() -> None:
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
+@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
+def test_a_second_pluck_of_next_to_nothing_changes_nothing(kind: str, pickup: str) -> None:
+    """Sample by sample: the motion goes on in its own time, however far ahead a voice was generated."""
+    of, ear = program(kind), Ear((0.37, 0.6), pickup)  # type: ignore[arg-type]
+    faint = Pluck(0.3, 1e-4, "raised_cosine", 0.2)
+    touched, alone = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear), sound(of, [], ear=ear)
+    np.testing.assert_allclose(touched, alone, atol=2e-4 * np.abs(alone).max())
+
+
+def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
+    low_hz = 16_000
+    own = modes_of(STRING, 80)
+    below = int((own.omega < 3.0 * low_hz).sum())
+    assert below < 80
+    few = modes_of(STRING, below)
+
+    def at(resonator: Resonator) -> NDArray[np.float64]:
+        model = KoopmanTension(KoopmanTensionConfiguration(modes=resonator.modes))
+        model.initialise("series", Physics(resonator, low_hz), torch.Generator())
+        mixer, voice = Mixer(low_hz, limited=False), struck(tension_program(model, resonator, low_hz))
+        mixer.add(voice)
+        return mixer.render(3_200)[:, 0].astype(np.float64)
+
+    np.testing.assert_allclose(at(own), at(few), atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_two_plucks_before_the_string_sounds_are_one_of_both(kind: str) -> None:
+    of, mixer = program(kind), Mixer(RATE_HZ, limited=False)
+    both = Voice(of, 2 * PLUCK.displacement(101), EAR)
+    both.never_ends()
+    alone = Mixer(RATE_HZ, limited=False)
+    alone.add(both)
+    first, second = struck(of), struck(of)
+    second.continues(first)
+    mixer.add(first)
+    mixer.add(second)
+    np.testing.assert_allclose(mixer.render(9_600), alone.render(9_600), atol=1e-6)
+    assert first.over
+    assert not second.over
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
 def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) -> None:
     high = modes_of(STRING, 80)
     assert float(high.omega[-1]) / (2 * math.pi) > 0.45 * RATE_HZ / 2
@@ -213,3 +256,5 @@ def test_what_cannot_change_says_so() -> None:
     samples = Voice.of_samples(plain_program(RATE_HZ), np.zeros((10, 1), np.float32))
     with pytest.raises(ValueError, match="cannot take"):
         samples.retune(modes_of(STRING))
+    with pytest.raises(ValueError, match="without modes"):
+        samples.continues(struck(program("truth")))
