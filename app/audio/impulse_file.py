@@ -27,6 +27,8 @@ def read_impulse(path: Path) -> Impulse:
         ImpulseError: it cannot be read, or is no response that can be used: see `engine.bounds`.
     """
     try:
+        if not path.is_file():  # a pipe would be waited for
+            raise ImpulseError(f"{path}: no file; check the name")
         if path.stat().st_size > bounds.LARGEST_IMPULSE_BYTES:
             raise ImpulseError(
                 f"{path}: larger than the {bounds.LARGEST_IMPULSE_BYTES // 2**20} MiB that it may have; cut it"

@@ -75,7 +75,8 @@ def evaluate(
         bool, typer.Option("--map", help="And errors by rise of tension and inharmonicity.")
     ] = False,
     picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The same, a dot each string: .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Errors by rise and inharmonicity, a dot each string: .png, .svg or .pdf."),
     ] = None,
     rate: Rate = 48_000,
     seed: Seed = 0,

@@ -6,6 +6,7 @@ The user's lie in a folder beside the patches. A body is known by its file's nam
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
 from functools import lru_cache
 from itertools import count
 from pathlib import Path
@@ -68,18 +69,23 @@ def install_body(file: Path) -> str:
         WriteError: the copy cannot be written; nothing is left.
     """
     read_impulse(file)
-    folder, taken = own_bodies(), _own_files()
+    folder, known = own_bodies(), _own_files()
     stem = file_stem(file.stem)[: LONGEST_NAME - 5]
     try:
         data = file.read_bytes()
-        for name, path in taken.items():
+    except OSError as error:
+        raise ImpulseError(f"{file}: cannot be read ({error.strerror}); check the name") from error
+    for name, path in known.items():
+        with suppress(OSError):  # one that cannot be read is another
             if path.stat().st_size == len(data) and path.read_bytes() == data:
                 return name
-        names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
-        name = next(name for name in names if name not in BODIES and name not in taken)
+    try:
         folder.mkdir(parents=True, exist_ok=True)
+        taken = {path.stem.casefold() for path in folder.iterdir()} | set(BODIES)  # names of some disks ignore case
     except OSError as error:
         raise WriteError(explain(folder, error)) from error
+    names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
+    name = next(name for name in names if name.casefold() not in taken)
     with whole_file(folder / f"{name}{file.suffix.lower()}") as copy:
         copy.write(data)
     return name

@@ -61,6 +61,8 @@ def read_scala(path: Path) -> str:
     from app.patches.patch import TuningChoice, explained
 
     try:
+        if not path.is_file():  # a pipe would be waited for
+            raise ValueError(one_line(f"{path}: no file; check the name"))
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE_BYTES + 1)
     except OSError as error:

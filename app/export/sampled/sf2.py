@@ -222,13 +222,14 @@ def _span(ends: tuple[int, int]) -> int:
 
 
 def _ascii(text: str) -> bytes:
-    """Accents go, what is left of other scripts becomes a question mark."""
-    return unicodedata.normalize("NFKD", one_line(text)).encode("ascii", "replace").replace(b"?", b"_")
+    """Accents go, each letter of other scripts becomes an underscore."""
+    plain = (c for c in unicodedata.normalize("NFKD", one_line(text)) if not unicodedata.combining(c))
+    return "".join(c if c.isascii() else "_" for c in plain).encode("ascii")
 
 
-def _name(text: str | bytes) -> bytes:
+def _name(text: str) -> bytes:
     """At most 19 characters and the zero behind them."""
-    return (text if isinstance(text, bytes) else _ascii(text))[:19]
+    return _ascii(text)[:19]
 
 
 def _text(text: str) -> bytes:

@@ -141,8 +141,8 @@ class SampleStore:
 
     def remove(self) -> None:
         """Our files, and the folder where nothing else is left in it."""
-        self._remove_all_but(set())
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, ExportError):
+            self._remove_all_but(set())
             (self.folder / INDEX).unlink(missing_ok=True)
             (self.folder / LOCK).unlink(missing_ok=True)
             self.folder.rmdir()
@@ -182,7 +182,10 @@ class SampleStore:
     def _remove_all_but(self, names: set[str]) -> None:
         left = {name for name in self._index.samples if name not in names and _OURS.fullmatch(name)}
         for name in left:
-            self.path(name).unlink(missing_ok=True)
+            try:
+                self.path(name).unlink(missing_ok=True)
+            except OSError as error:  # a sampler has it open
+                raise ExportError(explain(self.path(name), error)) from error
         if left:
             self._index.samples = {n: entry for n, entry in self._index.samples.items() if n in names}
             self._write_index()

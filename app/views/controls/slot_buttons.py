@@ -90,7 +90,7 @@ class SlotButtons(QWidget):
             told = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
             )
-            tip = f"Hear {slot.upper()}: {title} (X switches at the playhead)" + (told if gain else "")
+            tip = f"Hear {slot.upper()}: {title} (B switches at the playhead)" + (told if gain else "")
             button.setToolTip(plain_tip(tip))
             kind = theme.source_kind(source)
             if button.objectName() != kind:

@@ -93,7 +93,9 @@ class PatchBrowser(Browser):
             head.addWidget(widget)
         self._state = Label()
         self._state.setObjectName("faint")
-        folder = tool_button("Open folder", tip="Show your patches' folder; a patch dropped here is copied to it")
+        folder = tool_button(
+            "Open folder", tip="Show your patches' folder; a patch dropped here is loaded; Save keeps it there"
+        )
         folder.clicked.connect(self.folder_asked)
         foot = QHBoxLayout()
         foot.addWidget(self._state, 1)

@@ -110,7 +110,7 @@ class StringView(QWidget):
         self._toggles = (
             self._toggle("Motion", "Show the string in motion; off saves processor time (M)", self.motion_toggled),
             self._toggle(
-                "Envelope", "Show how far the string swung within the last second (E)", self.envelope_toggled
+                "Envelope", "Show how far the string swung within the last second (N)", self.envelope_toggled
             ),
         )
 

@@ -66,8 +66,8 @@ def broken(name: str, folder: Path) -> Path:
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        ("missing", "No such file"),
-        ("folder", "no sound file"),
+        ("missing", "no file"),
+        ("folder", "no file"),
         ("text", "no sound file"),
         ("ogg", "save it as WAV"),
         ("long", "its length"),

@@ -71,7 +71,7 @@ def test_the_tables_are_as_the_specification_has_them(
     export_sampled(plan, tmp_path / "a.sf2", render)
     font = SoundFont(tmp_path / "a.sf2")
     assert font.info["ifil"] == struct.pack("<HH", 2, 1)
-    assert font.info["INAM"].rstrip(b"\0") == b"Ha_a_rp"
+    assert font.info["INAM"].rstrip(b"\0") == b"Haarp"
     assert {name: len(row) for name, rows in font.rows.items() for row in rows} == ROWS
     *samples, last = font.samples
     assert last[0].rstrip(b"\0") == b"EOS"
@@ -196,6 +196,11 @@ def test_what_no_soundfont_holds_is_told_before(choices: dict, told: str, patch_
 def test_other_files_are_refused(patch: Patch) -> None:
     with pytest.raises(ValueError, match=r"a\.wav: must end with \.sfz or \.sf2"):
         planned(small(patch), Path("a.wav"))
+
+
+def test_accents_go_and_other_letters_are_underscores(patch: Patch, render: Render, tmp_path: Path) -> None:
+    export_sampled(small(patch.model_copy(update={"name": "Café ñ 琴"})), tmp_path / "a.sf2", render)
+    assert SoundFont(tmp_path / "a.sf2").info["INAM"].rstrip(b"\0") == b"Cafe n _"
 
 
 def test_a_hostile_name_is_a_name(patch: Patch, render: Render, tmp_path: Path) -> None:
