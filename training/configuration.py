@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from engine import bounds
-from engine.models import MODELS, read_model_configuration
+from engine.models import MODELS, DiagonalModel, read_model_configuration
 from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
@@ -98,6 +98,8 @@ class Recipe:
     prediction_weight: float = 1.0  # α₁ of the paper's loss
     encoding_weight: float = 1.0  # α₂
     consistency_weight: float = 0.01  # α₃
+    # of both terms, where the paper's text and its authors' code differ: see `fitting.losses`
+    koopman_terms: Literal["text", "code"] = "text"
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
@@ -153,6 +155,8 @@ class TrainingConfiguration:
             raise ValueError(f"latents_per_mode needs blind and the model 'koopman_integrated', not {self.model!r}")
         if self.recipe.latents_per_mode and "state_size" in self.model_configuration:
             raise ValueError("state_size follows latents_per_mode; leave one of them out")
+        if self.recipe.koopman_terms == "code" and not issubclass(MODELS[self.model][0], DiagonalModel):
+            raise ValueError(f"koopman_terms 'code' needs a Koopman model, not {self.model!r}")
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:

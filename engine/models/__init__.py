@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from engine import bounds
+from engine.models._diagonal import DiagonalModel
 from engine.models.base import StringModel, count_parameters
 from engine.models.dmd import DMD, DMDConfiguration
 from engine.models.fno import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
@@ -63,6 +64,7 @@ __all__ = [
     "MODELS",
     "S5",
     "DMDConfiguration",
+    "DiagonalModel",
     "FGRUConfiguration",
     "FRNNConfiguration",
     "IntegratedPhaseConfiguration",

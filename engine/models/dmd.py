@@ -107,9 +107,9 @@ class DMD(DiagonalModel):
     def powers(self, frames: Tensor) -> Tensor:
         return eigenvalues.powers(torch.complex(self.magnitude_log.double(), self.angle.double()), frames)
 
-    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+    def synthesise(self, modulated: Tensor, readout: Tensor | None = None) -> Tensor:
         real, imaginary = read_weight(self.modes, readout).chunk(2, dim=-1)
-        return dense(latents, torch.cat([real, -imaginary], dim=-1))
+        return dense(modulated, torch.cat([real, -imaginary], dim=-1))
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         return self.decode(self.successive_latents(origin, first, count), readout)

@@ -1,0 +1,66 @@
+"""The terms of the Koopman loss, by the paper's text and by its authors' code, written out."""
+
+from dataclasses import replace
+from typing import Literal
+
+import pytest
+import torch
+
+from engine.models import KoopmanVar, KoopmanVarConfiguration
+from engine.models.base import Physics
+from engine.resonators.string import StringParameters
+from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.data.batches import Batch
+from training.fitting.losses import training_loss
+
+RECIPE = Recipe(epochs=1, prediction_weight=0.7, encoding_weight=0.9, consistency_weight=0.3)
+
+
+def model_and_batch() -> tuple[KoopmanVar, Batch]:
+    model = KoopmanVar(KoopmanVarConfiguration(101, 6, (5,))).double()
+    model.initialise("paper", Physics(StringParameters().resonator(6), 4_000), torch.Generator().manual_seed(1))
+    draw = torch.Generator().manual_seed(2)
+    frames = torch.tensor([1, 3, 4])
+    target = torch.randn(2, 3, 101, generator=draw, dtype=torch.float64)
+    return model, Batch(torch.randn(2, 101, generator=draw, dtype=torch.float64), frames, target)
+
+
+def mean_square(values: torch.Tensor) -> float:
+    return float(values.detach().square().mean())
+
+
+@pytest.mark.parametrize("terms", ["text", "code"])
+def test_the_loss_is_the_weighted_sum_of_its_terms(terms: Literal["text", "code"]) -> None:
+    model, batch = model_and_batch()
+    loss, prediction = training_loss(model, batch, replace(RECIPE, koopman_terms=terms))
+
+    eigenvalues = torch.exp(torch.complex(-model.nu_log.exp(), model.theta_log.exp()))
+    origin = model.encode(batch.initial).origin
+    latents = torch.stack([origin * eigenvalues**k for k in (1, 3, 4)], dim=1)
+
+    def multiplied(z: torch.Tensor) -> torch.Tensor:
+        real, imaginary = model.multiplier(z.abs().square()).chunk(2, dim=-1)
+        return z * torch.complex(real, imaginary)
+
+    def decoded(z: torch.Tensor) -> torch.Tensor:
+        return model.decoder(torch.cat([z.real, z.imag], dim=-1))
+
+    wanted = mean_square(decoded(multiplied(latents)) - batch.target)
+    assert float(prediction) == pytest.approx(wanted, rel=1e-9)
+    encoded = model.encode(batch.target.flatten(0, 1)).origin.unflatten(0, (2, 3))
+    if terms == "text":
+        encoding = mean_square(decoded(multiplied(origin)) - batch.initial)
+        consistency = float((encoded - latents).detach().abs().square().mean())
+    else:
+        every = torch.cat([origin[:, None], encoded], dim=1)
+        encoding = mean_square(decoded(every) - torch.cat([batch.initial[:, None], batch.target], dim=1))
+        consistency = mean_square(torch.view_as_real(multiplied(latents) - encoded))
+    assert float(loss.detach()) == pytest.approx(0.7 * wanted + 0.9 * encoding + 0.3 * consistency, rel=1e-9)
+
+
+def test_terms_of_the_code_need_a_koopman_model() -> None:
+    data = DatasetConfiguration("gaussian", 4_000, 10)
+    recipe = Recipe(epochs=1, koopman_terms="code")
+    TrainingConfiguration("", "koopman_var", data, recipe)
+    with pytest.raises(ValueError, match="koopman_terms 'code' needs a Koopman model, not 'lru'"):
+        TrainingConfiguration("", "lru", data, recipe)
