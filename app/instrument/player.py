@@ -7,21 +7,18 @@ it ring. Whatever hands do to a string changes the modes of its voices, the mode
 
 from __future__ import annotations
 
-import contextlib
-import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from app.instrument import events
-from app.instrument.effects import body_response
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
-from app.instrument.loudness import HIGHEST_PEAK_DB, REFERENCE_VELOCITY, gain_of, peak_db
+from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, damped, slid
 from app.patches.patch import Patch
 from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
@@ -238,47 +235,23 @@ class Player:
     # How it is done
 
     def _take(self, patch: Patch) -> None:
-        strings = Strings(patch)
         ear = self._listens or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        rate_hz, model, response = self._rate_hz, self._model, body_response(patch)
-
-        def loud(key: int) -> tuple[KeyString, Resonator, float, float] | None:
-            """Its string, the gain that makes it as loud as the others, and its peak then, in dB."""
-            string = strings.of_key(key)
-            if string is None:
-                return None
-            modes = min(string.modes, model.configuration.grid_points - 2)
-            resonator = string.parameters.resonator(modes, grid_points=model.configuration.grid_points)
-            pluck = _on(string, patch.pluck.pluck(REFERENCE_VELOCITY))
-            gain = gain_of(resonator, pluck, ear, response)
-            return string, resonator, gain, peak_db(resonator, pluck, ear, response) + 20 * math.log10(gain)
-
-        @lru_cache(maxsize=1)
-        def level() -> float:
-            """One factor for all keys: the patch's level, less what the peaks of some of them are too high."""
-            low, high = patch.range
-            peaks_db = []
-            for key in {low + round(share * (high - low)) for share in (0, 0.25, 0.5, 0.75, 1)}:
-                with contextlib.suppress(ValueError):  # told when it is struck
-                    if (found := loud(key)) is not None:
-                        peaks_db.append(found[3])
-            over_db = max(0.0, max(peaks_db, default=HIGHEST_PEAK_DB) - HIGHEST_PEAK_DB)
-            return float(10 ** ((patch.level_db - over_db) / 20))
+        rate_hz, model = self._rate_hz, self._model
+        keys = LoudKeys(patch, ear, model.configuration.grid_points)
 
         @lru_cache(maxsize=KEPT_KEYS)
         def key_of(key: int) -> Key | None:
-            found = loud(key)
+            found = keys.of_key(key)
             if found is None:
                 return None
-            string, resonator, gain, _ = found
             programs: dict[str, Program] = {}
             for source in self._sources:
                 programs[source] = (
-                    solver_program(resonator, rate_hz)
+                    solver_program(found.resonator, rate_hz)
                     if source == "truth"
-                    else tension_program(model, resonator, rate_hz)
+                    else tension_program(model, found.resonator, rate_hz)
                 )
-            return Key(string, resonator, gain * level(), programs)
+            return Key(found.string, found.resonator, found.gain, programs)
 
         self._patch, self._ear, self._key = patch, ear, key_of
 
@@ -295,7 +268,7 @@ class Player:
         if key is None:
             return None
         place = self._place(event)
-        pluck = _on(key.string, self._pluck(event))
+        pluck = on_string(key.string, self._pluck(event))
         voices = {
             source: Voice(program, pluck.displacement(program.grid_points), self._ear)
             for source, program in key.programs.items()
@@ -422,8 +395,3 @@ class Player:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
             struck.retune(parameters, seconds)
-
-
-def _on(string: KeyString, pluck: Pluck) -> Pluck:
-    """A pluck of the whole string, on the string that a key leaves of it."""
-    return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))
