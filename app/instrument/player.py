@@ -32,9 +32,17 @@ MPE_POSITIONS = (0.05, 0.5)  # of the pluck, from the lowest to the highest slid
 DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the way to other modes
 STOP_S = 0.03
 KEPT_KEYS = 256
+GOALS = 8  # that are tried for a wheel all the way up
 # What a wheel all the way up makes of a field: a factor of its own value, or a value
-WHEEL_FACTORS = {"knobs": 4.0, "damping.release_t60_s": 10.0, "room.t60_s": 3.0, "body.size": 2.0}
-WHEEL_VALUES = {"pluck.position": 0.5, "pluck.curve": 1.0, "body.mix": 1.0, "room.mix": 1.0, "level_db": 6.0}
+WHEEL_FACTORS = {"knobs": 4.0, "damping": 10.0, "pluck.hardest_mm": 2.0, "body.size": 2.0, "room.t60_s": 3.0}
+WHEEL_VALUES = {
+    "pluck.position": 0.5,
+    "pluck.width": 0.02,
+    "pluck.width_hard": 0.02,
+    "pluck.curve": 1.0,
+    "body.mix": 1.0,
+    "room.mix": 1.0,
+}
 
 
 @dataclass(frozen=True)
@@ -149,6 +157,11 @@ class Player:
     @property
     def patch(self) -> Patch:
         return self._patch
+
+    @property
+    def heard_through(self) -> Patch:
+        """With the body and the room as the modulation wheel turns them."""
+        return self._wheeled("body.", "room.")
 
     @property
     def preset(self) -> Preset:
@@ -359,19 +372,21 @@ class Player:
             return replace(pluck, position=low + (high - low) * min(max(slide, 0), 127) / 127)
         return pluck
 
-    def _wheeled(self, part: str) -> Patch:
-        """The patch as the mod wheel turns it, where it turns anything of this part."""
+    def _wheeled(self, *parts: str) -> Patch:
+        """The patch as the mod wheel turns it, where it turns anything of these parts."""
         name, share = self._patch.mod_wheel, self._hands.wheel / 127
-        if share == 0 or not name.startswith(part):
+        if share == 0 or not name.startswith(parts):
             return self._patch
         value = self._patch.value(name)
         factor = WHEEL_FACTORS.get(name, WHEEL_FACTORS.get(name.split(".")[0], 0.0))
         goal = WHEEL_VALUES.get(name, value * factor if factor else value)
-        for turned in (value + share * (goal - value), value):
+        for _ in range(GOALS):
             try:
-                return self._patch.with_value(name, turned)
-            except ValueError:  # beyond its bounds
-                continue
+                self._patch.with_value(name, goal)
+            except ValueError:  # beyond its bounds: half as far
+                goal = (goal + value) / 2
+            else:
+                return self._patch.with_value(name, value + share * (goal - value))
         return self._patch
 
     def _with_hands(self, struck: Struck) -> StringParameters:
