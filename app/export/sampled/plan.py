@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, get_args
 
@@ -31,12 +32,22 @@ UNHEARD_FIELDS = {"name", "category", "description", "author", "macros"}  # a ma
 class NoteRenderer(Protocol):
     """Renders one note of a patch, struck at the first frame and let go after `held_s`.
 
-    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. Raises
-    ValueError where there is no such note.
+    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. `advanced` is
+    called several times a second with the seconds rendered, and may raise to stop the rendering. Raises ValueError
+    where there is no such note.
     """
 
     def __call__(
-        self, patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, /
+        self,
+        patch: Patch,
+        key: int,
+        velocity: int,
+        held_s: float,
+        seconds: float,
+        rate_hz: int,
+        /,
+        *,
+        advanced: Callable[[float], None],
     ) -> NDArray[np.float32]: ...
 
 

@@ -21,7 +21,7 @@ def notes(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """What is rendered: decaying sines, in place of the instrument."""
     rendered: list[tuple] = []
 
-    def render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source):
+    def render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
         rendered.append((patch.name, preset.name, key, velocity, held_s, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-30 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)

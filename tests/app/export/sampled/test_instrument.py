@@ -30,7 +30,7 @@ def harp() -> Patch:
 def note(harp: Patch) -> Callable[..., NDArray[np.float32]]:
     preset = load_preset(find_preset(harp.preset))
 
-    def rendered(patch: Patch, *words: float) -> NDArray[np.float32]:
+    def rendered(patch: Patch, *words: float, **_: object) -> NDArray[np.float32]:
         return render_note(patch, preset, *words)  # type: ignore[arg-type]
 
     return rendered

@@ -35,10 +35,11 @@ class Notes:
         self.gate.set()
         self.last = 10**6  # notes that pass before it closes by itself
 
-    def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source):
+    def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
         if len(self.rendered) >= self.last:
             self.gate.clear()
         assert self.gate.wait(20)
+        advanced(seconds)
         self.rendered.append((patch, key, velocity, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-40 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
