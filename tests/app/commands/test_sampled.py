@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.commands.sampled import _keys
 from app.patches.library import find_patch
 
 PATCH = "Classical guitar"
@@ -101,7 +102,7 @@ def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeyp
         (("a.wav",), "must end with .sfz or .sf2"),
         (("a.sf2", "--bits", "16"), "a SoundFont holds 16 bits"),
         (("a.sf2", "--rate", 96_000), "a SoundFont's rate must lie in"),
-        (("a.sfz", "--keys", "low-high"), "must be two MIDI keys as in 40-76"),
+        (("a.sfz", "--keys", "low-high"), "must be two keys as in E2-E5 or 40-76"),
         (("a.sfz", "--keys", "0-127"), "keys must be a range within the patch's own"),
         (("a.sfz", "--layers", 0), "layers must lie in 1 … 32"),
         (("a.sfz", "--every", 99), "every must lie in 1 … 12"),
@@ -116,3 +117,11 @@ def test_bad_usage(run, notes: list[tuple], folder: Path, words: tuple, told: st
 
 def test_no_such_patch(run, folder: Path) -> None:
     assert "no-such-patch" in run("sampled", "no-such-patch", folder / "a.sfz").failure
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [("40-76", (40, 76)), (" 40 - 76 ", (40, 76)), ("60", (60, 60)), ("E2-E5", (40, 76)), ("C-1-C0", (0, 12))],
+)
+def test_keys_are_numbers_or_notes(text: str, keys: tuple[int, int]) -> None:
+    assert _keys(text) == keys
