@@ -8,6 +8,7 @@ Whatever comes from a file is bounded here. Which pitch a key has, and where pat
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -137,6 +138,11 @@ class PhysicalString(_Value):
         from engine.resonators.string import StringParameters  # brings torch
 
         return StringParameters(**self.model_dump())
+
+    @property
+    def first_hz(self) -> float:
+        """The frequency of its first mode, undamped."""
+        return self.parameters.undamped_frequency(1) / math.tau
 
 
 class Fretted(_Value):
