@@ -46,7 +46,7 @@ def sampled(
     """
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
-    from app.export.sampled.words import counted, largest_bytes, megabytes, notes
+    from app.export.sampled.words import counted, megabytes, needed_bytes, notes, size_words
     from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
@@ -81,12 +81,11 @@ def sampled(
         planned(plan, out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    size = largest_bytes(plan, soundfont)
-    words = f"{counted(plan)}, at most {megabytes(size)}"
+    words = f"{counted(plan)}, {size_words(plan, soundfont)}"
     if size_only:
         print(f"{out}: {words}")
         return
-    if size > ASKED_ABOVE_BYTES and not yes:
+    if needed_bytes(plan, soundfont) > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
     say(words)
     from engine.presets import load_preset

@@ -83,13 +83,16 @@ def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatc
 def test_the_size_alone(run, notes: list[tuple], folder: Path) -> None:
     found = run("sampled", PATCH, folder / "a.sfz", *SMALL, "--size-only")
     assert (found.status, found.err) == (0, "")
-    assert found.out == f"{folder / 'a.sfz'}: 6 samples (3 keys, 2 velocity layers), at most 0.3 MB\n"
+    assert (
+        found.out
+        == f"{folder / 'a.sfz'}: 6 samples (3 keys, 2 velocity layers), at most 0.3 MB, before FLAC compression\n"
+    )
     assert notes == [] and list(folder.iterdir()) == []
 
 
 def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = run("sampled", PATCH, folder / "a.sfz", "--layers", 32, "--seconds", 30).failure
-    assert "MB; take fewer --keys, --layers or --seconds, or say --yes" in told
+    assert "MB, before FLAC compression; take fewer --keys, --layers or --seconds, or say --yes" in told
     monkeypatch.setattr("app.commands.sampled.ASKED_ABOVE_BYTES", 1000)
     assert run("sampled", PATCH, folder / "a.sfz", *SMALL).status == 1
     assert notes == [] and list(folder.iterdir()) == []
