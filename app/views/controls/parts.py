@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.plain import Label
@@ -69,6 +81,28 @@ def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, p
     column.setSpacing(0)
     column.addLayout(row)
     column.addWidget(plot, 1)
+
+
+def read_only_text(name: str, text: str = "") -> QPlainTextEdit:
+    """Lines that can be selected; `name` is what a screen reader says."""
+    box = QPlainTextEdit(text, readOnly=True)
+    box.setAccessibleName(name)
+    box.setTabChangesFocus(True)
+    return box
+
+
+def copy_and_close(dialog: QDialog, text: Callable[[], str], word: str, tip: str) -> QHBoxLayout:
+    """The last row of a dialog whose text is for a report: a button `word` that copies it, and Close."""
+    copy = QPushButton(word)
+    copy.setToolTip(tip)
+    copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text()))
+    close = QPushButton("Close", default=True)
+    close.clicked.connect(dialog.accept)
+    buttons = QHBoxLayout()
+    buttons.addWidget(copy)
+    buttons.addStretch(1)
+    buttons.addWidget(close)
+    return buttons
 
 
 def vertical_rule() -> QFrame:

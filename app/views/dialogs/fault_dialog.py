@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QVBoxLayout, QWidget
 
-from app.views.controls.parts import label
+from app.views.controls.parts import copy_and_close, label, read_only_text
 
 MOST_CHARACTERS = 100_000
 
@@ -20,22 +19,11 @@ class FaultDialog(QDialog):
         self.setWindowTitle("Something went wrong")
         self.resize(680, 420)
         words = label(text=f"{heading}\n\nPlease copy this and report it. It is also in {log}.", selectable=True)
-        self._text = QPlainTextEdit(readOnly=True)
-        self._text.setAccessibleName("What happened")
-        self._text.setTabChangesFocus(True)
-        copy = QPushButton("Copy")
-        copy.setToolTip("Copy all of this, for a report")
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.text))
-        close = QPushButton("Close", default=True)
-        close.clicked.connect(self.accept)
-        buttons = QHBoxLayout()
-        buttons.addWidget(copy)
-        buttons.addStretch(1)
-        buttons.addWidget(close)
+        self._text = read_only_text("What happened")
         column = QVBoxLayout(self)
         column.addWidget(words)
         column.addWidget(self._text)
-        column.addLayout(buttons)
+        column.addLayout(copy_and_close(self, lambda: self.text, "Copy", "Copy all of this, for a report"))
 
     @property
     def text(self) -> str:
