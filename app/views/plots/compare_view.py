@@ -7,14 +7,13 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.analysis.comparison import ComparedRow
 from app.presets.library import PresetEntry
 from app.views.controls.parts import tool_button, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.controls.segments import SMALL
-from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
 
 
 def percent(value: float) -> str:
@@ -77,29 +76,13 @@ class CompareView(QWidget):
             "Stop", "Stop comparing", "Stop computing, compute missing rows, or compute all again"
         )
         self._stop.clicked.connect(self.stop_asked)
-        copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
         self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
         self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
-        copy.clicked.connect(self.table.copy)
         self.table.row_double_clicked.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_entered.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_deleted.connect(lambda name: self.preset_toggled.emit(name, False))
         self.progress = ProgressStrip("Progress of the comparison")
-        for control in (presets, self._stop, copy):
-            control.setStyleSheet(SMALL)
-        head = QHBoxLayout()
-        head.setContentsMargins(4, 0, 4, 0)
-        head.setSpacing(8)
-        head.addWidget(presets)
-        head.addWidget(self._words, 1)
-        head.addWidget(self._stop)
-        head.addWidget(copy)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 2, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addWidget(self.progress)
-        column.addWidget(self.table, 1)
+        lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
 
     def set_presets(self, entries: Sequence[PresetEntry]) -> None:
         """What can be compared."""

@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.analysis.take_partials import WINDOWS, PartialRow
-from app.views.controls.parts import combo_box, tool_button, words_label
+from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.controls.segments import SMALL
-from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
 from engine.partials import LEAST_DECAY_DB
 
 
@@ -62,26 +61,11 @@ class PartialsView(QWidget):
         self._words = words_label()
         self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
-        copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
-        copy.clicked.connect(self.table.copy)
         self.table.row_clicked.connect(lambda mode: self.mode_chosen.emit(mode))
         self.table.row_entered.connect(lambda mode: self.mode_chosen.emit(mode))
         self.table.escaped.connect(self.solo_ended)
         self.progress = ProgressStrip("Progress of the partials")
-        for control in (self._window, copy):
-            control.setStyleSheet(SMALL)
-        head = QHBoxLayout()
-        head.setContentsMargins(4, 0, 4, 0)
-        head.setSpacing(8)
-        head.addWidget(self._window)
-        head.addWidget(self._words, 1)
-        head.addWidget(copy)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 2, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addWidget(self.progress)
-        column.addWidget(self.table, 1)
+        lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
 
     @property
     def window_key(self) -> str:
