@@ -123,8 +123,9 @@ def render_note(
     seconds: float,
     rate_hz: int,
     source: str = "model",
+    advanced: Callable[[float], None] = lambda seconds: None,
 ) -> NDArray[np.float32]:
-    """One key that is held for so long, (frames, channels), without a limiter.
+    """One key that is held for so long, (frames, channels), without a limiter. `advanced`: as in `render_events`.
 
     Raises:
         ValueError: the key has no string, or an impossible one.
@@ -133,7 +134,7 @@ def render_note(
     if held_s < seconds:
         events.append((held_s, NoteOff(key)))
     timed = [TimedEvent(time_s, event) for time_s, event in events]
-    blocks = list(render_events(patch, preset, timed, rate_hz, source, seconds, limited=False))
+    blocks = list(render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, advanced=advanced))
     sound = np.concatenate(blocks)
     if not math.isfinite(float(np.abs(sound).max())):
         raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")

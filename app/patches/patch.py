@@ -8,6 +8,7 @@ Whatever comes from a file is bounded here. Which pitch a key has, and where pat
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -57,6 +58,13 @@ FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on one of the three systems
 HIGHEST_KEY = 127
 VELOCITIES = (1, 127)
 LEVEL_RANGE_DB = (-60.0, 24.0)
+MULTIPLIER_RANGE = (0.05, 20.0)
+GAUGE_RANGE = (0.25, 4.0)
+AMPLITUDE_RANGE_MM = (0.001, LARGEST_AMPLITUDE_MM)
+CURVE_RANGE = (-1.0, 1.0)
+RELEASE_RANGE_S = (0.01, 60.0)  # of the damping's T60
+A4_RANGE_HZ = (220.0, 880.0)
+TRANSPOSE_RANGE = (-48, 48)
 
 
 def _plain(text: str) -> str:
@@ -101,10 +109,10 @@ Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(_pla
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
 Key = Annotated[int, _number(0, HIGHEST_KEY)]
 Share = Annotated[float, _number(0, 1)]
-Multiplier = Annotated[float, _number(0.05, 20)]
+Multiplier = Annotated[float, _number(*MULTIPLIER_RANGE)]
 Position = Annotated[float, _number(*POSITION_RANGE)]
 Width = Annotated[float, _number(*WIDTH_RANGE)]
-Millimetres = Annotated[float, _number(0.001, LARGEST_AMPLITUDE_MM)]
+Millimetres = Annotated[float, _number(*AMPLITUDE_RANGE_MM)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
@@ -130,6 +138,11 @@ class PhysicalString(_Value):
         from engine.resonators.string import StringParameters  # brings torch
 
         return StringParameters(**self.model_dump())
+
+    @property
+    def first_hz(self) -> float:
+        """The frequency of its first mode, undamped."""
+        return self.parameters.undamped_frequency(1) / math.tau
 
 
 class Fretted(_Value):
@@ -177,7 +190,7 @@ class Knobs(_Value):
     brightness_decay: Multiplier = 1.0
     modulus: Multiplier = 1.0
     density: Multiplier = 1.0
-    gauge: Annotated[float, _number(0.25, 4)] = 1.0
+    gauge: Annotated[float, _number(*GAUGE_RANGE)] = 1.0
 
 
 class PluckChoices(_Value):
@@ -195,7 +208,7 @@ class PluckChoices(_Value):
     width_hard: Width = 0.06
     softest_mm: Millimetres = 0.1
     hardest_mm: Millimetres = 3.0
-    curve: Annotated[float, _number(-1, 1)] = 0.0
+    curve: Annotated[float, _number(*CURVE_RANGE)] = 0.0
 
     @model_validator(mode="after")
     def _softest_is_softer(self) -> Self:
@@ -225,7 +238,7 @@ class Pickup(_Value):
 class Damping(_Value):
     """What happens when a key is let go: nothing (`let_ring`), or all partials fall by 60 dB in `release_t60_s`."""
 
-    release_t60_s: Annotated[float, _number(0.01, 60)] = 0.3
+    release_t60_s: Annotated[float, _number(*RELEASE_RANGE_S)] = 0.3
     let_ring: Flag = False
 
 
@@ -239,10 +252,10 @@ class TuningChoice(_Value):
         transpose: keys that everything sounds higher.
     """
 
-    a4_hz: Annotated[float, _number(220, 880)] = 440.0
+    a4_hz: Annotated[float, _number(*A4_RANGE_HZ)] = 440.0
     scale: ScalaText = ""
     keymap: ScalaText = ""
-    transpose: Annotated[int, _number(-48, 48)] = 0
+    transpose: Annotated[int, _number(*TRANSPOSE_RANGE)] = 0
 
     @model_validator(mode="after")
     def _gives_pitches(self) -> Self:

@@ -36,10 +36,10 @@ from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
 from app.session.instrument import choices_of, heard_at
+from app.shared.key_names import note_name
 from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
-from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from engine.plain_text import one_line

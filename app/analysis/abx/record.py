@@ -15,6 +15,7 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from app.analysis.abx.trials import LARGEST_SEED, MOST_TRIALS, Run, Trial, draw_order, p_value
+from app.patches.patch import PhysicalString
 from app.shared.version import program_version
 from app.shared.vocabulary import Pickup
 from app.shared.whole_file import WriteError, explain, whole_file
@@ -22,7 +23,7 @@ from engine.plain_text import one_line
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Shape
 
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
-VERSION: Literal[1] = 1
+VERSION: Literal[2] = 2  # 1 did not tell the string
 LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -49,7 +50,11 @@ class HeardSource(BaseModel):
 
 
 class HeardPluck(BaseModel):
-    """The pluck, and where it was heard; positions in lengths of the string."""
+    """The pluck, and where it was heard; positions in lengths of the string.
+
+    Attributes:
+        string: which one was chosen, of a preset of many; None: the preset's own.
+    """
 
     model_config = _FROZEN
 
@@ -62,6 +67,7 @@ class HeardPluck(BaseModel):
     pickup: Pickup = "displacement"
     solo: Annotated[int, Field(ge=0)] = 0
     seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    string: PhysicalString | None = None
 
 
 class HeardThrough(BaseModel):
@@ -88,7 +94,7 @@ class AbxRecord(BaseModel):
     model_config = _FROZEN
 
     kind: Literal["learned-strings-abx"]
-    version: Literal[1]
+    version: Literal[1, 2]
     program: str
     date: AwareDatetime
     a: HeardSource
@@ -105,6 +111,8 @@ class AbxRecord(BaseModel):
 
     @model_validator(mode="after")
     def _numbers_follow_from_trials(self) -> AbxRecord:
+        if self.version == 1 and self.pluck.string is not None:
+            raise ValueError("pluck.string belongs to version 2")
         answered = len(self.trials)
         if self.complete != (answered == self.planned_trials) or answered > self.planned_trials:
             raise ValueError(f"complete does not fit {answered} answers to {self.planned_trials} trials")

@@ -37,6 +37,7 @@ def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
         pickup=choices.pickup,
         solo=choices.solo,
         seconds=choices.seconds,
+        string=choices.string,
     )
     candidates = tuple(Candidate(source, source.capitalize(), entry.name, digest) for source in ("model", "truth"))
     return Subject(candidates, pluck, choices.volume_db)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.analysis.abx.record import AbxRecord, HeardSource
 from app.analysis.abx.trials import LEVEL
+from app.patches.patch import PhysicalString
 from app.presets.words import shape_word
 
 MEANING = (
@@ -45,6 +46,7 @@ def as_text(record: AbxRecord) -> str:
         "A": _source(record.a),
         "B": _source(record.b),
         **_presets(record),
+        "String": "" if pluck.string is None else _string(pluck.string),
         "Pluck": f"position {pluck.position:g}, {pluck.amplitude_mm:g} mm, {shape_word(pluck.shape)}{width}",
         "Heard": f"at {pluck.listen:g} of the length, {pluck.seconds:g} s",
         "Device": f"{through.device} ({through.host_api}), {through.rate_hz} Hz, volume {through.volume_db:+g} dB",
@@ -66,6 +68,11 @@ def as_text(record: AbxRecord) -> str:
 
 def _source(source: HeardSource) -> str:
     return f"{source.label}, turned down by {abs(source.gain_db):.2f} dB"
+
+
+def _string(string: PhysicalString) -> str:
+    values = ", ".join(f"{name} {value:g}" for name, value in string.model_dump().items())
+    return f"{string.first_hz:.1f} Hz: {values}"
 
 
 def _presets(record: AbxRecord) -> dict[str, str]:

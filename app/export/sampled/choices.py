@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampleBits, SampledSource
 from app.patches.patch import Key
 
-SampledForm = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
+SampledKind = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
 
 
 class SampledChoices(BaseModel):
@@ -18,7 +18,7 @@ class SampledChoices(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     folder: str = ""
-    form: SampledForm = "flac"
+    form: SampledKind = "flac"
     bits: SampleBits = "24"
     rate_hz: int = 48_000
     keys: tuple[Key, Key] | None = None

@@ -6,6 +6,7 @@ An export that was stopped goes on with the same call: whole samples are kept, u
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -108,7 +109,7 @@ def export_sampled(
                     file.write(sfz_text(plan, samples, store.folder.name).encode())
                     gain_db = sfz_gain_db(samples)
                 else:
-                    gain_db = write_sf2(file, plan, samples, store.folder)
+                    gain_db = write_sf2(file, plan, samples, store.folder, cancelled)
             size = out.stat().st_size
             if out.suffix.lower() == ".sfz":
                 size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)
@@ -130,9 +131,16 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
     from app.instrument.offline import render_note  # compiled code, and torch
 
     def rendered(
-        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
+        patch: Patch,
+        key: int,
+        velocity: int,
+        held_s: float,
+        seconds: float,
+        rate_hz: int,
+        *,
+        advanced: Callable[[float], None],
     ) -> NDArray[np.float32]:
-        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source)
+        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced)
 
     return rendered
 

@@ -125,17 +125,25 @@ class SampleStore:
             ExportError: a file cannot be written, or a note is not finite.
         """
         self._write_index()  # before any sample: it says whose they are
-        wanted = [zone for zone in plan.zones if not self._keeps(plan, zone)]
-        started = time.monotonic()
-        for done, zone in enumerate(wanted):
+
+        def check(_: object = None) -> None:
             if cancelled():
                 raise ExportCancelled
+
+        wanted = []
+        for zone in plan.zones:
+            check()
+            if not self._keeps(plan, zone):
+                wanted.append(zone)
+        started = time.monotonic()
+        for done, zone in enumerate(wanted):
+            check()
             share = done / len(wanted)
             if done == 1:
                 started = time.monotonic()  # the first note also loads and compiles
             left_s = (time.monotonic() - started) * (len(wanted) - done) / (done - 1) if done > 1 else None
             progress(share, f"key {zone.key}, velocity {zone.velocity}", left_s)
-            self._add(plan, zone, render)
+            self._add(plan, zone, render, check)
         self._remove_all_but({plan.file_name(zone) for zone in plan.zones})
         return {zone: self._index.samples[plan.file_name(zone)] for zone in plan.zones}, len(wanted)
 
@@ -158,11 +166,11 @@ class SampleStore:
         except OSError:
             return False
 
-    def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer) -> None:
+    def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer, advanced: Callable[[float], None]) -> None:
         name = plan.file_name(zone)
         try:
             note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
-            sample = sample_of(render(*note), plan.rate_hz)
+            sample = sample_of(render(*note, advanced=advanced), plan.rate_hz)
         except ValueError as error:
             raise ExportError(f"{self.path(name)}: {error}") from error
         data = encoded(sample, plan.rate_hz, plan.format, plan.bits)

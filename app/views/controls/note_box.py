@@ -7,24 +7,9 @@ import re
 from PySide6.QtGui import QValidator
 from PySide6.QtWidgets import QSpinBox
 
-from app.views.instrument.playable import note_name
+from app.shared.key_names import key_named, note_name
 
-_SEMITONES = {"C": 0, "D": 2, "E": 4, "F": 5, "G": 7, "A": 9, "B": 11}
-_SIGNS = {"": 0, "#": 1, "♯": 1, "b": -1, "♭": -1}
-_NOTE = re.compile(r"([A-Ga-g])([#♯b♭]?)(-?\d)", re.ASCII)
 _BEGUN = re.compile(r"([A-Ga-g][#♯b♭]?-?\d?|\d{0,3})", re.ASCII)
-
-
-def key_named(text: str) -> int | None:
-    """The MIDI key of a note's name or number; None where it is none. C4 is 60, as in `note_name`."""
-    text = text.strip()
-    if text.isdecimal() and text.isascii():
-        return int(text)
-    found = _NOTE.fullmatch(text)
-    if found is None:
-        return None
-    letter, sign, octave = found.groups()
-    return _SEMITONES[letter.upper()] + _SIGNS[sign] + 12 * (int(octave) + 1)
 
 
 class NoteBox(QSpinBox):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -16,9 +15,7 @@ from engine.presets import load_preset, of_string
 
 def string_word(choices: Choices) -> str:
     """Which string of many is plucked, by the frequency of its first mode; "" for the preset's own."""
-    if choices.string is None:
-        return ""
-    return f"{choices.string.parameters.undamped_frequency(1) / math.tau:.1f} Hz"
+    return "" if choices.string is None else f"{choices.string.first_hz:.1f} Hz"
 
 
 def suggested_name(preset: PresetEntry, choices: Choices, rate_hz: int, source: Source) -> str:

@@ -13,8 +13,9 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
+from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import Playable, note_name
+from app.views.instrument.playable import Playable
 
 MOST_ROWS, MOST_FRETS = 8, 24
 NAMES_WIDTH = 40  # open strings, left of the nut

@@ -7,20 +7,16 @@ what lies beyond the model's training.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
+from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch
 from app.views.controls.knob import Knob, KnobRange
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, plain_tip
 
-if TYPE_CHECKING:
-    from app.patches.patch import Macro, Patch
-
-MOST_MACROS = 8
 ROOMY_MACROS = 6  # more of them stand closer
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
 COMPARE_TIP = "Hear the patch as it was saved, while this is pressed; its knobs stay. Any change ends it"
@@ -28,7 +24,7 @@ SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
     "body.mix": ("mix", SHARE, "How much is heard of the body that the strings stand on"),
     "room.mix": ("room", KnobRange(0, 1, 0, 0.02, "{:.0%}"), "How much is heard of the room"),
-    "level_db": ("level", KnobRange(-60, 24, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
+    "level_db": ("level", KnobRange(*LEVEL_RANGE_DB, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
 }
 
 

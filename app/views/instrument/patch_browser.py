@@ -25,11 +25,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.shared.key_names import note_name
 from app.views import theme
 from app.views.controls.browser import KEYS, MOVES, Browser
 from app.views.controls.parts import combo_box, label, tool_button
 from app.views.controls.plain import Label, plain_tip
-from app.views.instrument.playable import note_name
 
 if TYPE_CHECKING:
     from app.patches.library import PatchEntry

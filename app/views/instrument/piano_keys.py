@@ -8,8 +8,9 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
+from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import Playable, note_name
+from app.views.instrument.playable import Playable
 
 BLACK_HEIGHT = 0.62  # of a white key's
 BLACK_WIDTH = 0.6

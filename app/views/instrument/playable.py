@@ -19,6 +19,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.shared.key_names import note_name
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS
 
@@ -27,13 +28,7 @@ SOFTEST, HARDEST = 16, 127  # velocities of a click at the top and at the bottom
 TIP_MS = 5_000  # then it is out of the way
 TYPED = 96  # velocity of the Enter key
 LEVEL_STEPS = 24  # that can be told apart; finer changes are not painted
-NAMES = ("C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯", "A", "A♯", "B")
 _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
-
-
-def note_name(key: int) -> str:
-    """With its octave; key 60 is C4."""
-    return f"{NAMES[key % 12]}{key // 12 - 1}"
 
 
 class Playable(QWidget):

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
+from app.patches.patch import (
+    A4_RANGE_HZ,
+    AMPLITUDE_RANGE_MM,
+    CURVE_RANGE,
+    GAUGE_RANGE,
+    MULTIPLIER_RANGE,
+    RELEASE_RANGE_S,
+    TRANSPOSE_RANGE,
+    Patch,
+)
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, Knob, KnobRange
 from app.views.controls.parts import faint, vertical_rule
 from app.views.controls.plain import plain_tip
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
-
-if TYPE_CHECKING:
-    from app.patches.patch import Patch
+from engine.pluck import POSITION_RANGE, WIDTH_RANGE
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 TIMES = "× {:.2f}"
@@ -34,8 +40,8 @@ class _Turned:
     tip: str
 
 
-def _times(low: float = 0.05, high: float = 20.0) -> KnobRange:
-    return KnobRange(low, high, 1.0, 1.03, TIMES, logarithmic=True)
+def _times(limits: tuple[float, float] = MULTIPLIER_RANGE) -> KnobRange:
+    return KnobRange(*limits, 1.0, 1.03, TIMES, logarithmic=True)
 
 
 _PLACE = "0 and 1 are the ends of the string, 0.5 its middle"
@@ -44,10 +50,13 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
         "PITCH",
         (
             _Turned(
-                "tuning.a4_hz", "A4", KnobRange(220, 880, 440, 2 ** (1 / 1200), "{:.1f} Hz", True), "Pitch of A4"
+                "tuning.a4_hz", "A4", KnobRange(*A4_RANGE_HZ, 440, 2 ** (1 / 1200), "{:.1f} Hz", True), "Pitch of A4"
             ),
             _Turned(
-                WHOLE, "transpose", KnobRange(-48, 48, 0, 1, "{:+.0f}"), "Semitones that everything sounds higher"
+                WHOLE,
+                "transpose",
+                KnobRange(*TRANSPOSE_RANGE, 0, 1, "{:+.0f}"),
+                "Semitones that everything sounds higher",
             ),
         ),
     ),
@@ -55,7 +64,7 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
         "STRING",
         (
             _Turned(
-                "knobs.gauge", "gauge", _times(0.25, 4), "Thickness: thick strings are stiffer and ring otherwise"
+                "knobs.gauge", "gauge", _times(GAUGE_RANGE), "Thickness: thick strings are stiffer and ring otherwise"
             ),
             _Turned("knobs.density", "density", _times(), "Mass of the material: gut is light, steel heavy"),
             _Turned(
@@ -85,7 +94,7 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
             _Turned(
                 "damping.release_t60_s",
                 "release",
-                KnobRange(0.01, 60, 0.3, 1.1, "{:.2f} s", True),
+                KnobRange(*RELEASE_RANGE_S, 0.3, 1.1, "{:.2f} s", True),
                 "How long a key that is let go takes to fall by 60 dB",
             ),
         ),
@@ -111,19 +120,19 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
             _Turned(
                 "pluck.softest_mm",
                 "softest",
-                KnobRange(0.001, LARGEST_AMPLITUDE_MM, 0.1, 1.1, "{:.2f} mm", True),
+                KnobRange(*AMPLITUDE_RANGE_MM, 0.1, 1.1, "{:.2f} mm", True),
                 "How far the softest key pulls the string",
             ),
             _Turned(
                 "pluck.hardest_mm",
                 "hardest",
-                KnobRange(0.001, LARGEST_AMPLITUDE_MM, 3.0, 1.1, "{:.2f} mm", True),
+                KnobRange(*AMPLITUDE_RANGE_MM, 3.0, 1.1, "{:.2f} mm", True),
                 "How far the hardest key pulls the string",
             ),
             _Turned(
                 "pluck.curve",
                 "curve",
-                KnobRange(-1, 1, 0, 0.05, "{:+.2f}"),
+                KnobRange(*CURVE_RANGE, 0, 0.05, "{:+.2f}"),
                 "Velocity curve: above 0 middle velocities are louder, below 0 softer",
             ),
         ),
