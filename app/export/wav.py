@@ -1,6 +1,6 @@
-"""WAV bytes from samples: rate, level, fade, dither, rounding, tags. Nothing here touches a file.
+"""WAV from samples: rate, level, fade, dither, rounding, tags, written to an open file.
 
-libsndfile stores what it is given; whatever changes a number is done here, in NumPy, where it can be tested.
+libsndfile only stores: all that changes a number is done here, in NumPy, where it can be tested.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from app.export.wav_chunks import Marker, finish
 from app.shared.vocabulary import BITS, Bits
 
 RATE_RANGE_HZ = (1_000, 384_000)
-LONGEST_TAG_BYTES = 2_000  # libsndfile reads back no INFO text of 2048 bytes or more
-NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves room for the peaks between samples
+LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 bytes or more
+NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
 
 _SUBTYPES: dict[Bits, str] = {"16": "PCM_16", "24": "PCM_24", "32f": "FLOAT"}
 _DITHER_SEED = 0  # the same sound makes the same file
@@ -37,7 +37,10 @@ class WavSettings:
         bits: integers of 16 (with TPDF dither) or 24 bits, or 32-bit floating point, which never clips.
         rate_hz: None keeps the samples' own rate. A higher one adds no bandwidth.
         normalise: to -1 dBFS, by one gain for all channels and for the sounds that belong together.
-        fade_out_s: at the end, so that a decay that is cut does not click.
+        fade_out_s: the length of the fade at the end, so that a decay that is cut off does not click.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it.
     """
 
     bits: Bits = "24"
@@ -112,13 +115,15 @@ def write_wav(
     beside: Sequence[Sound] = (),
     labels: Mapping[str, float] | None = None,
 ) -> Level:
-    """As `encode_wav`, of a sound of the file's own rate, block by block: memory does not grow with its length.
+    """As `encode_wav`, for a sound at the file's own rate, block by block: memory does not grow with its length.
 
     Args:
         file: open for reading and writing, empty.
+        rate_hz: of the sound; `settings.rate_hz` is ignored.
 
     Raises:
-        ValueError: see there.
+        ValueError: as `encode_wav`.
+        OSError: the file cannot be written.
     """
     _check_tags(tags)
     if len(sound) == 0:
@@ -137,7 +142,7 @@ def write_wav(
         for first, block in blocks(sound):
             faded = _faded(block, first, len(sound), fade_frames)
             stored, cut = quantised(faded * gain, settings.bits, first, len(sound))
-            with suppress(soundfile.SoundFileError, AssertionError):  # of a disk that is full: told next
+            with suppress(soundfile.SoundFileError, AssertionError):  # of a full disk, whose OSError `check` raises
                 out.write(stored)
             noting.check()
             clipped += cut
@@ -147,7 +152,7 @@ def write_wav(
 
 
 class _Noting:
-    """A file as libsndfile is given it, which cannot pass an error on: the first one is kept to be raised later."""
+    """A file for libsndfile, which cannot pass on an OSError: the first one is kept and raised by `check`."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -172,7 +177,7 @@ def _places(labels: Mapping[str, float], rate_hz: int) -> list[tuple[str, int]]:
 
 
 def _faded(block: NDArray[np.floating], first: int, total: int, frames: int) -> NDArray[np.float64]:
-    """A block that begins at frame `first` of `total`, with its part of the fade over the last `frames`."""
+    """A block that begins at frame `first` of `total`, with its part of the fade-out over the last `frames`."""
     frames = min(frames, total)
     begin = max(0, total - frames - first)  # in the block
     faded: NDArray[np.float64] = block.astype(np.float64)
@@ -194,7 +199,7 @@ def _finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> NDArray[np.float64]:
-    """The same duration at another rate, band-limited; untouched where the rates are equal."""
+    """The sound at another rate, band-limited, of the same duration; unchanged where the rates are equal."""
     if rate_hz == new_rate_hz:
         return samples
     frames = round(len(samples) * new_rate_hz / rate_hz)
@@ -203,7 +208,7 @@ def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> N
 
 
 def faded_out(samples: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
-    """The last `frames` brought to zero along half a cosine."""
+    """The sound with its last `frames` faded to zero along half a cosine."""
     return _faded(samples, 0, len(samples), frames)
 
 
@@ -212,11 +217,11 @@ def quantised(
 ) -> tuple[NDArray[np.generic], int]:
     """The numbers that the file stores, as soundfile takes them, and how many were clipped.
 
-    Triangular dither of ±1 step at 16 bits makes the rounding error a noise that does not follow the sound;
-    at 24 bits the step lies 144 dB down, below any converter's own noise.
+    At 16 bits triangular dither of ±1 step makes the rounding error a noise independent of the sound; at 24 bits the
+    step is 144 dB below full scale, below any converter's own noise.
 
     Args:
-        first, total: the samples are a block that begins at this frame of so many: the dither is that of the whole.
+        first, total: the samples are a block that begins at frame `first` of `total`, and get its part of the dither.
     """
     if bits == "32f":
         return samples.astype(np.float32), 0
@@ -235,7 +240,7 @@ def quantised(
 
 
 def _dither(shape: tuple[int, ...], first: int) -> NDArray[np.float64]:
-    """Numbers in 0 … 1 from the `first` on of one endless row."""
+    """Random numbers in 0 … 1, of one fixed sequence from its element `first` on."""
     return np.random.Generator(np.random.PCG64(_DITHER_SEED).advance(first)).random(shape)
 
 
