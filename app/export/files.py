@@ -14,9 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
-from numpy.typing import NDArray
-
 from app.export.recipe import Recipe
 from app.export.recording import Sound
 from app.export.sound import (
@@ -32,8 +29,7 @@ from app.export.sound import (
     render_sound,
     render_voices,
 )
-from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, encode_wav
-from app.export.wav import write_wav as write_blocks
+from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, write_wav
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import BITS, Bits
 from app.shared.whole_file import WriteError, explain, whole_file
@@ -147,7 +143,7 @@ def export_sounds(
             with _explained(path):
                 labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
                 tags = _tags(info.title, recipes[source])
-                level = write_blocks(file, sound, rate_hz, settings, tags, beside, labels)
+                level = write_wav(file, sound, rate_hz, settings, tags, beside, labels)
             report = _report(path, file, len(sound), rate_hz, level)
             past_s = max(0.0, report.seconds - info.horizon_s) if labels else 0.0
             reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
@@ -159,25 +155,6 @@ def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
     if request.decay_db is None:
         return settings
     return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
-
-
-def write_wav(
-    path: Path,
-    samples: NDArray[np.floating],
-    rate_hz: int,
-    settings: WavSettings | None = None,
-    *,
-    title: str = "",
-) -> WavReport:
-    """Writes samples (frames,) or (frames, channels), ±1 being full scale, whole or not at all.
-
-    Raises:
-        ExportError: the file cannot be written, or a sample is not finite.
-    """
-    with _written_whole(path) as file, _explained(path):
-        wav = encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title))
-        file.write(wav.data)
-        return _report(path, file, wav.frames, wav.rate_hz, wav.level)
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
@@ -192,9 +169,8 @@ def _digits(value: float, least: int) -> str:
     return next((text for places in range(least, 6) if float(text := f"{value:.{places}f}") == value), f"{value:.6f}")
 
 
-def _tags(title: str, recipe: Recipe | None = None) -> dict[str, str]:
-    comment = recipe.model_dump_json() if recipe else ""
-    tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": comment}
+def _tags(title: str, recipe: Recipe) -> dict[str, str]:
+    tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": recipe.model_dump_json()}
     return {name: text for name, text in tags.items() if text}
 
 
@@ -241,5 +217,4 @@ __all__ = [
     "export_sounds",
     "render_sound",
     "settings_of",
-    "write_wav",
 ]

@@ -1,11 +1,10 @@
-"""WAV from samples: rate, level, fade, dither, rounding, tags, written to an open file.
+"""WAV from samples: level, fade, dither, rounding, tags, written to an open file.
 
 libsndfile only stores: all that changes a number is done here, in NumPy, where it can be tested.
 """
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -14,7 +13,6 @@ from typing import BinaryIO
 
 import numpy as np
 import soundfile
-import soxr
 from numpy.typing import NDArray
 
 from app.export.recording import Sound, blocks
@@ -35,7 +33,7 @@ class WavSettings:
 
     Attributes:
         bits: integers of 16 (with TPDF dither) or 24 bits, or 32-bit floating point, which never clips.
-        rate_hz: None keeps the samples' own rate. A higher one adds no bandwidth.
+        rate_hz: at which the sound is rendered; None: the preset's own rate.
         normalise: to -1 dBFS, by one gain for all channels and for the sounds that belong together.
         fade_out_s: the length of the fade at the end, so that a decay that is cut off does not click.
 
@@ -67,45 +65,6 @@ class Level:
     gain_db: float
 
 
-@dataclass(frozen=True)
-class EncodedWav:
-    """A whole WAV file in memory."""
-
-    data: bytes
-    level: Level
-    frames: int
-    rate_hz: int
-
-
-def encode_wav(
-    samples: NDArray[np.floating],
-    rate_hz: int,
-    settings: WavSettings,
-    tags: dict[str, str],
-    beside: Sequence[NDArray[np.float64]] = (),
-    labels: Mapping[str, float] | None = None,
-) -> EncodedWav:
-    """A WAV file of samples (frames,) or (frames, channels) where ±1 is full scale.
-
-    Args:
-        tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
-        beside: other sounds of the same rate that share the gain when normalising.
-        labels: names of markers and their times in s; those past the end are left out.
-
-    Raises:
-        ValueError: a sample is not finite, there are none, or a tag is too long.
-    """
-    _check_tags(tags)
-    if len(samples) == 0:
-        raise ValueError("there are no samples to write; choose a longer duration")
-    new_rate_hz = settings.rate_hz or rate_hz
-    sound = resampled(samples.astype(np.float64), rate_hz, new_rate_hz)
-    others = [resampled(other, rate_hz, new_rate_hz) for other in beside]
-    buffer = io.BytesIO()
-    level = write_wav(buffer, sound, new_rate_hz, settings, tags, others, labels)
-    return EncodedWav(buffer.getvalue(), level, len(sound), new_rate_hz)
-
-
 def write_wav(
     file: BinaryIO,
     sound: Sound,
@@ -115,14 +74,19 @@ def write_wav(
     beside: Sequence[Sound] = (),
     labels: Mapping[str, float] | None = None,
 ) -> Level:
-    """As `encode_wav`, for a sound at the file's own rate, block by block: memory does not grow with its length.
+    """Writes a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
+
+    It is written block by block, so that memory does not grow with its length.
 
     Args:
         file: open for reading and writing, empty.
         rate_hz: of the sound; `settings.rate_hz` is ignored.
+        tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
+        beside: other sounds that share the gain when normalising.
+        labels: names of markers and their times in s; those past the end are left out.
 
     Raises:
-        ValueError: as `encode_wav`.
+        ValueError: a sample is not finite, there are none, or a tag is too long.
         OSError: the file cannot be written.
     """
     _check_tags(tags)
@@ -196,15 +160,6 @@ def _finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
     if not bool(np.isfinite(block).all()):
         raise ValueError("the sound holds values that are not finite; choose another source or a shorter duration")
     return block
-
-
-def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> NDArray[np.float64]:
-    """The sound at another rate, band-limited, of the same duration; unchanged where the rates are equal."""
-    if rate_hz == new_rate_hz:
-        return samples
-    frames = round(len(samples) * new_rate_hz / rate_hz)
-    sound = soxr.resample(samples, rate_hz, new_rate_hz, quality="VHQ")[:frames]
-    return np.concatenate([sound, np.zeros((frames - len(sound), *sound.shape[1:]))])
 
 
 def faded_out(samples: NDArray[np.float64], frames: int) -> NDArray[np.float64]:

@@ -22,13 +22,6 @@ class Marker:
     label: str
 
 
-def with_markers(data: bytes, markers: Sequence[Marker]) -> bytes:
-    """The WAV file with a "cue " chunk and the labels of its points (LIST adtl), as editors show them."""
-    file = io.BytesIO(data)
-    _append(file, markers)
-    return file.getvalue()
-
-
 def finish(file: BinaryIO, markers: Sequence[Marker]) -> None:
     """Adds markers to a WAV file written by libsndfile and zeroes the time in its PEAK chunk.
 
@@ -62,24 +55,6 @@ def _append(file: BinaryIO, markers: Sequence[Marker]) -> None:
     size = file.tell()
     file.seek(4)
     file.write(struct.pack("<I", size - 8))
-
-
-def read_markers(data: bytes) -> list[Marker]:
-    """The markers of a WAV file, in the order of their numbers; damaged ones are left out."""
-    frames: dict[int, int] = {}
-    labels: dict[int, str] = {}
-    for name, start, size in chunks(data):
-        body = data[start : start + size]
-        if name == b"cue ":
-            for place in range(4, len(body) - 23, 24):
-                number, _, _, _, _, frame = struct.unpack_from("<II4sIII", body, place)
-                frames[number] = frame
-        elif name == b"LIST" and body[:4] == b"adtl":
-            for kind, first, length in chunks(body, 4):
-                if kind == b"labl" and length >= 4:
-                    (number,) = struct.unpack_from("<I", body, first)
-                    labels[number] = body[first + 4 : first + length].rstrip(b"\0").decode(errors="replace")
-    return [Marker(frames[number], labels.get(number, "")) for number in sorted(frames)]
 
 
 def chunks(data: bytes, position: int = 12) -> Iterator[tuple[bytes, int, int]]:
