@@ -22,7 +22,6 @@ LIBRARIES = (
     "pyqtgraph",
     "sounddevice",
     "soundfile",
-    "soxr",
     "pydantic",
 )
 
