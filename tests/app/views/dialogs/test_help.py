@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
+from app.presets.words import model_word
 from app.shared.log import log_file
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.help_text import MODELS
@@ -30,10 +31,10 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
         assert panel.title in texts["Views"]
         assert panel.help, panel.key
         assert panel.help in texts["Views"]
-    assert len(MODELS) == len(KNOWN_MODELS)
+    assert {title for title, _ in MODELS} == {model_word(model) for model in KNOWN_MODELS}  # as presets are named
     for title, _ in MODELS:
         assert title in texts["Models"]
-    assert str(log_file()) in texts["Faults"]
+    assert str(log_file()) in texts["Errors"]
     dialog.close()
 
 
