@@ -1,10 +1,10 @@
-"""bench solver, render, voices, effects, tune, take, train, app, play, soak: what the program costs here."""
+"""bench solver, render, voices, effects, tune, take, train, app, play, notes, soak: what the program costs here."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,8 +12,9 @@ from app.commands.arguments import Json
 from app.commands.console import print_json, print_table, progress
 
 if TYPE_CHECKING:
+    from app.audio.choices import Buffer
     from app.commands.benchmarks.machine import Machine
-    from app.commands.benchmarks.play.measure import Spread
+    from app.commands.benchmarks.play.spread import Spread
 
 bench = typer.Typer(help="Measure speed on this machine: medians of repeats.", no_args_is_help=True)
 
@@ -285,17 +286,11 @@ def play(
 
     Linux only; needs PulseAudio and Xvfb, and touches nothing of the sound and the screen in use.
     """
-    from pydantic import ValidationError
-
-    from app.audio.choices import SoundChoice
     from app.commands.benchmarks.play.measure import measure
     from app.commands.console import Failure
     from app.patches.library import PatchError, find_patch
 
-    try:
-        chosen = SoundChoice.model_validate({"buffer": int(buffer) if buffer.isdecimal() else buffer}).buffer
-    except ValidationError:
-        raise typer.BadParameter("low, medium, high, 128, 256, 512, 1024 or 2048", param_hint="--buffer") from None
+    chosen = _buffer(buffer)
     try:
         found_patch = find_patch(patch).patch
     except PatchError as error:
@@ -342,6 +337,73 @@ def play(
         ("uncertainty of the device's buffer, ms", found.device_uncertainty_ms),
     ]
     print_table(("what", "here"), rows)
+
+
+@bench.command()
+def notes(
+    json: Json = False,
+    by: Annotated[Literal["midi", "keys", "both"], typer.Option(help="What plays.")] = "both",
+    buffer: Annotated[str, typer.Option(help="low, medium, high, or 128 ... 2048 frames.")] = "medium",
+    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    patch: Annotated[
+        str, typer.Option(metavar="PATCH", help="What is played, without its body and room.")
+    ] = "classical_guitar",
+) -> None:
+    """What notes sound like: a melody, chords, repeats, bends and a pedal, by MIDI and keys, recorded and measured.
+
+    Linux only; needs PulseAudio and Xvfb, for MIDI JACK as well, and touches nothing of the sound and screen in use.
+    """
+    from app.commands.benchmarks.play.notes import measure
+    from app.commands.console import Failure
+    from app.patches.library import PatchError, find_patch
+
+    chosen = _buffer(buffer)
+    try:
+        found_patch = find_patch(patch).patch
+    except PatchError as error:
+        raise Failure(str(error)) from error
+    if found_patch.damping.let_ring:
+        raise Failure(f"{found_patch.name}: its strings ring on when a key is let go; choose one with dampers")
+    with progress("bench notes") as report:
+        found = measure(by, chosen, seed, found_patch, report)
+    if json:
+        print_json(asdict(found))
+        return
+    _print_machine(found.machine)
+    loads = ", ".join(f"{each.load_before:.1f}" for each in found.heard)
+    print(f"{found.patch}, without body and room; {found.buffer} buffer; seed {found.seed}; load before: {loads}")
+    hands, told = found.heard, [each.judgement for each in found.heard]
+    t60_s = told[0].wanted_t60_s
+    rows: list[tuple[object, ...]] = [
+        ("quiet notes off their tuning, worst, cents", *(each.melody_cents for each in told), 0.5),
+        ("resting bends off theirs, worst, cents", *(each.bend_cents for each in told), 0.5),
+        ("tones of chords off theirs, worst, cents", *(each.chord_cents for each in told), None),
+        ("tones of chords that stand out", *(f"{each.tones_heard} of {each.chord_tones}" for each in told), "all"),
+        ("repeats that are heard", *(f"{each.repeats_heard} of {each.repeats}" for each in told), "all"),
+        ("single notes that are not heard", *(each.unheard for each in hands), 0),
+        ("quiet notes from softest to loudest, dB", *(each.loudness_spread_db for each in told), "below 3"),
+        ("damper's T60, shortest, s", *(each.release_t60_s[0] for each in told), t60_s),
+        ("damper's T60, longest, s", *(each.release_t60_s[1] for each in told), t60_s),
+        ("held by the pedal from held by a finger, dB", *(each.pedal_db for each in told), 0),
+        ("damper's T60 as the pedal rises, s", *(each.pedal_t60_s for each in told), t60_s),
+        ("largest fall at a soft strike of a loud string, dB", *(each.restrike_db for each in told), None),
+        ("holes", *(each.holes for each in told), 0),
+        ("holes together, ms", *(each.holes_ms for each in told), 0),
+        ("holes of a steady tone beside it", *(each.control_holes for each in hands), None),
+        ("these together, ms", *(each.control_holes_ms for each in hands), None),
+        ("fades", *(each.fades for each in told), 0),
+        ("clicks", *(each.clicks for each in told), 0),
+        *((*row, None) for row in _spread_rows("to sound", [each.latency_ms for each in hands])),
+        *(
+            (*row, None)
+            for row in _spread_rows("to sound, beyond the device", [each.beyond_device_ms for each in hands])
+        ),
+        ("of it the MIDI cable, median, ms", *(each.cable_ms for each in hands), None),
+        ("messages that the cable lost", *(each.lost for each in hands), 0),
+        ("the device's own buffer, ms", *(each.device_ms for each in hands), None),
+        ("loudest sample", *(each.loudest for each in told), "below 1"),
+    ]
+    print_table(("what", *(f"by {each.by}" for each in found.heard), "wanted"), rows)
 
 
 def _spread_rows(name: str, spreads: Sequence[Spread | None]) -> list[tuple[object, ...]]:
@@ -395,6 +457,17 @@ def soak(
                 print(f"{kind}, {times} times: {text}")
     if found.faults or found.threads_left:
         raise typer.Exit(1)
+
+
+def _buffer(text: str) -> Buffer:
+    from pydantic import ValidationError
+
+    from app.audio.choices import SoundChoice
+
+    try:
+        return SoundChoice.model_validate({"buffer": int(text) if text.isdecimal() else text}).buffer
+    except ValidationError:
+        raise typer.BadParameter("low, medium, high, 128, 256, 512, 1024 or 2048", param_hint="--buffer") from None
 
 
 def _print_machine(machine: Machine) -> None:

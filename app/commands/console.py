@@ -7,7 +7,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -23,6 +23,18 @@ class Report(Protocol):
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None) -> None:
         """`share` in 0 … 1; `left_s` where the work knows better than its past speed what is left."""
+
+
+class Shares:
+    """Progress of several pieces of work of one length, one after the other."""
+
+    def __init__(self, report: Report, pieces: int) -> None:
+        self._report, self._pieces, self._begun = report, pieces, 0
+
+    def next(self) -> Callable[[float], None]:
+        """What the next piece tells its share to."""
+        before, self._begun = self._begun, self._begun + 1
+        return lambda share: self._report((before + share) / self._pieces)
 
 
 class Failure(Exception):

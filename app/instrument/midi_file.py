@@ -88,7 +88,7 @@ def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
     tick = 0
     for each in sorted(timed, key=lambda one: one.time_s):
         now = round(mido.second2tick(each.time_s, TICKS, TEMPO))
-        for message in _messages(each.event):
+        for message in messages_of(each.event):
             track.append(message.copy(time=max(0, now - tick)))
             tick = max(tick, now)
     file = mido.MidiFile(type=0, ticks_per_beat=TICKS)
@@ -98,7 +98,8 @@ def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
     return buffer.getvalue()
 
 
-def _messages(event: Event) -> Iterable[Any]:
+def messages_of(event: Event) -> Iterable[Any]:
+    """Of mido's; none for what MIDI has no words for."""
     import mido
 
     if isinstance(event, PatchTurned):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Callable
@@ -28,7 +29,7 @@ class Backend(Protocol):
 
 
 def load_backend() -> Backend:
-    """Mido with python-rtmidi.
+    """Mido with python-rtmidi, or what mido's own variable MIDO_BACKEND names, as "mido.backends.rtmidi/UNIX_JACK".
 
     Raises:
         MidiUnavailable: one of them is not installed.
@@ -36,8 +37,12 @@ def load_backend() -> Backend:
     try:
         import mido
 
-        backend: Backend = mido.Backend("mido.backends.rtmidi", load=True)
+        backend: Backend = mido.Backend(load=True)
     except ImportError as error:
+        if named := os.environ.get("MIDO_BACKEND"):
+            raise MidiUnavailable(
+                f"MIDO_BACKEND names {named}, which cannot be loaded ({error}). Correct it, or unset it."
+            ) from error
         raise MidiUnavailable(
             "MIDI needs two packages that are not installed: mido and python-rtmidi. "
             f"Get them with:  {sys.executable} -m pip install mido python-rtmidi"
@@ -63,7 +68,7 @@ class MidiInput:
         """
         try:
             return list(dict.fromkeys(self._loaded().get_input_names()))
-        except (OSError, RuntimeError) as error:
+        except (OSError, RuntimeError, ValueError) as error:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:

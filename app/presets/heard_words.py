@@ -1,7 +1,8 @@
 """How true a preset sounds, in a musician's words.
 
-What is named can be heard: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the next
-(Moore, "An Introduction to the Psychology of Hearing"). Levels have 2 dB: seconds of decay lie between the two.
+Only what can be heard is named: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the
+next (Moore, "An Introduction to the Psychology of Hearing"). For changes of level the threshold is 2 dB, because they
+are heard over seconds of decay and not from one tone to the next.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ UNMEASURED = "not measured"
 
 
 def heard_word(heard: Heard | None) -> str:
-    """For a list: "true", the worst that is wrong, or how far it is off."""
+    """For a list: "true", the worst fault, or the distance of the spectra in dB."""
     if heard is None:
         return UNMEASURED
     if found := faults(heard):
@@ -26,7 +27,7 @@ def heard_word(heard: Heard | None) -> str:
 
 
 def heard_sentence(heard: Heard | None, name: str) -> str:
-    """For a card: all that a listener finds, and how far model and truth are apart."""
+    """For a preset's card: all faults, and the distance of the spectra in dB. `name`: the preset's."""
     if heard is None:
         return f"{UNMEASURED}; to measure it: learned-strings evaluate {name} --heard --write"
     apart = f"spectra {heard.distance_db:.2g} dB apart over {heard.seconds:.2g} s"
@@ -36,7 +37,7 @@ def heard_sentence(heard: Heard | None, name: str) -> str:
 
 
 def faults(heard: Heard) -> list[str]:
-    """What would mislead a musician, by name: first what exceeds its threshold most."""
+    """Every fault above its threshold, in words; first the one that exceeds its threshold by the largest factor."""
     found = []
     if heard.runs_away_s is not None:
         found.append((math.inf, f"runs away after {heard.runs_away_s:.1f} s"))

@@ -1,7 +1,7 @@
-"""The record of a test: one JSON file that says what was heard, what was answered and what follows.
+"""The record of a test: a JSON file with what was played, what was answered, and the result.
 
-A record is checked when it is read: its numbers must follow from its trials, and its order from its seed. So a file
-that was damaged or edited is not taken for a result.
+A record is checked when it is read: its numbers must follow from its trials, and its order from its seed, so that a
+damaged or edited file is refused.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _FROZEN = ConfigDict(frozen=True, extra="forbid")
 
 
 class RecordError(ValueError):
-    """A record that cannot be used. The message names the file, what is wrong with it and the remedy, in one line."""
+    """A record cannot be used. The message, one line, names the file, what is wrong with it and the remedy."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
 
 
 class HeardSource(BaseModel):
-    """A or B: its name for people, the preset that made it (of the truth: whose string it is), and its gain."""
+    """A or B: its name for people, the preset that made it (for the truth, the one whose string it is), its gain."""
 
     model_config = _FROZEN
 
@@ -50,7 +50,7 @@ class HeardSource(BaseModel):
 
 
 class HeardPluck(BaseModel):
-    """The pluck, and where it was heard; positions in lengths of the string.
+    """The pluck, and where and how it was heard; positions and width as fractions of the string's length.
 
     Attributes:
         string: which one was chosen, of a preset of many; None: the preset's own.
@@ -86,9 +86,10 @@ class AbxRecord(BaseModel):
     """See the module.
 
     Attributes:
-        correct: right answers among the trials that were answered.
-        p_value: only of a complete test: one that was stopped early proves nothing.
-        remark: why it is not complete, if anything is known.
+        trials: those that were answered, in order.
+        correct: how many of them were answered right.
+        p_value: None unless the test is complete: stopping early would bias it.
+        remark: why it is not complete, if that is known.
     """
 
     model_config = _FROZEN
@@ -130,12 +131,12 @@ class AbxRecord(BaseModel):
 
 
 def default_folder() -> Path:
-    """Among the user's documents."""
+    """Where records are saved by default: a folder within the user's documents."""
     return user_documents_path() / "Learned Strings" / "Listening tests"
 
 
 def save_record(folder: Path, record: AbxRecord) -> Path:
-    """Writes a new file, whole or not at all, and makes the folder; no earlier record is overwritten.
+    """Writes a new file, whole or not at all, and returns its path; makes the folder, overwrites no earlier record.
 
     Raises:
         WriteError: the folder or the file cannot be written.
@@ -175,7 +176,7 @@ def load_record(path: Path) -> AbxRecord:
 
 
 def list_records(folder: Path) -> tuple[list[tuple[Path, AbxRecord]], list[str]]:
-    """The records of a folder, the latest first, and a line for each file that is not usable."""
+    """The records of a folder, the latest first, and a line for each file that cannot be used."""
     found, problems = [], []
     for path in folder.glob("abx_*.json"):
         try:
@@ -188,7 +189,7 @@ def list_records(folder: Path) -> tuple[list[tuple[Path, AbxRecord]], list[str]]
 def make_record(
     run: Run, a: HeardSource, b: HeardSource, pluck: HeardPluck, through: HeardThrough, remark: str = ""
 ) -> AbxRecord:
-    """What has become of a run, dated now."""
+    """The record of a run as it stands, dated now."""
     correct = sum(trial.correct for trial in run.trials)
     return AbxRecord(
         kind=KIND,

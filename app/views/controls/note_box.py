@@ -1,4 +1,4 @@
-"""A box for a key, written as a note: E2, F♯3; typed also as F#3, Gb3 or 54."""
+"""A spin box for a key, shown as a note (E2, F♯3); typed also as F#3, Gb3 or a MIDI number."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _BEGUN = re.compile(r"([A-Ga-g][#♯b♭]?-?\d?|\d{0,3})", re.ASCII)
 
 
 class NoteBox(QSpinBox):
-    """See the module."""
+    """Its value is the MIDI number of the key."""
 
     def __init__(self, name: str, tip: str) -> None:
         super().__init__()
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.setMinimumWidth(64)
-        self.setKeyboardTracking(False)  # what is half typed is another note
+        self.setKeyboardTracking(False)  # a note that is half typed is another one
         self.lineEdit().setTextMargins(6, 0, 0, 0)
 
     def textFromValue(self, value: int) -> str:

@@ -1,4 +1,4 @@
-"""The notices of this run, latest first, each with what the system said, to copy."""
+"""The notices of this run, the latest first, each with its details, to copy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class NoticeList(QDialog):
-    """Does not block the window; follows it while open."""
+    """Does not block the window, and shows new notices while it is open."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -35,7 +35,7 @@ class NoticeList(QDialog):
         column.addLayout(copy_and_close(self, self.report, "Copy all", tip))
 
     def set_notices(self, notices: Sequence[Notice]) -> None:
-        """Latest last, as they were told."""
+        """`notices`: the latest last."""
         self._notices = list(reversed(notices))
         self._list.clear()
         for notice in self._notices:

@@ -1,4 +1,4 @@
-"""About: version, licence, the paper, where things lie; all of it to copy for a report."""
+"""About: version, licence, the paper, the files and folders; all of it to copy for a bug report."""
 
 from __future__ import annotations
 

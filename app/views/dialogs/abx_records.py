@@ -25,7 +25,7 @@ from app.views.controls.parts import label, read_only_text
 
 
 class RecordsPage(QWidget):
-    """`show_folder` reads it anew."""
+    """Shows the records of the folder that `show_folder` reads."""
 
     back_asked = Signal()
 

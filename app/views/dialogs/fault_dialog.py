@@ -1,4 +1,4 @@
-"""What nobody expected, once: what happened, where it is written down, all of it to copy for a report."""
+"""The dialog of unexpected errors: what happened and where the log is, to copy for a bug report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MOST_CHARACTERS = 100_000
 
 
 class FaultDialog(QDialog):
-    """Stays one: further faults are added to the same text."""
+    """There is one for all errors: further ones are added to its text."""
 
     def __init__(self, log: Path, heading: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -23,14 +23,14 @@ class FaultDialog(QDialog):
         column = QVBoxLayout(self)
         column.addWidget(words)
         column.addWidget(self._text)
-        column.addLayout(copy_and_close(self, lambda: self.text, "Copy", "Copy all of this, for a report"))
+        column.addLayout(copy_and_close(self, lambda: self.text, "Copy", "Copy all of this, for a bug report"))
 
     @property
     def text(self) -> str:
         return self._text.toPlainText()
 
     def add(self, fault: str) -> None:
-        """One that is there already changes nothing: it may come with every picture."""
+        """Adds an error and shows the dialog. One that is there already is ignored: it may come with every frame."""
         if fault.strip() in self.text or len(self.text) > MOST_CHARACTERS:
             return
         self._text.appendPlainText(fault)

@@ -36,16 +36,18 @@ def times(value: float) -> str:
 
 COLUMNS = (
     Column("Preset", "Double-click or Enter loads the preset"),
-    Column("MAE", "Relative mean absolute error over the trained horizon, all of the string", percent),
+    Column("MAE", "Relative mean absolute error over the trained time and the whole string", percent),
     Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
     Column(
         "Null, dB",
         "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck",
         decibels,
     ),
-    Column("Speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
+    Column(
+        "Speed", "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time", times
+    ),
     Column("Parameters", "Trainable parameters", lambda n: f"{n:,}"),
-    Column("MSE", "Relative mean squared error over the trained horizon", scientific),
+    Column("MSE", "Relative mean squared error over the trained time and the whole string", scientific),
     Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
     Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
     Column("Model", "Model architecture"),
@@ -54,7 +56,7 @@ COLUMNS = (
 
 
 class CompareView(QWidget):
-    """See the module."""
+    """Presets are known by their names."""
 
     preset_toggled = Signal(str, bool)  # by its checkbox: in the table or not
     same_string_asked = Signal()
@@ -72,9 +74,7 @@ class CompareView(QWidget):
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
         self._words = words_label()
-        self._stop = tool_button(
-            "Stop", "Stop comparing", "Stop computing, compute missing rows, or compute all again"
-        )
+        self._stop = tool_button("Stop")
         self._stop.clicked.connect(self.stop_asked)
         self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
         self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
@@ -88,7 +88,7 @@ class CompareView(QWidget):
         """What can be compared."""
         menu = self._menu
         menu.clear()
-        for text, signal in (("Presets of the present string", self.same_string_asked), ("All", self.all_asked)):
+        for text, signal in (("Presets of this string", self.same_string_asked), ("All presets", self.all_asked)):
             menu.addAction(text).triggered.connect(signal)
         menu.addSeparator()
         self._actions = {}
@@ -108,13 +108,17 @@ class CompareView(QWidget):
         self._words.setText(text)
 
     def set_computing(self, share: float | None) -> None:
-        """How far the table is; None: nothing is computed."""
+        """The share of the table that is done, 0 … 1; None: nothing is being computed."""
         self.progress.show_share(share)
-        self._stop.setText("Stop" if share is not None else "Compute again")
-        self._stop.setAccessibleName("Stop comparing" if share is not None else "Compare again")
+        stops = share is not None
+        self._stop.setText("Stop" if stops else "Compute again")
+        self._stop.setAccessibleName("Stop comparing" if stops else "Compare again")
+        self._stop.setToolTip(
+            "Stop computing" if stops else "Compute the missing rows; where none is missing, all rows"
+        )
 
     def show_rows(self, rows: Sequence[tuple[ComparedRow, bool]], present: str) -> None:
-        """Rows, and whether each is of the present pluck; the present preset's is marked."""
+        """Rows, and whether each is of the present pluck; `present`: the preset whose row is bold."""
         self.table.show_rows([self._row(row, fresh, row.name == present) for row, fresh in rows])
 
     @staticmethod

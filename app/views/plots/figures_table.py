@@ -41,17 +41,17 @@ LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, what it tells, how a figure is written, and whose it is."""
+    """A column: its heading, its tooltip, how a value is written, and the source whose colour it has."""
 
     title: str
     tip: str
     text: Callable[[Any], str] = str
-    source: str = ""  # of the figures, for their colour
+    source: str = ""  # a key of `theme.SOURCE_COLOURS`; "": no colour of its own
 
 
 @dataclass(frozen=True)
 class TableRow:
-    """A row: what it is known by, its values in the order of the columns, how it looks, and a tooltip."""
+    """A row: its key, its values in the order of the columns, how it looks, and its tooltip."""
 
     key: object
     values: tuple[Value, ...]
@@ -65,7 +65,7 @@ def _colour(column: Column) -> str:
 
 
 class FiguresTable(QTableView):
-    """See the module. A value of None is written as "–" and stands last in either order."""
+    """A value of None is written as "–" and sorted last in either order."""
 
     row_clicked = Signal(object)  # its key
     row_double_clicked = Signal(object)
@@ -107,13 +107,13 @@ class FiguresTable(QTableView):
         self.choose(chosen)
 
     def set_dimmed(self, dimmed: bool) -> None:
-        """Whether all figures are grey: of something earlier."""
+        """Makes all rows grey: they are of an earlier pluck."""
         self._rows.dimmed = dimmed
         self.viewport().update()
 
     @property
     def rows(self) -> list[TableRow]:
-        """As they stand, sorted."""
+        """In the order in which they are shown."""
         return [self._row(self._sorted.index(place, 0)) for place in range(self._sorted.rowCount())]
 
     @property
@@ -141,7 +141,7 @@ class FiguresTable(QTableView):
         QGuiApplication.clipboard().setText(self.text())
 
     def event(self, event: QEvent) -> bool:
-        """Enter and Esc are the table's own while it has the keyboard, whatever the window's shortcuts say."""
+        """Keeps Enter and Esc, which are shortcuts of the window, while the table has the focus."""
         return keeps_own_keys(event) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -222,7 +222,7 @@ class _Rows(QAbstractTableModel):
 
 
 class _OwnColours(QStyledItemDelegate):
-    """Keeps the colours of the columns in a chosen row."""
+    """Keeps the colours of the columns in the selected row."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)

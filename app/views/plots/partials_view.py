@@ -1,4 +1,4 @@
-"""A table of the string's partials: what the model makes of each, beside the truth."""
+"""A table of the string's partials, model against truth."""
 
 from __future__ import annotations
 
@@ -35,9 +35,13 @@ COLUMNS = (
     Column("Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
     Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
     Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
-    Column("Cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
-    Column("Level, dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
-    Column("T60, %", "Error of the model's decay time in %", signed),
+    Column(
+        "Cents",
+        "Frequency of the model relative to the truth, in cents (hundredths of a semitone)",
+        lambda v: signed(v, 2),
+    ),
+    Column("Level, dB", "Level of the model relative to the truth, in dB", lambda v: signed(v, 2)),
+    Column("T60, %", "Error of the model's decay time T60, in %", signed),
     Column("Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
     Column("Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
     Column("Note", "Why a row is grey"),
@@ -45,7 +49,7 @@ COLUMNS = (
 
 
 class PartialsView(QWidget):
-    """See the module."""
+    """Rows are known by their mode numbers."""
 
     window_chosen = Signal(str)  # a key of `WINDOWS`
     mode_chosen = Signal(int)
@@ -72,7 +76,7 @@ class PartialsView(QWidget):
         return str(self._window.currentData())
 
     def set_words(self, text: str) -> None:
-        """What there is to say beside the table."""
+        """The line above the table."""
         self._words.setText(text)
 
     def show_partials(self, rows: Sequence[PartialRow]) -> None:

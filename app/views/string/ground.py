@@ -1,4 +1,4 @@
-"""What lies behind the string: the grid, and the plucks that the model was not trained on, with a word why."""
+"""What lies behind the string: grid, scale, hatching outside the training range, and the legend above."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
 
 @dataclass(frozen=True)
 class TrainedPlucks:
-    """The positions and amplitudes that the model was trained on; None: all."""
+    """The positions and amplitudes that the model was trained on, (lowest, highest); None: all."""
 
     position: tuple[float, float] | None = None
     amplitude_mm: tuple[float, float] | None = None
 
 
 def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
-    """All of it.
+    """Paints the gradient, the grid, the scale and the hatching.
 
-    `pluck`: 0 or 1, towards which end of the string it is, while it is shown. Only then are amplitudes shaded, for a
-    string in motion crosses them all.
+    `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Amplitudes
+    are hatched only for a pluck, for a string in motion crosses them all.
     """
     gradient = QLinearGradient(0, 0, 0, axes.height)
     gradient.setColorAt(0, QColor(theme.face.ground_top))
@@ -74,9 +74,9 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
 
 
 def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
-    """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`.
+    """Paints the sources and, beside them, the warning, as far as `right` in pixels.
 
-    What warns is whole first, as far as it leaves room for the letters of the slots.
+    Where both do not fit, the titles of the sources are cut first, but they keep LEGEND_SHARE of the line.
     """
     warned = QFontMetrics(theme.small_font(11)).horizontalAdvance(warning) + 8 if warning else 0
     room = right - MARGIN_X

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.commands.console import number
 from training.family import fit_baseline
 
 
@@ -36,6 +37,22 @@ def test_evaluate_tells_the_map_and_draws_it(run, folder: Path) -> None:
     assert "choose one of these suffixes" in run(*words[:-4], "--picture", folder / "map.bmp").failure
 
 
+def test_evaluate_tells_of_partials(run) -> None:
+    words = ("family", "evaluate", "studio_any_string", "--strings", 1, "--partials", "--rate", 8_000)
+    facts = json.loads(run(*words, "--json").out)
+    for column in ("inside", "beyond"):
+        partials = facts[column]["studio_any_string"]["partials"]
+        assert partials["quiet_first_cents"]["worst"] < 1e-4
+        assert partials["quiet_first_cents"]["worst"] <= partials["quiet_cents_largest"]["worst"]
+        for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
+            mean, largest = (partials[f"{name}_{kind}"] for kind in ("mean", "largest"))
+            assert 0 < mean["median"] == mean["worst"] <= largest["worst"] < 1
+            assert mean["worst_at"] == facts[column]["studio_any_string"]["worst_at"]  # there is one string
+    shown = run(*words)
+    assert "quiet pluck, the first mode's pitch, cents" in shown.out
+    assert shown.out.count("glide of any, cents") == 2
+
+
 def test_a_baseline_is_trained_and_stands_beside_the_preset(
     run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -44,11 +61,22 @@ def test_a_baseline_is_trained_and_stands_beside_the_preset(
     words = ("family", "baseline", "koopman_var", "--minutes", 0.01, "--train-strings", 1, "--runs", folder)
     facts = json.loads(run(*words, *few).out)
     assert (facts["baseline"], facts["minutes"]) == ("koopman_var", 0.01)
+    assert facts["parameters"] == 156_259
+    assert all(facts[name] > 0 for name in ("steps", "train", "validation"))
+    told = run(*words, *few[:-1]).out  # the training is at its end
+    assert told.startswith(f"koopman_var: 156,259 numbers, {facts['steps']:,} steps of 16 strings and 48 frames")
+    assert f"{number(facts['train'])} in training, {number(facts['validation'])} in validation" in told
     beside = json.loads(run("family", "evaluate", "studio_any_string", "--runs", folder, *few).out)
     for column in ("inside", "beyond"):
         error = facts[column]["koopman_var"]["geometric_mean"]
         assert beside[column]["koopman_var, trained"]["geometric_mean"] == error
         assert beside[column]["studio_any_string"]["geometric_mean"] < error
+    checkpoint = folder / "family_koopman_var" / "checkpoint.safetensors"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
+    for damaged in (words, ("family", "evaluate", "studio_any_string", "--runs", folder)):
+        failure = run(*damaged, *few).failure
+        assert f"{checkpoint}: damaged checkpoint" in failure
+        assert "delete it to start the run again" in failure
     assert (
         "no baseline was trained here"
         in run("family", "evaluate", "studio_any_string", "--runs", folder / "none", *few).failure

@@ -15,6 +15,7 @@ PACKAGES = {  # of Debian and its kin
     "parec": "pulseaudio-utils",
     "pactl": "pulseaudio-utils",
     "Xvfb": "xvfb",
+    "jackd": "jackd2",
 }
 
 
@@ -22,9 +23,12 @@ class Missing(RuntimeError):
     """Something of the computer that the benchmark cannot do without."""
 
 
+SOUND_AND_SCREEN = ("pulseaudio", "pacat", "parec", "pactl", "Xvfb")
+
+
 def need_programs(*programs: str) -> None:
-    """Raises `Missing` with the names of those that are absent, of all if none are named, and what to install."""
-    absent = [program for program in programs or PACKAGES if shutil.which(program) is None]
+    """Raises `Missing` with the names of those that are absent, and what to install."""
+    absent = [program for program in programs if shutil.which(program) is None]
     if absent:
         packages = " ".join(sorted({PACKAGES[program] for program in absent}))
         raise Missing(

@@ -1,14 +1,20 @@
-"""Keys as a player presses them: the letters of a piano's two rows, in a random but repeatable order."""
+"""What a player's hands do: a piano's two rows of letters at random but repeatably, or a score, by keys or MIDI."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
 from random import Random
+from typing import Protocol
 
+from app.commands.benchmarks.play.midi import Cable
 from app.commands.benchmarks.play.screen import Screen
+from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
 
 KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
+LOWEST = 48  # that the first of them plays
+OCTAVE_DOWN, OCTAVE_UP = "z", "x"
+DIGITS = {round(1 + (digit - 1) / 8 * 126): str(digit) for digit in range(1, 10)}  # by velocity
 HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
@@ -42,3 +48,67 @@ def steady(random: Random, rate_hz: float, seconds: float) -> list[float]:
 def single(random: Random, count: int, step_s: float) -> list[float]:
     """Steps of single plucks, in no step with blocks."""
     return [step_s + random.uniform(0, 0.1) for _ in range(count)]
+
+
+class Hand(Protocol):
+    """What plays events; `turns`: whether it has a wheel and a pedal."""
+
+    turns: bool
+
+    def do(self, event: Event) -> float:
+        """Plays one, and returns when."""
+
+
+class MidiHand:
+    """On a MIDI keyboard, at the other end of a cable."""
+
+    turns = True
+
+    def __init__(self, cable: Cable) -> None:
+        self._cable = cable
+
+    def do(self, event: Event) -> float:
+        return self._cable.send(event)
+
+
+class KeyHand:
+    """On the computer's keys, which stand at octave 0."""
+
+    turns = False
+
+    def __init__(self, screen: Screen) -> None:
+        self._screen = screen
+        self._octave = 0
+        self._velocity: int | None = None
+        self._down: dict[int, str] = {}
+
+    def do(self, event: Event) -> float:
+        """Raises ValueError: the computer's keys cannot play it."""
+        if isinstance(event, NoteOff):
+            return self._screen.key(self._down.pop(event.key), False)
+        if not isinstance(event, NoteOn):
+            raise ValueError("the computer's keys have neither wheel nor pedal")
+        octave = self._octave
+        while not 0 <= event.key - LOWEST - 12 * octave < len(KEYS):
+            octave += 1 if event.key - LOWEST - 12 * octave > 0 else -1
+        for _ in range(abs(octave - self._octave)):
+            self._touch(OCTAVE_UP if octave > self._octave else OCTAVE_DOWN)
+        if event.velocity != self._velocity:
+            self._touch(DIGITS[event.velocity])
+        self._octave, self._velocity = octave, event.velocity
+        letter = self._down[event.key] = KEYS[event.key - LOWEST - 12 * octave]
+        return self._screen.key(letter, True)
+
+    def _touch(self, key: str) -> None:
+        self._screen.key(key, True)
+        self._screen.key(key, False)
+
+
+def perform(hand: Hand, events: Sequence[TimedEvent], seconds: float) -> list[TimedEvent]:
+    """Plays events by their times; the same with the times, of `time.monotonic`, at which they were played."""
+    began_s, played = time.monotonic(), []
+    for each in events:
+        time.sleep(max(began_s + each.time_s - time.monotonic(), 0))
+        played.append(TimedEvent(hand.do(each.event), each.event))
+    time.sleep(max(began_s + seconds - time.monotonic(), 0))
+    return played

@@ -153,6 +153,13 @@ def test_the_text_says_everything(record: AbxRecord) -> None:
     assert sum("  yes  " in line for line in text.splitlines()) == 9
 
 
+def test_the_text_says_where_and_how_it_was_heard(record: AbxRecord) -> None:
+    assert "Heard     at 0.37 of the length, 2 s\n" in as_text(record)
+    pluck = record.pluck.model_copy(update={"listen_right": 0.63, "pickup": "velocity", "solo": 3})
+    text = as_text(record.model_copy(update={"pluck": pluck}))
+    assert "Heard     at 0.37 (left) and 0.63 (right) of the length, as velocity, mode 3 alone, 2 s\n" in text
+
+
 def test_two_presets_are_told_apart(record: AbxRecord) -> None:
     other = record.b.model_copy(update={"preset_sha256": "aa" * 32})
     text = as_text(record.model_copy(update={"b": other}))
