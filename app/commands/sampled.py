@@ -1,4 +1,4 @@
-"""sampled: a patch as an instrument for samplers, SFZ or SoundFont 2."""
+"""sampled: a patch as an instrument for samplers, in SFZ or SoundFont 2."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from app.commands.console import Failure, progress, say
 from app.shared.key_names import key_named
 
-ASKED_ABOVE_BYTES = 2**30
+ASKED_ABOVE_BYTES = 2**30  # refused without --yes
 
 
 def sampled(
@@ -20,29 +20,32 @@ def sampled(
         str | None, typer.Option(metavar="LOW-HIGH", help="Keys, as in E2-E5 or 40-76; default all of the patch.")
     ] = None,
     every: Annotated[
-        int, typer.Option(metavar="N", help="A sample for every N keys; those between are transposed.")
+        int, typer.Option(metavar="N", help="Sample one of every N keys; the others transpose its samples.")
     ] = 1,
     layers: Annotated[int, typer.Option(metavar="N", help="Velocity layers.")] = 4,
     seconds: Annotated[
-        float, typer.Option(help="The longest sample; one that still rings is faded out. Silent ones end sooner.")
+        float, typer.Option(metavar="S", help="Longest sample in s; what still rings then is faded out.")
     ] = 8.0,
     rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = 48_000,
     form: Annotated[
-        Literal["flac", "wav"] | None, typer.Option("--format", help="Of an SFZ's samples; default flac.")
+        Literal["flac", "wav"] | None, typer.Option("--format", help="Of the samples of an SFZ; default flac.")
     ] = None,
     bits: Annotated[
-        Literal["16", "24"] | None, typer.Option(help="Of an SFZ's samples; default 24. A SoundFont has 16.")
+        Literal["16", "24"] | None, typer.Option(help="Of the samples of an SFZ; default 24. A SoundFont has 16.")
     ] = None,
-    source: Annotated[Literal["model", "truth"], typer.Option(help="What plays the patch.")] = "model",
+    source: Annotated[
+        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
+    ] = "model",
     dry: Annotated[
-        bool, typer.Option("--dry", help="Without the patch's room, which would end with each key that is let go.")
+        bool, typer.Option("--dry", help="Leave out the patch's room, whose tail would end at each key's release.")
     ] = False,
-    size_only: Annotated[bool, typer.Option("--size-only", help="Tell the size, and render nothing.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Go on, however large it is.")] = False,
+    size_only: Annotated[bool, typer.Option("--size-only", help="Print the size, and render nothing.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Allow more than 1 GiB.")] = False,
 ) -> None:
-    """Render a patch for a sampler: each key at several velocities, without loops.
+    """Render a patch as an instrument for samplers.
 
-    An export that was stopped goes on with the same command: whole samples are kept while the patch is the same.
+    Each key is rendered at several velocities, without loops. The same command continues an export that was stopped:
+    whole samples are kept as long as the patch is the same.
     """
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan

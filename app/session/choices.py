@@ -11,7 +11,7 @@ from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from app.patches.patch import Patch, PhysicalString
-from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Pickup
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
 Slot = Literal["a", "b"]  # two sources to compare; each holds "model", "truth", "difference" or "preset:NAME"
@@ -49,7 +49,7 @@ class Choices(BaseModel):
     seconds: float = Field(4.0, ge=SECONDS_RANGE[0], le=SECONDS_RANGE[1])
     listen_right: float = Field(1 - DEFAULT_LISTEN, ge=0, le=1)  # used in stereo, where `listen` is the left one
     stereo: bool = False
-    pickup: Literal["displacement", "velocity"] = "displacement"
+    pickup: Pickup = "displacement"
     solo: int = Field(0, ge=0, le=HIGHEST_MODE)  # above 0: this mode is heard alone
     a: str = Field("model", pattern=SLOT_PATTERN)
     b: str = Field("truth", pattern=SLOT_PATTERN)

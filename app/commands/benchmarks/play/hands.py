@@ -20,7 +20,7 @@ SHORTEST_STEP_S = 0.04
 
 
 def tap(screen: Screen, key: str) -> float:
-    """Presses a key and lets it go; returns when it was pressed."""
+    """Presses and releases a key; returns when it was pressed."""
     pressed_s = screen.key(key, True)
     time.sleep(HELD_S)
     screen.key(key, False)
@@ -28,7 +28,7 @@ def tap(screen: Screen, key: str) -> float:
 
 
 def play(screen: Screen, random: Random, steps_s: Sequence[float]) -> list[float]:
-    """Taps a random key at each of the `steps_s` after the one before; returns the times."""
+    """Taps random keys, `steps_s` apart; returns when each was pressed."""
     pressed_s = []
     due_s = time.monotonic()
     for step_s in steps_s:
@@ -39,14 +39,14 @@ def play(screen: Screen, random: Random, steps_s: Sequence[float]) -> list[float
 
 
 def steady(random: Random, rate_hz: float, seconds: float) -> list[float]:
-    """Steps of so many plucks a second, each up to a tenth of a step early or late, as hands are."""
+    """Steps in s of so many plucks per second, each up to a tenth of a step early or late, as by a player."""
     step_s = max(1 / rate_hz, SHORTEST_STEP_S)
     offsets_s = [random.uniform(-0.1, 0.1) * step_s for _ in range(round(seconds / step_s))]
     return [step_s + offset - before for before, offset in zip([0.0, *offsets_s], offsets_s, strict=False)]
 
 
 def single(random: Random, count: int, step_s: float) -> list[float]:
-    """Steps of single plucks, in no step with blocks."""
+    """Steps in s of single plucks, at random offsets from the device's blocks."""
     return [step_s + random.uniform(0, 0.1) for _ in range(count)]
 
 

@@ -1,8 +1,8 @@
-"""A private sound server whose one device, a null sink, stands for the sound card.
+"""A private sound server whose only device, a null sink, stands for the sound card.
 
-The null sink plays by the computer's monotonic clock, asks for sound as a card does, and plays silence where there is
-none in time. What it was given can be recorded bit for bit. It stands still where nobody plays: a player of silence
-keeps it going.
+The null sink runs by the computer's monotonic clock, asks for sound as a card does, and plays silence where none
+arrives in time. What it receives can be recorded bit for bit. It pauses while no program plays, so a player of
+silence keeps it running.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ class SoundServer:
 
     @contextlib.contextmanager
     def adopted(self) -> Iterator[None]:
-        """This process plays into it too. To be entered before PortAudio is loaded.
+        """Within, this process plays into it too. To be entered before PortAudio is loaded.
 
         Raises:
-            Missing: It is loaded.
+            Missing: PortAudio has been loaded.
         """
         if "sounddevice" in sys.modules:
             raise Missing("PortAudio has been loaded, and plays elsewhere; use a process of its own")
@@ -52,7 +52,7 @@ class SoundServer:
             os.environ.update(before)
 
     def buffered_s(self) -> float | None:
-        """Sound of the one client that plays which the server keeps ready, or None where not one client plays."""
+        """How much sound of the one client that plays the server has buffered; None where not exactly one plays."""
         command = ["pactl", "--format=json", "list", "sink-inputs"]
         done = subprocess.run(command, env=self.environment, capture_output=True, text=True)
         try:
@@ -66,14 +66,14 @@ class SoundServer:
 
 @contextlib.contextmanager
 def sound_server(folder: Path) -> Iterator[SoundServer]:
-    """The server, with its files in `folder`. Nothing of the user's own sound is touched.
+    """Starts the server, with its files in `folder`, and ends it afterwards. The user's own sound is left alone.
 
     Raises:
-        Missing: It did not start.
+        Missing: it did not start.
     """
     socket = folder / "native"
     (folder / ".asoundrc").write_text("pcm.!default { type pulse }\nctl.!default { type pulse }\n", encoding="utf-8")
-    caches = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")  # a start is as warm as the user's
+    caches = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")  # the user's, so that starts are warm
     environment = {
         **os.environ,
         "HOME": str(folder),
