@@ -373,16 +373,19 @@ def play(
 @bench.command()
 def notes(
     json: Json = False,
-    by: Annotated[Literal["midi", "keys", "both"], typer.Option(help="What plays.")] = "both",
-    buffer: Annotated[str, typer.Option(help="low, medium, high, or 128 ... 2048 frames.")] = "medium",
-    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    by: Annotated[Literal["midi", "keys", "both"], typer.Option(help="What the notes are played by.")] = "both",
+    buffer: Annotated[
+        str, typer.Option(help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
+    ] = "medium",
+    seed: Annotated[int, typer.Option(min=0, help="Of the random single notes.")] = 0,
     patch: Annotated[
         str, typer.Option(metavar="PATCH", help="What is played, without its body and room.")
     ] = "classical_guitar",
 ) -> None:
-    """What notes sound like: a melody, chords, repeats, bends and a pedal, by MIDI and keys, recorded and measured.
+    """Pitch, loudness, damping and latency of notes, recorded.
 
-    Linux only; needs PulseAudio and Xvfb, for MIDI JACK as well, and touches nothing of the sound and screen in use.
+    A melody, chords, repeats, bends and a pedal are played by MIDI and by keys. Linux only. Needs PulseAudio, Xvfb
+    and, for MIDI, JACK; starts a sound server and a screen of its own, and leaves yours alone.
     """
     from app.commands.benchmarks.play.notes import measure
     from app.commands.console import Failure

@@ -26,13 +26,13 @@ class Report(Protocol):
 
 
 class Shares:
-    """Progress of several pieces of work of one length, one after the other."""
+    """Progress of several pieces of work of equal length, one after the other."""
 
     def __init__(self, report: Report, pieces: int) -> None:
         self._report, self._pieces, self._begun = report, pieces, 0
 
     def next(self) -> Callable[[float], None]:
-        """What the next piece tells its share to."""
+        """Begins the next piece; returns a function that is called with the share of it that is done, 0 … 1."""
         before, self._begun = self._begun, self._begun + 1
         return lambda share: self._report((before + share) / self._pieces)
 

@@ -42,8 +42,10 @@ def evaluate(
     preset: Annotated[
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
-    split: Annotated[Split, typer.Option(help="The tables of the paper are of validation.")] = "validation",
-    past: Annotated[float, typer.Option(metavar="S", help="Go on so many s past the training horizon.")] = 0.0,
+    split: Annotated[
+        Split, typer.Option(help="Which trajectories; the paper's tables are of validation.")
+    ] = "validation",
+    past: Annotated[float, typer.Option(metavar="S", help="Measure so many s past the training horizon, too.")] = 0.0,
     partials: Annotated[
         bool, typer.Option("--partials", help="Level, phase, frequency, decay and glide of each mode, too.")
     ] = False,
@@ -51,7 +53,7 @@ def evaluate(
         int | None, typer.Option(min=1, metavar="N", help="Only the first N of a split; default all.")
     ] = None,
     table: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write every figure to a table, one a row.")
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write all figures to a CSV file, one per row.")
     ] = None,
     fresh: Annotated[
         int | None,
@@ -60,30 +62,30 @@ def evaluate(
             min=FEWEST_PLUCKS,
             max=10_000,
             metavar="N",
-            help=f"Fresh plucks of its draw, not a split; of a string's default {FEWEST_PLUCKS}.",
+            help=f"Measure N new plucks instead of a split; default {FEWEST_PLUCKS} for a preset of many strings.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of --held-out.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draw of --held-out.")] = 1,
     string: arguments.StringName = None,
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,
     on: Annotated[
         str | None,
-        typer.Option("--on", metavar="CONFIG", help="A preset of many strings: on the data of this run, by name."),
+        typer.Option("--on", metavar="CONFIG", help="For a preset of many strings: measure it on this run's data."),
     ] = None,
     heard: Annotated[
-        bool, typer.Option("--heard", help="Instead: what a listener would notice of a few plucks, by name.")
+        bool, typer.Option("--heard", help="Instead, say in words what a listener would notice on a few plucks.")
     ] = False,
     everything: Annotated[bool, typer.Option("--all", help="With --heard: all presets.")] = False,
     write: Annotated[
-        bool, typer.Option("--write", help="With --heard: keep it beside the preset, for cards and browser.")
+        bool, typer.Option("--write", help="With --heard: add it to heard.csv beside the preset, for the app.")
     ] = False,
     cache: Cache = None,
     json: Json = False,
 ) -> None:
-    """Measure a preset's errors on the data set that it was trained with, beside those stored in it.
+    """Measure a preset's errors on its own data set.
 
-    A preset of many strings is measured on fresh plucks of one of them.
+    They are printed beside those stored in the preset. A preset of many strings is measured on new plucks of one.
     """
     of_heard = (("--all", everything), ("--write", write))
     of_string = (("--string", string), ("--rate", rate), ("--modes", modes))

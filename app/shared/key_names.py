@@ -1,4 +1,4 @@
-"""MIDI keys as notes: C4 is 60."""
+"""Names of MIDI keys; C4 is 60."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _NUMBER = re.compile(r"\d{1,3}", re.ASCII)
 
 
 def note_name(key: int) -> str:
-    """With its octave, as in F♯3."""
+    """The note of a MIDI key, with its octave, such as F♯3."""
     return f"{NAMES[key % 12]}{key // 12 - 1}"
 
 
 def key_named(text: str) -> int | None:
-    """The key of a note's name, as in F♯3, F#3 or Gb3, or of its number; None where it is none."""
+    """The MIDI key of a note's name, such as F♯3, F#3 or Gb3, or of a number; None where `text` is neither."""
     text = text.strip()
     if _NUMBER.fullmatch(text):
         return int(text)

@@ -120,7 +120,7 @@ def test_every_figure_is_drawn(run, tiny: Path, folder: Path, kind: str) -> None
     assert list(folder.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("group", ["figure", "bench", "results"])
+@pytest.mark.parametrize("group", ["figure", "results"])
 def test_a_list_of_commands_cuts_no_summary(run, group: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     listed = run(group, "--help").out.partition("Commands:")[2].strip().splitlines()
