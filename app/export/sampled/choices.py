@@ -1,4 +1,4 @@
-"""What the dialog that exports an instrument was last set to."""
+"""The last settings of the dialog that exports an instrument."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SampledKind = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's sampl
 
 
 class SampledChoices(BaseModel):
-    """The dialog's last state. Without `keys`, all of the patch's range."""
+    """The last settings. `keys`: the lowest and the highest; None: all of the patch's range."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 

@@ -37,12 +37,12 @@ class SampledReport:
     """What was written.
 
     Attributes:
-        samples: of the instrument; rendered: those of them that were not there yet.
+        samples: how many the instrument has; rendered: how many of them were not there yet.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: what all of it is louder than the patch: an SFZ is softer where a note would clip, a SoundFont is
-            raised to full level.
-        peak_db: of its loudest note as a sampler plays it, in dB of full scale.
+        gain_db: by how much the whole is louder than the patch: an SFZ is softer where a note would clip, a SoundFont
+            is raised to full level.
+        peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
 
     path: Path
@@ -55,7 +55,7 @@ class SampledReport:
 
 
 def plain_stem(text: str) -> str:
-    """Letters, digits and `_.+-` of ASCII: what every player takes within an SFZ file, on every system."""
+    """`text` with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
 
 
@@ -91,7 +91,7 @@ def export_sampled(
 
     Raises:
         ValueError: see `planned`.
-        ExportCancelled: `cancelled` said so; samples that are whole stay for the next time; without any, nothing.
+        ExportCancelled: `cancelled` returned True; whole samples stay for the next time, without any no folder stays.
         ExportError: a file cannot be written, or a note not rendered.
     """
     plan = planned(plan, out)
@@ -146,7 +146,7 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
 
 
 def kept_samples(plan: SampledPlan, out: Path) -> int:
-    """How many samples of a plan an export that was stopped has left, as its index tells.
+    """How many samples of a plan are there already from an export that was stopped, by its index.
 
     Raises:
         ValueError: see `planned`.

@@ -68,16 +68,17 @@ class Zone:
 
     @property
     def stem(self) -> str:
-        """Of its file: numbers alone, so that no name of a patch becomes a path."""
+        """The name of its file without suffix: from numbers alone, so that no patch's name becomes part of a path."""
         return f"key{self.key:03d}_vel{self.velocity:03d}"
 
 
 @dataclass(frozen=True)
 class SampledPlan:
-    """What is rendered. Without `keys`, all of the patch's range.
+    """What is rendered.
 
     Attributes:
-        every: a sample for each so many keys; its neighbours are the same sample, transposed. 1 transposes none.
+        keys: the lowest and the highest MIDI key; None: all of the patch's range.
+        every: one of so many keys is sampled; the others transpose its samples. 1 transposes none.
         layers: velocity layers, of equal widths; each is rendered at its highest velocity.
         seconds: the longest sample. One that is silent sooner ends there; one that still rings is faded out.
         preset_sha256: of the model that plays the patch, so that samples of an earlier one are not kept.
@@ -141,7 +142,7 @@ class SampledPlan:
 
     @property
     def largest_bytes(self) -> int:
-        """Of all samples, were none silent before `seconds` and none compressed."""
+        """The size of all samples if each lasted `seconds` and none were compressed."""
         frames = round(self.seconds * self.rate_hz)
         return len(self.zones) * frames * self.channels * int(self.bits) // 8
 
@@ -149,7 +150,7 @@ class SampledPlan:
         return f"{zone.stem}.{self.format}"
 
     def digest(self, zone: Zone) -> str:
-        """Of all that decides how a zone's file sounds; names and descriptions do not."""
+        """SHA-256 of all that the sound of a zone's file depends on; names and descriptions are not among it."""
         told = {
             "patch": self._heard_fields,
             "preset": self.preset_sha256,

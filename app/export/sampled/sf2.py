@@ -62,7 +62,7 @@ class _Channel:
 
 
 def check_sf2(plan: SampledPlan) -> None:
-    """Raises ValueError where a plan cannot be one SoundFont; the message names the remedy."""
+    """Raises ValueError where a plan does not fit into one SoundFont; the message names the remedy."""
     low, high = RATE_RANGE_HZ
     if not low <= plan.rate_hz <= high:
         raise ValueError(f"a SoundFont's rate must lie in {low} … {high} Hz, not {plan.rate_hz}; lower it")
@@ -85,7 +85,7 @@ def write_sf2(
     """Writes the whole file; the stored samples are read one after the other.
 
     Returns:
-        What all of it was raised by, in dB: the loudest sample, which has 16 bits here, is at full level.
+        By how much the whole was raised, in dB: the loudest sample is at the full level of 16 bits.
 
     Raises:
         ExportCancelled: `cancelled` said so; the file is not whole.
@@ -131,7 +131,7 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
 
 
 def _raised_db(attenuation_cb: int, zone: Zone) -> float:
-    """What the velocity's attenuation takes at the velocity that the zone is rendered at: its level is kept there."""
+    """By how much a zone is raised to make up for the velocity's attenuation at the velocity it was rendered at."""
     return attenuation_cb / 10 * (1 - zone.velocity / 128)
 
 

@@ -1,4 +1,4 @@
-"""The folder of samples, and its index, which says what each was rendered from: a stopped export goes on there."""
+"""The folder of samples, and its index of what each was rendered from, with which a stopped export continues."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class StoredSample(BaseModel):
 
     @property
     def peak_db(self) -> float:
-        """As it was rendered, in dB of full scale."""
+        """Of the note as rendered, relative to full scale."""
         return PEAK_DBFS - self.gain_db if self.level_db > INAUDIBLE_DBFS else INAUDIBLE_DBFS
 
 
@@ -88,7 +88,7 @@ class SampleStore:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Nobody else writes here meanwhile. Raises ExportError where somebody does."""
+        """Within, no other export writes here. Raises ExportError where one does."""
         lock = FileLock(self.folder / LOCK, timeout=0)
         try:
             lock.acquire()
@@ -148,7 +148,7 @@ class SampleStore:
         return {zone: self._index.samples[plan.file_name(zone)] for zone in plan.zones}, len(wanted)
 
     def remove(self) -> None:
-        """Our files, and the folder where nothing else is left in it."""
+        """Deletes the samples and the index, and the folder if nothing else is in it; errors are ignored."""
         with contextlib.suppress(OSError, ExportError):
             self._remove_all_but(set())
             (self.folder / INDEX).unlink(missing_ok=True)
@@ -211,7 +211,7 @@ class SampleStore:
 
 
 def read_index(path: Path) -> SampleIndex | None:
-    """None where there is no file.
+    """The index; None where there is no file.
 
     Raises:
         ExportError: there is one that is not the index of samples, or one of another version.

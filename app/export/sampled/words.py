@@ -1,4 +1,4 @@
-"""What an export of samples takes and what came of it, in words; the same on the command line and in the window."""
+"""Size, notes and results of an export of samples in words, for the command line and the window alike."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's h
 
 
 def number_of(count: int, thing: str) -> str:
-    """As in 1 key, 2 keys."""
+    """Such as "1 key", "2 keys"."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
 def instrument_bytes(plan: SampledPlan, soundfont: bool) -> int:
-    """Of what is there in the end, at most: no sample is silent before its end, and FLAC compresses nothing."""
+    """The finished instrument's size at most: as if all samples were of full length and FLAC did not compress."""
     if soundfont:
         behind = ZEROS_BEHIND * len(plan.zones) * plan.channels * 2
         return plan.largest_bytes * 16 // int(plan.bits) + behind + _LINES_BYTES * len(plan.zones) * plan.channels
@@ -24,12 +24,12 @@ def instrument_bytes(plan: SampledPlan, soundfont: bool) -> int:
 
 
 def needed_bytes(plan: SampledPlan, soundfont: bool) -> int:
-    """Of the disk, at most: a SoundFont has its samples, FLAC of 24 bits, beside it until it is whole."""
+    """The space on disk needed at most: a SoundFont's samples, FLAC of 24 bits, lie beside it until the end."""
     return instrument_bytes(plan, soundfont) + (plan.largest_bytes * 24 // int(plan.bits) if soundfont else 0)
 
 
 def size_words(plan: SampledPlan, soundfont: bool) -> str:
-    """How large it becomes, and what else it takes."""
+    """The instrument's size, and what else is needed meanwhile, in words."""
     most = f"at most {megabytes(instrument_bytes(plan, soundfont))}"
     if soundfont:
         beside = needed_bytes(plan, soundfont) - instrument_bytes(plan, soundfont)
@@ -38,7 +38,7 @@ def size_words(plan: SampledPlan, soundfont: bool) -> str:
 
 
 def counted(plan: SampledPlan) -> str:
-    """How many samples, and of what."""
+    """The numbers of samples, keys and layers in words."""
     zones = plan.zones
     keys = number_of(len({zone.key for zone in zones}), "key")
     between = "" if plan.every == 1 else f", each for {plan.every} keys"
