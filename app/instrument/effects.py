@@ -31,6 +31,7 @@ class Response:
     power: NDArray[np.float64]
 
     def power_at(self, frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The square of the gain, of the shape of `frequencies_hz`."""
         return np.interp(frequencies_hz, self.frequencies_hz, self.power)
 
 

@@ -99,7 +99,7 @@ def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
 
 
 def messages_of(event: Event) -> Iterable[Any]:
-    """Of mido's; none for what MIDI has no words for."""
+    """The mido messages of an event; none where MIDI has no message for it."""
     import mido
 
     if isinstance(event, PatchTurned):

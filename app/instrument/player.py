@@ -83,6 +83,7 @@ class Struck:
 
     @property
     def over(self) -> bool:
+        """Whether all its voices have ended."""
         return all(voice.over for voice in self.voices.values())
 
     def retune(self, parameters: StringParameters, seconds: float) -> None:

@@ -79,7 +79,7 @@ class Strings:
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
-    """With a patch's multipliers. Damping per length follows the mass, so that decay rates do not change with it."""
+    """The string with a patch's multipliers. Damping follows the mass, which so leaves decay rates as they are."""
     area = knobs.gauge**2
     mass = area * knobs.density
     return replace(
@@ -100,7 +100,7 @@ def pitch_hz_of(string: StringParameters) -> float:
 
 
 def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
-    """With the length that gives the pitch.
+    """The string with the length that gives the pitch.
 
     Raises:
         ValueError: that length is out of bounds.
@@ -116,7 +116,7 @@ def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
 
 
 def bent(string: StringParameters, ratio: float) -> StringParameters:
-    """With the tension that raises the pitch by a ratio.
+    """The string with the tension that raises its pitch by a ratio.
 
     Raises:
         ValueError: there is none: stiffness alone is higher, or it is out of bounds.
@@ -133,11 +133,11 @@ def bent(string: StringParameters, ratio: float) -> StringParameters:
 
 
 def slid(string: StringParameters, ratio: float) -> StringParameters:
-    """With the length that raises the pitch by a ratio, as a slide or a finger on the string. Raises ValueError."""
+    """The string with the length that raises its pitch by a ratio, as by a slide. Raises ValueError as `fretted`."""
     return string if ratio == 1 else fretted(string, ratio * pitch_hz_of(string))
 
 
 def damped(string: StringParameters, t60_s: float) -> StringParameters:
-    """With a damper on it: every partial falls by 60 dB more in so many seconds. Raises ValueError."""
+    """The string with a damper: each partial decays by 60 dB more in `t60_s`. Raises ValueError: out of bounds."""
     added = 2 * string.mass_per_length_kg_m * math.log(1000) / t60_s
     return replace(string, damping_d1_kg_m_s=string.damping_d1_kg_m_s + added)

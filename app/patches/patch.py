@@ -360,11 +360,11 @@ class Patch(_Value):
         return float(found)
 
     def with_value(self, field: str, value: float) -> Patch:
-        """With one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of its bounds."""
+        """The patch with one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of bounds."""
         return self.with_values({field: value})
 
     def with_values(self, values: dict[str, float]) -> Patch:
-        """With several of ASSIGNABLE changed, one after the other. Raises ValueError as `with_value` does."""
+        """The patch with several of ASSIGNABLE changed, in order. Raises ValueError as `with_value` does."""
         patch = self
         for field, value in values.items():
             self._check_assignable("field", field)
@@ -373,7 +373,7 @@ class Patch(_Value):
         return patch
 
     def turned(self, macro: int, value: float) -> Patch:
-        """With the macro of this number, from 0, turned to `value` in 0 … 1, and the fields of its targets set."""
+        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set."""
         share = min(1.0, max(0.0, value))
         chosen = self.macros[macro]
         moved = chosen.model_copy(update={"value": share})

@@ -126,6 +126,7 @@ class AheadVoice:
 
     @property
     def samples(self) -> NDArray[np.float32]:
+        """What was rendered so far, (frames, channels)."""
         return np.concatenate(self._frames)
 
     def _take(self, samples: NDArray[np.float32]) -> None:

@@ -65,12 +65,12 @@ class MidiChoices(BaseModel):
     controllers: dict[TurnedField, ControllerNumber] = {}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """With `controller` assigned to `field`, and to no other."""
+        """These choices with `controller` assigned to `field`, and to no other."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 
     def forgotten(self, field: str) -> MidiChoices:
-        """With no controller assigned to `field`."""
+        """These choices with no controller assigned to `field`."""
         others = {f: c for f, c in self.controllers.items() if f != field}
         return self.model_copy(update={"controllers": others})
 

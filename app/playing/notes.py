@@ -273,7 +273,7 @@ class Notes:
         return tuple(self._latencies_s)
 
     def poll(self) -> None:
-        """To be called often by the window: forgets notes that ended, moves listening points, bounds the load."""
+        """Forgets notes that ended, moves listening points, bounds the load. The window calls it at each frame."""
         with self._lock:
             self._carry()
             self._notes = [note for note in self._notes if not note.over]

@@ -59,7 +59,7 @@ class Mix:
     difference_gain_db: float = 0.0
 
     def of(self, sources: Iterable[str]) -> Mix:
-        """With the model heard where `heard` is none of these sources."""
+        """This mix, with the model heard where `heard` is none of these sources."""
         return self if self.heard in (DIFFERENCE, *sources) else replace(self, heard="model")
 
     def gain(self, source: str, match: Mapping[str, float] | None) -> float:

@@ -27,7 +27,7 @@ LIBRARIES = (
 
 
 def library_versions() -> dict[str, str]:
-    """By distribution, as installed."""
+    """Distribution -> installed version."""
     return {name: _version(name) for name in LIBRARIES}
 
 

@@ -23,6 +23,7 @@ class Faults(QObject):
         self._told.connect(self._show, Qt.ConnectionType.QueuedConnection)
 
     def tell(self, text: str, heading: str = UNEXPECTED) -> None:
+        """Shows an error in the dialog; `heading` is that of the first one."""
         self._told.emit(text, heading)
 
     def _show(self, text: str, heading: str) -> None:

@@ -39,7 +39,7 @@ FIRST_PATCH = SHIPPED / "classical_guitar.json"
 
 
 def with_patch(settings: Settings) -> Settings:
-    """With FIRST_PATCH where no patch was ever chosen, so that keys play from the first start on."""
+    """The settings, with FIRST_PATCH where no patch was ever chosen: keys play from the first start on."""
     if settings.choices.patch is not None:
         return settings
     with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places

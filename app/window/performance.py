@@ -176,6 +176,7 @@ class Performance(QObject):
             self._shown.note, self._shown.parked_s = latest, latest.from_s
 
     def play_or_stop(self) -> None:
+        """Stops what rings; where nothing does, plucks."""
         if self.playing:
             self.stop()
         else:
@@ -258,6 +259,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
+        """Forgets notes that ended, goes on with the loop, and updates the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._turn()
@@ -347,7 +349,7 @@ class Performance(QObject):
         return None if entry is None else self._stroke_of(self._session.choices, entry)
 
     def _stroke_of(self, choices: Choices, entry: PresetEntry) -> Stroke:
-        """With the gain that the string has when a key plays it."""
+        """The chosen pluck, with the gain that its string has when a key plays it."""
         stroke = stroke_of(choices, entry.path, self._library)
         string = string_of(stroke.preset)
         return stroke if string is None else replace(stroke, gain=self.live.gain_of(string))

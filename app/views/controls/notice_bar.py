@@ -50,7 +50,7 @@ class NoticeBar(QFrame):
 
     @property
     def notices(self) -> list[Notice]:
-        """Of this run, latest last."""
+        """The notices of this run, the latest last."""
         return list(self._notices)
 
     def tell(self, message: str, details: str = "") -> None:

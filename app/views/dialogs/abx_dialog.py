@@ -95,6 +95,7 @@ class AbxDialog(QDialog):
 
     @property
     def testing(self) -> bool:
+        """Whether a test is under way."""
         return self._run is not None
 
     def choices(self) -> AbxChoices:

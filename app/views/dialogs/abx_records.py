@@ -62,6 +62,7 @@ class RecordsPage(QWidget):
         column.addLayout(buttons)
 
     def show_folder(self, folder: Path) -> None:
+        """Reads and lists the records of a folder; says which files cannot be read."""
         self._records, problems = list_records(folder)
         self._list.clear()
         for _, record in self._records:

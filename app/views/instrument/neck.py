@@ -31,7 +31,7 @@ TIP = (
 
 
 def fret_share(fret: float, frets: int) -> float:
-    """Where a fret lies between the nut, 0, and the last of `frets`, 1."""
+    """The place of a fret between the nut, 0, and the last of `frets`, 1."""
     return (1 - 2 ** (-fret / 12)) / (1 - 2 ** (-frets / 12))
 
 
@@ -60,7 +60,7 @@ class Neck(Playable):
 
     @property
     def frets(self) -> int:
-        """How many a neck has: to the highest key, and two octaves at most."""
+        """The number of frets: to the highest key, and two octaves at most."""
         highest = self._strings[-1][1] if self._strings else self._low
         return min(max(self._high - highest, 12), MOST_FRETS)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
@@ -81,6 +81,7 @@ class InstrumentPanel(QFrame):
         column.addWidget(self._knobs_row)
         column.addLayout(below)
         self._stack.installEventFilter(self)
+        self._hint.installEventFilter(self)
 
     # What is shown
 
@@ -163,6 +164,8 @@ class InstrumentPanel(QFrame):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show):
             self._place_hint()
+        elif watched is self._hint and event.type() == QEvent.Type.StyleChange:
+            QTimer.singleShot(0, self, self._place_hint)  # when the label has taken the style
         return super().eventFilter(watched, event)
 
     def _place_hint(self) -> None:

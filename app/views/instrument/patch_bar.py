@@ -283,6 +283,6 @@ def _named(macro: Macro) -> tuple[str, list[str]]:
 
 
 def _words(field: str) -> str:
-    """Of a field of a patch; of a pick-up point those of all points."""
+    """The words for a field of a patch; the same for all pick-up points."""
     inside, _, last = field.rpartition(".")
     return PATCH.get(field) or PATCH.get(inside) or last.replace("_", " ")

@@ -60,12 +60,12 @@ class PianoKeys(Playable):
     # Where keys are
 
     def _white(self, key: int) -> int:
-        """How many white keys lie left of it."""
+        """The number of white keys left of a key."""
         return 7 * ((key - self._first) // 12) + _WHITE_BEFORE[key % 12]
 
     @property
     def _pitch(self) -> float:
-        """From a white key to the next, in pixels."""
+        """The distance of white keys, in pixels."""
         return self.width() / (self._white(self._last) + 1)
 
     @property

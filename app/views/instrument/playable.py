@@ -174,9 +174,11 @@ class Playable(QWidget):
         self.rest_changed()
 
     def level(self, key: int) -> float:
+        """How loud a key sounds, 0 … 1."""
         return self._levels.get(key, 0) / LEVEL_STEPS
 
     def is_down(self, key: int) -> bool:
+        """Whether a key is pressed here, or stays down by itself."""
         return key in (self._down, self._typed) or key in self._held
 
     @property

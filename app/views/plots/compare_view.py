@@ -17,6 +17,7 @@ from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_ou
 
 
 def percent(value: float) -> str:
+    """A relative error; ∞: the model ran away."""
     if math.isinf(value):
         return "ran away"
     return f"{100 * value:.3g} %" if value < 10 else "> 1000 %"
@@ -27,10 +28,12 @@ def scientific(value: float) -> str:
 
 
 def decibels(value: float) -> str:
+    """A null depth in dB."""
     return "+∞" if math.isinf(value) else f"{value:.1f}".replace("-", "−")
 
 
 def times(value: float) -> str:
+    """A speed, as a multiple of real time."""
     return f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×"
 
 

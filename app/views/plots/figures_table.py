@@ -118,6 +118,7 @@ class FiguresTable(QTableView):
 
     @property
     def chosen_key(self) -> object:
+        """The key of the selected row; None: none is."""
         index = self.currentIndex()
         return self._key(index) if index.isValid() else None
 
@@ -166,7 +167,7 @@ class FiguresTable(QTableView):
 
 
 class _Rows(QAbstractTableModel):
-    """What `FiguresTable` shows."""
+    """The model of `FiguresTable`."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
         super().__init__()

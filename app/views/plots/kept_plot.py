@@ -29,6 +29,7 @@ class KeptPlot(pg.PlotWidget):
 
     @property
     def line_at(self) -> float:
+        """The place of the line on the horizontal axis."""
         return self._line_at
 
     def move_line(self, at: float) -> None:

@@ -106,5 +106,5 @@ def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -
 
 
 def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
-    """Of all texts in a row, with their samples of colour, in pixels."""
+    """The width of all texts in a row, with their samples of colour, in pixels."""
     return sum(STROKE + _GAP + metrics.horizontalAdvance(text) for text in texts) + _BETWEEN * (len(texts) - 1)

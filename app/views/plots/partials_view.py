@@ -20,10 +20,12 @@ def hertz(value: float) -> str:
 
 
 def seconds(value: float) -> str:
+    """A T60 in s; ∞: the partial grows."""
     return "grows" if math.isinf(value) else f"{value:.3g}"
 
 
 def signed(value: float, digits: int = 1) -> str:
+    """With its sign, and so many digits after the point."""
     if math.isinf(value):
         return "+∞" if value > 0 else "−∞"
     rounded = round(value, digits) or 0.0  # no minus before a zero
@@ -88,7 +90,7 @@ class PartialsView(QWidget):
         self.table.set_dimmed(True)
 
     def show_solo(self, mode: int) -> None:
-        """Marks the mode that is heard alone; 0: none."""
+        """Marks the soloed mode; 0: none."""
         self.table.choose(mode or None)
 
     @staticmethod

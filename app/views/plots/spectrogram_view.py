@@ -90,6 +90,7 @@ class SpectrogramView(QWidget):
         return 10**height if self.logarithmic else height
 
     def set_take(self, seconds: float, horizon_s: float, rate_hz: int) -> None:
+        """A new take; the frequency axis ends at half its rate."""
         self.plot.set_times(seconds, horizon_s)
         if rate_hz / 2 != self._highest_hz:
             self._highest_hz = rate_hz / 2

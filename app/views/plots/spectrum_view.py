@@ -44,6 +44,7 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
+        """(COLUMNS,), from LOWEST_HZ to half the rate."""
         return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
 
     @cached_property
@@ -58,7 +59,7 @@ class Analyser:
 
     @cached_property
     def _first_bins(self) -> NDArray[np.intp]:
-        """Where columns are wider than bins: each one's first."""
+        """The first bin of each column, where columns are wider than bins."""
         return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
 
     @cached_property

@@ -87,6 +87,7 @@ class TimePlot(KeptPlot):
         self._untrained.setVisible(inside and self._shaded)
 
     def show_playhead(self, position_s: float) -> None:
+        """Moves the playhead; costs nothing where it is there already."""
         if position_s != self.line_at:
             self.move_line(position_s)
 
@@ -120,6 +121,7 @@ class TimePlot(KeptPlot):
         self.show_times(about_s - (about_s - low) * factor, about_s + (high - about_s) * factor)
 
     def pan(self, by_s: float) -> None:
+        """Moves the view to later times; to earlier ones where `by_s` is negative."""
         low, high = self.times_s
         self.show_times(low + by_s, high + by_s)
 

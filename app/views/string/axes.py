@@ -30,7 +30,7 @@ class StringAxes:
 
     @property
     def length(self) -> float:
-        """Of the string, in pixels."""
+        """The length of the string, in pixels."""
         return max(1.0, self.width - 2 * MARGIN_X)
 
     @property

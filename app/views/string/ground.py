@@ -31,8 +31,8 @@ class TrainedPlucks:
 def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
     """Paints the gradient, the grid, the scale and the hatching.
 
-    `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Amplitudes
-    are hatched only for a pluck, for a string in motion crosses them all.
+    `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
+    pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
     """
     gradient = QLinearGradient(0, 0, 0, axes.height)
     gradient.setColorAt(0, QColor(theme.face.ground_top))
@@ -43,7 +43,7 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
     paint_grid(painter, axes)
     _paint_scale(painter, axes)
     if trained.position is not None:
-        _paint_untrained_positions(painter, axes, trained.position)
+        _paint_untrained_positions(painter, axes, trained.position, words=pluck is not None)
     if pluck is not None and trained.amplitude_mm is not None:
         _paint_untrained_amplitudes(painter, axes, trained, pluck)
 
@@ -97,17 +97,19 @@ def _shade(painter: QPainter, area: QRectF) -> None:
     painter.drawRect(area)
 
 
-def _paint_untrained_positions(painter: QPainter, axes: StringAxes, trained: tuple[float, float]) -> None:
+def _paint_untrained_positions(
+    painter: QPainter, axes: StringAxes, trained: tuple[float, float], words: bool
+) -> None:
     low, high = trained
     height = axes.bottom - axes.top
-    words = ("not trained here", f"only plucks at {low:g} … {high:g}")
+    lines = ("not trained here", f"only plucks at {low:g} … {high:g}") if words else ()
     for start, stop in ((0.0, low), (high, 1.0)):
         if stop <= start:
             continue
         area = QRectF(axes.x(start), axes.top, axes.x(stop) - axes.x(start), height)
         _shade(painter, area)
         painter.setFont(theme.small_font(11))
-        for row, text in enumerate(words):
+        for row, text in enumerate(lines):
             painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
             line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
             if painter.fontMetrics().horizontalAdvance(text) > line.width():

@@ -74,7 +74,7 @@ class SpaceTimePanel(Panel):
         view.readout.rest(_caption(made))
 
     def _typical_mm(self, envelopes: Envelopes, times_s: tuple[float, float]) -> float:
-        """Of the displacement in view, for model and truth alike, or of the error."""
+        """The typical displacement in view, the same for model and truth, or the typical error."""
         names = ("error",) if self.view.quantity == "error" else SOURCES
         return max(envelopes.typical_m(name, times_s) for name in names) * MM
 
