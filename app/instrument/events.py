@@ -51,6 +51,13 @@ class PatchTurned:
     patch: Patch
 
 
+def moves_effects(event: object, patch: Patch) -> bool:
+    """Whether it changes the body or the room of what is heard of a patch."""
+    if isinstance(event, Controller):
+        return event.number in (MOD_WHEEL, RESET) and patch.mod_wheel.startswith(("body.", "room."))
+    return isinstance(event, PatchTurned)
+
+
 Event = NoteOn | NoteOff | Bend | Controller | PatchTurned
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.effects import channels_of, effects_of
-from app.instrument.events import Event, NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent, moves_effects
 from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from engine.kernels.layout import AHEAD
@@ -31,8 +31,8 @@ class _Stage:
         self._source = source
         self._struck: list[Struck] = []
         self.player = Player(patch, preset, rate_hz, self._take, (source,))
-        self.mixer.set_effects(effects := effects_of(patch))
-        self.tail_s = 0.0 if effects is None else effects.tail_s(rate_hz)
+        self.tail_s = 0.0
+        self._set_effects()
 
     def _take(self, struck: Struck) -> None:
         self._struck = [each for each in self._struck if not each.over]
@@ -45,8 +45,13 @@ class _Stage:
 
     def handle(self, event: Event) -> None:
         self.player.handle(event)
-        if isinstance(event, PatchTurned):
-            self.mixer.set_effects(effects_of(event.patch))
+        if moves_effects(event, self.player.patch):
+            self._set_effects()
+
+    def _set_effects(self) -> None:
+        self.mixer.set_effects(effects := effects_of(self.player.heard_through))
+        if effects is not None:
+            self.tail_s = max(self.tail_s, effects.tail_s(self.mixer.rate_hz))
 
     @property
     def silent(self) -> bool:

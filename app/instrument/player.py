@@ -7,21 +7,18 @@ it ring. Bends, slides, dampers and knobs change the modes of a string's voices,
 
 from __future__ import annotations
 
-import contextlib
-import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from app.instrument import events
-from app.instrument.effects import body_response
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
-from app.instrument.loudness import HIGHEST_PEAK_DB, REFERENCE_VELOCITY, gain_of, peak_db
+from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, damped, slid
 from app.patches.patch import Patch
 from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
@@ -35,9 +32,17 @@ MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the ke
 DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03
 KEPT_KEYS = 256
-# What the mod wheel at its top makes of a field: a multiple of its value, or a value
-WHEEL_FACTORS = {"knobs": 4.0, "damping.release_t60_s": 10.0, "room.t60_s": 3.0, "body.size": 2.0}
-WHEEL_VALUES = {"pluck.position": 0.5, "pluck.curve": 1.0, "body.mix": 1.0, "room.mix": 1.0, "level_db": 6.0}
+GOALS = 8  # values that are tried for a wheel all the way up
+# What a wheel all the way up makes of a field: a factor of its own value, or a value
+WHEEL_FACTORS = {"knobs": 4.0, "damping": 10.0, "pluck.hardest_mm": 2.0, "body.size": 2.0, "room.t60_s": 3.0}
+WHEEL_VALUES = {
+    "pluck.position": 0.5,
+    "pluck.width": 0.02,
+    "pluck.width_hard": 0.02,
+    "pluck.curve": 1.0,
+    "body.mix": 1.0,
+    "room.mix": 1.0,
+}
 
 
 @dataclass(frozen=True)
@@ -160,6 +165,11 @@ class Player:
         return self._patch
 
     @property
+    def heard_through(self) -> Patch:
+        """With the body and the room as the modulation wheel turns them."""
+        return self._wheeled("body.", "room.")
+
+    @property
     def preset(self) -> Preset:
         return self._preset
 
@@ -244,47 +254,23 @@ class Player:
     # How it is done
 
     def _take(self, patch: Patch) -> None:
-        strings = Strings(patch)
         ear = self._listens or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        rate_hz, model, response = self._rate_hz, self._model, body_response(patch)
-
-        def loud(key: int) -> tuple[KeyString, Resonator, float, float] | None:
-            """The key's string, its modes, the factor that makes it as loud as others, and its peak then, in dB."""
-            string = strings.of_key(key)
-            if string is None:
-                return None
-            modes = min(string.modes, model.configuration.grid_points - 2)
-            resonator = string.parameters.resonator(modes, grid_points=model.configuration.grid_points)
-            pluck = _on(string, patch.pluck.pluck(REFERENCE_VELOCITY))
-            gain = gain_of(resonator, pluck, ear, response)
-            return string, resonator, gain, peak_db(resonator, pluck, ear, response) + 20 * math.log10(gain)
-
-        @lru_cache(maxsize=1)
-        def level() -> float:
-            """One factor for all keys: the patch's level, lowered where keys would peak above HIGHEST_PEAK_DB."""
-            low, high = patch.range
-            peaks_db = []
-            for key in {low + round(share * (high - low)) for share in (0, 0.25, 0.5, 0.75, 1)}:
-                with contextlib.suppress(ValueError):  # raised again when it is struck
-                    if (found := loud(key)) is not None:
-                        peaks_db.append(found[3])
-            over_db = max(0.0, max(peaks_db, default=HIGHEST_PEAK_DB) - HIGHEST_PEAK_DB)
-            return float(10 ** ((patch.level_db - over_db) / 20))
+        rate_hz, model = self._rate_hz, self._model
+        keys = LoudKeys(patch, ear, model.configuration.grid_points)
 
         @lru_cache(maxsize=KEPT_KEYS)
         def key_of(key: int) -> Key | None:
-            found = loud(key)
+            found = keys.of_key(key)
             if found is None:
                 return None
-            string, resonator, gain, _ = found
             programs: dict[str, Program] = {}
             for source in self._sources:
                 programs[source] = (
-                    solver_program(resonator, rate_hz)
+                    solver_program(found.resonator, rate_hz)
                     if source == "truth"
-                    else tension_program(model, resonator, rate_hz)
+                    else tension_program(model, found.resonator, rate_hz)
                 )
-            return Key(string, resonator, gain * level(), programs)
+            return Key(found.string, found.resonator, found.gain, programs)
 
         self._patch, self._ear, self._key = patch, ear, key_of
 
@@ -301,7 +287,7 @@ class Player:
         if key is None:
             return None
         place = self._place(event)
-        pluck = _on(key.string, self._pluck(event))
+        pluck = on_string(key.string, self._pluck(event))
         voices = {
             source: Voice(program, pluck.displacement(program.grid_points), self._ear)
             for source, program in key.programs.items()
@@ -392,19 +378,21 @@ class Player:
             return replace(pluck, position=low + (high - low) * min(max(slide, 0), 127) / 127)
         return pluck
 
-    def _wheeled(self, part: str) -> Patch:
-        """The patch as the mod wheel turns it, where it turns anything of this part."""
+    def _wheeled(self, *parts: str) -> Patch:
+        """The patch as the mod wheel turns it, where it turns anything of these parts."""
         name, share = self._patch.mod_wheel, self._hands.wheel / 127
-        if share == 0 or not name.startswith(part):
+        if share == 0 or not name.startswith(parts):
             return self._patch
         value = self._patch.value(name)
         factor = WHEEL_FACTORS.get(name, WHEEL_FACTORS.get(name.split(".")[0], 0.0))
         goal = WHEEL_VALUES.get(name, value * factor if factor else value)
-        for turned in (value + share * (goal - value), value):
+        for _ in range(GOALS):
             try:
-                return self._patch.with_value(name, turned)
-            except ValueError:  # beyond its bounds
-                continue
+                self._patch.with_value(name, goal)
+            except ValueError:  # beyond its bounds: half as far
+                goal = (goal + value) / 2
+            else:
+                return self._patch.with_value(name, value + share * (goal - value))
         return self._patch
 
     def _with_hands(self, struck: Struck) -> StringParameters:
@@ -428,8 +416,3 @@ class Player:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
             struck.retune(parameters, seconds)
-
-
-def _on(string: KeyString, pluck: Pluck) -> Pluck:
-    """A pluck of the whole string, made for the part of it that a key leaves."""
-    return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))

@@ -45,7 +45,25 @@ ASSIGNABLE: tuple[str, ...] = (
     "room.mix",
     "room.t60_s",
     "level_db",
-)  # what the mod wheel and macros may turn
+)  # what macros may turn
+WHEEL: tuple[str, ...] = (
+    "knobs.stiffness",
+    "knobs.decay",
+    "knobs.brightness_decay",
+    "knobs.modulus",
+    "knobs.density",
+    "knobs.gauge",
+    "pluck.position",
+    "pluck.width",
+    "pluck.width_hard",
+    "pluck.hardest_mm",
+    "pluck.curve",
+    "damping.release_t60_s",
+    "body.mix",
+    "body.size",
+    "room.mix",
+    "room.t60_s",
+)  # what the modulation wheel may turn
 
 LONGEST_NAME = 60  # characters
 LONGEST_DESCRIPTION = 400
@@ -304,7 +322,7 @@ class Patch(_Value):
         range: the lowest and the highest key that sound.
         mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe".
         bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
-        mod_wheel: one of ASSIGNABLE, or "none".
+        mod_wheel: one of WHEEL, or "none".
         level_db: gain of its sound.
         macros: their values do nothing until a macro is turned (`turned`), which sets the fields of its targets.
     """
@@ -336,8 +354,11 @@ class Patch(_Value):
         low, high = self.range
         if low > high:
             raise ValueError(f"range: the lowest key {low} is above the highest, {high}; exchange them")
-        if self.mod_wheel != "none":
-            self._check_assignable("mod_wheel", self.mod_wheel)
+        if self.mod_wheel not in ("none", *WHEEL):
+            raise ValueError(
+                f"mod_wheel: {bounds.brief(self.mod_wheel)} is no field that the wheel can turn; "
+                f"try none, {', '.join(WHEEL)}"
+            )
         for number, macro in enumerate(self.macros):
             for target in macro.targets:
                 where = f"macros.{number}: target {target.field[:LONGEST_NAME]}"

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import Event, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import Controller, Event, NoteOn, PatchTurned, TimedEvent, moves_effects
 from app.instrument.player import SOURCES, Player, Struck
 from app.patches.patch import Patch
 from app.playing.notes import Note, Notes
@@ -84,7 +84,7 @@ class Live:
                 except ValueError as error:
                     self._report(str(error), "")
                     return
-                self._wish_effects(patch)
+                self._wish_effects(player.heard_through)
                 self._prepare(player)
                 return
             self._player = None
@@ -115,6 +115,8 @@ class Live:
                 player.handle(event)
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
+            if isinstance(event, Controller) and moves_effects(event, player.patch):
+                self._wish_effects(player.heard_through)
             return self._made
 
     def stop(self) -> None:
@@ -145,7 +147,7 @@ class Live:
         with self._lock:
             self._dry = dry
             if self._player is not None:
-                self._wish_effects(self._player.patch)
+                self._wish_effects(self._player.heard_through)
 
     def _wish_effects(self, patch: Patch | None) -> None:
         """Sets body and room in the background: an impulse response takes milliseconds. The latest call counts."""

@@ -87,7 +87,12 @@ def _of_patch(before: Patch | None, after: Patch | None) -> str:
     if "macros" in fields:
         turned = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
         return _together(turned or ["macros"])
-    return _together([PATCH.get(field, field.rpartition(".")[2].replace("_", " ")) for field in fields])
+    return _together([field_words(field) for field in fields])
+
+
+def field_words(field: str) -> str:
+    """A patch's field, by its path."""
+    return PATCH.get(field, field.rpartition(".")[2].replace("_", " "))
 
 
 def _changed(before: BaseModel, after: BaseModel, path: str = "") -> Iterator[str]:

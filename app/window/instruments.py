@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 
 from app.instrument.events import Event, NoteOff, NoteOn
 from app.instrument.player import Struck
-from app.patches.patch import PhysicalString
+from app.patches.patch import Patch, PhysicalString
 from app.playing.keyboard import LOWEST_C, KeyPress, Reach, play, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.presets.library import Library
@@ -65,6 +65,7 @@ class Instruments(QObject):
             self,
         )
         self.midi.performed.connect(lambda changes: self.perform(changes, False))
+        self.midi.patch_turned.connect(self._turn_patch)
         self.midi.told.connect(self.told)
         window.midi_asked.connect(lambda: self.midi.show_dialog(window))
 
@@ -89,6 +90,7 @@ class Instruments(QObject):
 
     def choices_changed(self) -> None:
         self._keys.piano = self.plays_pitches
+        self.midi.show_patch(self._session.choices.patch)
 
     def play(self, event: Event) -> bool:
         """Plays an event through the patch. Any thread. False where no patch is chosen."""
@@ -120,6 +122,11 @@ class Instruments(QObject):
             self._struck.emit(changes)
         else:
             self._session.update(**changes)
+
+    def _turn_patch(self, field: str, value: object) -> None:
+        patch = self._session.choices.patch
+        if patch is not None:
+            self._session.update(patch=Patch.model_validate({**dict(patch), field: value}))
 
     def _tell_session(self, changes: dict[str, Any]) -> None:
         """Updates the session, once for all notes that were struck meanwhile."""

@@ -13,9 +13,11 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.instrument.events import Controller, Event, NoteOn
+from app.patches.patch import WHEEL, Patch
 from app.playing.keyboard import Reach
 from app.playing.midi import TURNED, MidiChoices, meaning_of
 from app.playing.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
+from app.session.step_words import field_words
 from app.views.dialogs.midi_dialog import MidiDialog
 
 
@@ -33,6 +35,7 @@ class MidiControl(QObject):
     """
 
     performed = Signal(dict)  # new values of `Choices`, by a controller
+    patch_turned = Signal(str, object)  # field and value of the patch, by the dialog
     told = Signal(str)  # an error, for the user
     _received = Signal(object)  # emitted in mido's thread
 
@@ -53,6 +56,7 @@ class MidiControl(QObject):
         self._play, self._handle = play, handle
         self._learning: str | None = None  # the field to which the next controller is assigned
         self._dialog: MidiDialog | None = None
+        self._patch: Patch | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
         self.input = MidiInput(self._receive, load)
 
@@ -72,7 +76,12 @@ class MidiControl(QObject):
     def show_dialog(self, window: QWidget) -> None:
         """Opens the dialog, which does not block the window, or brings it to the front."""
         if self._dialog is None:
-            dialog = self._dialog = MidiDialog({field: turned.label for field, turned in TURNED.items()}, window)
+            dialog = self._dialog = MidiDialog(
+                {field: turned.label for field, turned in TURNED.items()},
+                {field: field_words(field) for field in WHEEL},
+                window,
+            )
+            dialog.patch_turned.connect(self.patch_turned)
             dialog.port_chosen.connect(self._choose_port)
             dialog.notes_chosen.connect(lambda mode: self._remember(self.choices.model_copy(update={"notes": mode})))
             dialog.learn_asked.connect(self._learn)
@@ -80,6 +89,7 @@ class MidiControl(QObject):
             dialog.finished.connect(lambda _: self._learn(""))
         self._show_inputs()
         self._show_choices()
+        self.show_patch(self._patch)
         self._dialog.show()
         self._dialog.raise_()
 
@@ -96,6 +106,14 @@ class MidiControl(QObject):
         if self._dialog is not None:
             controllers = {str(field): number for field, number in self.choices.controllers.items()}
             self._dialog.show_choices(self.choices.notes, controllers, self._learning)
+
+    def show_patch(self, patch: Patch | None) -> None:
+        """The patch that is played; None for none."""
+        self._patch = patch
+        if self._dialog is not None:
+            self._dialog.set_patch_turnable(patch is not None)
+            if patch is not None:
+                self._dialog.show_patch(patch.mode, patch.bend_semitones, patch.mod_wheel)
 
     def _choose_port(self, name: str) -> None:
         assert self._dialog is not None

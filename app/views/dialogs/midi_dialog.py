@@ -23,6 +23,8 @@ NOTE_MODES = (
     ("Set pluck position", "position"),
     ("Select preset", "preset"),
 )
+CHANNELS = (("Any channel plays any key", "poly"), ("Guitar: a channel is a string", "guitar"), ("MPE", "mpe"))
+BENDS = (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 12.0, 24.0, 48.0)  # semitones
 
 
 class MidiDialog(QDialog):
@@ -30,14 +32,16 @@ class MidiDialog(QDialog):
 
     Args:
         turned: the names of what a controller can turn, by field of `Choices`.
+        wheel: names of what the modulation wheel can turn, by field of a patch.
     """
 
     port_chosen = Signal(str)  # "": none
     notes_chosen = Signal(str)
     learn_asked = Signal(str)  # a field
     forget_asked = Signal(str)
+    patch_turned = Signal(str, object)  # a field of the patch, and its value
 
-    def __init__(self, turned: Mapping[str, str], parent: QWidget | None = None) -> None:
+    def __init__(self, turned: Mapping[str, str], wheel: Mapping[str, str], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("MIDI")
         self.setMinimumWidth(460)
@@ -46,6 +50,13 @@ class MidiDialog(QDialog):
         self._notes = combo_box("Function of notes", NOTE_MODES)
         self._notes.setToolTip("Velocity always sets how hard the string is plucked")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
+        self._channels = combo_box("Channels", CHANNELS)
+        self._bends = combo_box("Range of the pitch wheel", [(_semitones(each), each) for each in BENDS])
+        turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
+        self._wheel = combo_box("Modulation wheel", [("Nothing", "none"), *turnable])
+        for box, field in ((self._channels, "mode"), (self._bends, "bend_semitones"), (self._wheel, "mod_wheel")):
+            box.setToolTip("Of the patch, and saved with it")
+            box.activated.connect(lambda row, box=box, field=field: self.patch_turned.emit(field, box.itemData(row)))
         self._problem = Label()
         self._problem.setObjectName("warning")
         self._problem.setWordWrap(True)
@@ -55,7 +66,13 @@ class MidiDialog(QDialog):
         self._turned = turned
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
-        for name, box in (("Input", self._inputs), ("Notes", self._notes)):
+        for name, box in (
+            ("Input", self._inputs),
+            ("Notes", self._notes),
+            ("Channels", self._channels),
+            ("Pitch wheel", self._bends),
+            ("Modulation wheel", self._wheel),
+        ):
             label = Label(name)
             label.setMinimumHeight(box.sizeHint().height())  # so that it is level with its box
             form.addRow(label, box)
@@ -104,6 +121,18 @@ class MidiDialog(QDialog):
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
 
+    def show_patch(self, mode: str, bend_semitones: float, mod_wheel: str) -> None:
+        """What the patch that is played makes of channels and wheels."""
+        if self._bends.findData(bend_semitones) < 0:
+            self._bends.addItem(_semitones(bend_semitones), bend_semitones)
+        for box, value in ((self._channels, mode), (self._bends, bend_semitones), (self._wheel, mod_wheel)):
+            box.setCurrentIndex(max(0, box.findData(value)))
+
+    def set_patch_turnable(self, turnable: bool) -> None:
+        """Whether there is a patch to play."""
+        for box in (self._channels, self._bends, self._wheel):
+            box.setEnabled(turnable)
+
     def set_learnable(self, why_not: str) -> None:
         """`why_not`: why no controller can be assigned, with the remedy; "" where one can."""
         for field, (_, learn, _) in self._rows.items():
@@ -124,3 +153,7 @@ class MidiDialog(QDialog):
             taught.style().polish(taught)
             learn.setChecked(waits)
             forget.setEnabled(number is not None)
+
+
+def _semitones(count: float) -> str:
+    return f"± {count:g} semitone{'' if count == 1 else 's'}"

@@ -52,3 +52,14 @@ def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> No
     assert {(case["batch"], case["frames"]) for name, case in cases.items() if name != "fgru"} == {(2, 5)}
     assert cases["fgru"]["frames"] == 3
     assert all(case["step_s"] > 0 for case in cases.values())
+
+
+def test_bench_notes_says_what_is_missing(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.commands.benchmarks.play.children.shutil.which", lambda name: None)
+    by_midi, by_keys = run("bench", "notes"), run("bench", "notes", "--by", "keys")
+    assert (by_midi.status, by_keys.status) == (1, 1)
+    assert "jackd2" in by_midi.err and "apt install" in by_midi.err
+    assert "jackd" not in by_keys.err and "xvfb" in by_keys.err
+    rings = run("bench", "notes", "--patch", "concert_harp")
+    assert rings.status == 1 and "ring on" in rings.err
+    assert run("bench", "notes", "--buffer", "huge").status == 2

@@ -12,7 +12,7 @@ from app.instrument.events import MOD_WHEEL, SOUND_OFF, SUSTAIN, Bend, Controlle
 from app.instrument.loudness import k_weight
 from app.instrument.offline import render_events, render_note
 from app.instrument.player import Player, Struck
-from app.patches.patch import Damping, Fretted, Knobs, Patch, PhysicalString, Pickup
+from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, Room
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
@@ -207,6 +207,35 @@ def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> No
     player.handle(Controller(MOD_WHEEL, 127))
     player.handle(NoteOn(52, 90))
     assert [each.pluck.position for each in struck] == [pytest.approx(0.2), pytest.approx(0.5)]
+
+
+@pytest.mark.parametrize("field", WHEEL)
+def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: str) -> None:
+    """Softly and hard, held and let go: something of the next note, or of what it is heard through, is another."""
+
+    def heard(value: int) -> object:
+        struck: list[Struck] = []
+        wheel = changed(patch, mod_wheel=field, body=Body(name="guitar"), room=Room(mix=0.1))
+        player = Player(wheel, preset, RATE_HZ, struck.append)
+        player.handle(Controller(MOD_WHEEL, value))
+        for key, velocity in ((50, 20), (52, 110)):
+            player.handle(NoteOn(key, velocity))
+            player.handle(NoteOff(key))
+        return [(each.pluck, each.parameters) for each in struck], player.heard_through
+
+    assert heard(0) != heard(127)
+
+
+def test_the_wheel_brings_the_room(patch: Patch, preset: Preset) -> None:
+    wheel = changed(patch, mod_wheel="room.mix", room=Room(mix=0.0, t60_s=1.0))
+
+    def tail(value: int) -> float:
+        events = [(0.0, Controller(MOD_WHEEL, value)), (0.1, NoteOn(50, 100)), (0.4, NoteOff(50))]
+        sound = play(wheel, preset, 1.6, *events)
+        return float(np.abs(sound[round(1.2 * RATE_HZ) :]).max())
+
+    assert tail(0) < 1e-5
+    assert tail(127) > 1e-4
 
 
 def test_all_sound_off_ends_everything(patch: Patch, preset: Preset) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from app.instrument.events import MOD_WHEEL, Controller
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
@@ -76,6 +77,18 @@ def test_they_are_off_while_models_are_compared(stage: Stage, patch: Patch, wait
         stage.live.hear_dry(dry)
         stage.settle(wait)
         assert (stage.effects[-1] is None) == dry
+
+
+def test_the_modulation_wheel_brings_the_room(stage: Stage, patch: Patch, wait: Wait) -> None:
+    stage.live.set_patch(patch.model_copy(update={"mod_wheel": "room.mix"}), EAR)
+    wait(lambda: stage.live.ready)
+    stage.settle(wait)
+    for value, mix in ((127, 1.0), (0, patch.room.mix)):
+        stage.live.handle(Controller(MOD_WHEEL, value))
+        stage.settle(wait)
+        effects = stage.effects[-1]
+        assert effects is not None
+        assert (effects.room.mix if effects.room is not None else 0.0) == pytest.approx(mix)
 
 
 def test_a_body_that_is_not_here_is_told_once_however_its_knobs_are_turned(

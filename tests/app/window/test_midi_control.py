@@ -14,6 +14,8 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
 from app.playing.keyboard import Reach
 from app.playing.midi import MidiChoices
 from app.playing.midi_port import MidiInput, MidiUnavailable, load_backend, same_device
@@ -92,6 +94,15 @@ Played = list[tuple[dict[str, Any], threading.Thread]]
 def played() -> Played:
     """Notes, and the threads that they were played in."""
     return []
+
+
+def test_midos_own_variable_chooses_what_brings_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MIDO_BACKEND", "mido.backends.portmidi_of_nobody")
+    with pytest.raises(MidiUnavailable, match=r"MIDO_BACKEND names mido\.backends\.portmidi_of_nobody"):
+        load_backend()
+    monkeypatch.setenv("MIDO_BACKEND", "mido.backends.rtmidi/NO_SUCH_API")
+    with pytest.raises(MidiUnavailable, match="does not answer"):
+        MidiInput(lambda event: None).names()
 
 
 def control(
@@ -214,6 +225,24 @@ def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
     midi.show_dialog(window)
     assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())
     assert "move a control" in dialog._rows["width"][1].toolTip()
+
+
+def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiControl) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.show_dialog(window)
+    dialog = midi._dialog
+    assert dialog is not None
+    assert not dialog._wheel.isEnabled()  # there is no patch
+    patch = read_patch(PATCHES / "classical_guitar.json")
+    midi.show_patch(patch.model_copy(update={"mode": "guitar", "bend_semitones": 2.5, "mod_wheel": "knobs.decay"}))
+    shown = [box.currentData() for box in (dialog._channels, dialog._bends, dialog._wheel)]
+    assert shown == ["guitar", 2.5, "knobs.decay"]
+    turned: list[tuple[str, object]] = []
+    midi.patch_turned.connect(lambda field, value: turned.append((field, value)))
+    for box, value in ((dialog._channels, "mpe"), (dialog._bends, 12.0), (dialog._wheel, "pluck.position")):
+        box.activated.emit(box.findData(value))
+    assert turned == [("mode", "mpe"), ("bend_semitones", 12.0), ("mod_wheel", "pluck.position")]
 
 
 def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:

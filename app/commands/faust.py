@@ -1,0 +1,33 @@
+"""faust: a patch's quiet string as a Faust program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.commands.console import Failure, say
+
+
+def faust(
+    patch: Annotated[str, typer.Argument(metavar="PATCH", help="A patch's name or the path of its file.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT.dsp", help="The program.")],
+    modes: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="The lowest so many alone; default all below 20 kHz.")
+    ] = None,
+) -> None:
+    """Write a patch's quiet string as a Faust program: a bank of its modes, for plug-ins, Max, the web and more."""
+    from app.commands.arguments import open_preset
+    from app.export.faust import write_faust
+    from app.patches.library import PatchError, find_patch
+    from app.shared.whole_file import WriteError
+
+    try:
+        chosen = find_patch(patch).patch
+        written = write_faust(out, chosen, open_preset(chosen.preset).info.grid_points, modes)
+    except (PatchError, ValueError, WriteError) as error:
+        raise Failure(str(error)) from error
+    if chosen.body.name or chosen.room.mix:
+        say("note: without the patch's body and room")
+    print(f"{out}: {written} modes")
