@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Json, PresetName, open_preset
+from app.commands.arguments import Cache, Json, PresetName, check_range, open_preset
 from app.commands.console import Failure, Shares, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from engine.presets import Preset
     from training.family.errors import FamilyErrors, StringError
     from training.family.partials import StringPartials
     from training.family.strings import Column
@@ -83,10 +84,6 @@ def evaluate(
     error_map: Annotated[
         bool, typer.Option("--map", help="And errors by rise of tension and inharmonicity.")
     ] = False,
-    partials: Annotated[
-        bool,
-        typer.Option("--partials", help="And pitch after a quiet pluck, level, T60 and glide of the partials."),
-    ] = False,
     picture: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Errors by rise and inharmonicity, a dot each string: .png, .svg or .pdf."),
@@ -99,22 +96,19 @@ def evaluate(
     import torch
 
     from training.family.errors import Player, by_cell, by_rise, knowing_physics, measure, player
-    from training.family.partials import measure_partials
 
     torch.set_num_threads(1)
     if picture is not None:
         from training.figures.style import check_format
 
         check_format(picture)
-    loaded = open_preset(preset)
-    if loaded.info.family is None:
-        raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")
+    loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     players |= knowing_physics() if baselines else {}
     players |= _trained(runs) if runs else {}
     own: list[Any] = []  # errors of the preset, both columns
     with progress("family evaluate") as report:
-        shares = Shares(report, 2 * (1 + (tenth > 0) + partials))
+        shares = Shares(report, 2 * (1 + (tenth > 0)))
         measured = _measured(players, strings, rate, seed, shares)
         found = {column: {name: _facts(one) for name, one in errors.items()} for column, errors in measured.items()}
         for column, errors in measured.items():
@@ -129,10 +123,6 @@ def evaluate(
                 span_s, told = (9.0, 10.0), shares.next()
                 last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=told)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
-            if partials:
-                play, told = players[loaded.name], shares.next()
-                of_partials = measure_partials(play, column, "test", strings, rate, 1.0, seed=seed, report=told)
-                facts["partials"] = _partials_facts(of_partials)
     cells = [
         {"rise": rises, "inharmonicity": edges, "strings": len(part.strings), **_facts(part)}
         for rises, edges, part in (by_cell(own, RISES, INHARMONICITIES) if error_map else ())
@@ -161,10 +151,52 @@ def evaluate(
                 f"{number(last.get('geometric_mean'))}, worst {number(last.get('worst'))}; "
                 f"{number(last.get('over_first'))} times their first"
             )
-        if partials:
-            _print_partials(facts["partials"], strings)
     if error_map:
         _print_map(cells)
+
+
+@family.command()
+def partials(
+    preset: PresetName,
+    strings: Strings = 200,
+    seconds: Annotated[float, typer.Option(help="After each pluck.")] = 0.5,
+    rate: Rate = 48_000,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Pitch after a quiet pluck, level, T60 and glide of the partials, on the held-out strings of `evaluate`.
+
+    Those of one string, mode by mode: `evaluate PRESET --string NAME --partials`.
+    """
+    import torch
+
+    from training.family.errors import player
+    from training.family.partials import QUIET_RISE, measure_partials
+    from training.family.strings import COLUMNS
+
+    check_range("--seconds", seconds, 0.25, 10, "s")  # thirds of it tell the glide of a low string
+    torch.set_num_threads(1)
+    loaded = _open_preset_of_many(preset)
+    play = player(loaded.model)
+    found: dict[str, dict[str, Any]] = {}
+    with progress("family partials") as report:
+        shares = Shares(report, len(COLUMNS))
+        for column in COLUMNS:
+            of_strings = measure_partials(
+                play, column, "test", strings, rate, seconds, seed=seed, report=shares.next()
+            )
+            found[column] = _partials_facts(of_strings)
+    if json:
+        facts = {"preset": loaded.name, "strings": strings, "seconds": seconds, "rate_hz": rate, "seed": seed}
+        print_json({**facts, "quiet_rise": QUIET_RISE, **found})
+        return
+    print(
+        f"{strings} strings a column, {seconds:g} s at {rate} Hz: errors of partials, of the middle string and of "
+        f"the worst; a quiet pluck raises the tension by {QUIET_RISE:g}, the other plucks are each string's own"
+    )
+    for column_name, figures in found.items():
+        rows = [[text, *figures[name].values()] for name, text in PARTIALS.items()]
+        print_table((column_name, "median", "worst", "worst at"), rows)
 
 
 @family.command()
@@ -234,6 +266,13 @@ def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any
         print(path)
 
 
+def _open_preset_of_many(name_or_path: str) -> Preset:
+    loaded = open_preset(name_or_path)
+    if loaded.info.family is None:
+        raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")
+    return loaded
+
+
 def _measured(
     players: dict[str, Any], strings: int, rate_hz: int, seed: int, shares: Shares
 ) -> dict[Column, dict[str, FamilyErrors]]:
@@ -278,31 +317,18 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
 
 
 def _partials_facts(strings: list[StringPartials]) -> dict[str, Any]:
-    """Of each figure the middle one of the strings and the worst, of a string's partials by energy or the largest."""
-    from training.family.partials import QUIET_RISE, middle_and_worst
+    """Of each figure the median over the strings and the worst; of a string's partials the mean or the largest."""
+    from training.family.partials import middle_and_worst
 
     figures: dict[str, list[float]] = {"quiet_first_cents": [one.quiet_first_cents for one in strings]}
     for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
         for kind in ("mean", "largest"):
             figures[f"{name}_{kind}"] = [getattr(getattr(one, name), kind) for one in strings]
-    facts: dict[str, Any] = {"quiet_rise": QUIET_RISE}
+    facts = {}
     for name, values in figures.items():
         median, worst, place = middle_and_worst(values)
-        facts[name] = {
-            "median": median,
-            "worst": worst,
-            "worst_at": "" if place is None else _place(strings[place]),
-        }
+        facts[name] = {"median": median, "worst": worst, "worst_at": "" if place is None else _place(strings[place])}
     return facts
-
-
-def _print_partials(facts: dict[str, Any], strings: int) -> None:
-    print(
-        f"partials of {strings} strings, first second: magnitudes of the errors; a quiet pluck raises the tension by "
-        f"{facts['quiet_rise']:g}, the others are each string's own"
-    )
-    rows = [[text, *(facts[name][key] for key in ("median", "worst", "worst_at"))] for name, text in PARTIALS.items()]
-    print_table(("", "median", "worst", "worst at"), rows)
 
 
 def _print_map(cells: list[dict[str, Any]]) -> None:

@@ -271,8 +271,11 @@ class PatchDesk(QObject):
         if many is None:
             self.told.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
             return
-        string = read_string(file)
-        of_string(load_preset(many.path), string)  # it can be plucked
+        string, preset = read_string(file), load_preset(many.path)
+        try:
+            of_string(preset, string)  # it can be plucked
+        except PresetError as error:
+            raise PresetError(f"{file.name}: {error}") from error
         self._session.update(preset=many.name, string=PhysicalString(**asdict(string)))
         outside = many.info.family.outside(string) if many.info.family is not None else []
         beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""

@@ -162,6 +162,15 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     (tmp_path / "bad.toml").write_text("length_m = -1")
     played.take_file(tmp_path / "bad.toml")
     assert "bad.toml" in told.pop()
+    (tmp_path / "heavy.toml").write_text("damping_d1_kg_m_s = 900.0")
+    played.take_file(tmp_path / "heavy.toml")
+    assert "heavy.toml: " in told[-1]
+    assert "overdamped" in told.pop()
+    assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
+    slack = (STRINGS / "steel_g3.toml").read_text().replace("tension_n = 74.173", "tension_n = 0.74173")
+    (tmp_path / "slack.toml").write_text(slack)
+    played.take_file(tmp_path / "slack.toml")
+    assert "Beyond training: pitch" in told.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
     played.take_file(tmp_path / "bad.mid")
     assert "bad.mid" in told[0]
