@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -29,19 +27,17 @@ from app.commands.benchmarks.play.calibration import Holding, Transit, click_thr
 from app.commands.benchmarks.play.children import child, need_programs
 from app.commands.benchmarks.play.control import steady_tone
 from app.commands.benchmarks.play.picture import picture_lags
+from app.commands.benchmarks.play.program import ended_politely, open_window, the_app, try_keys
 from app.commands.benchmarks.play.recording import CardClock, Recording, recording
 from app.commands.benchmarks.play.screen import Screen, private_screen
 from app.commands.benchmarks.play.sound_server import RATE_HZ, SoundServer, sound_server
 from app.patches.patch import Patch
 from app.session.choices import Choices
 from app.session.instrument import choices_of
-from app.window.settings import Settings, save_settings
+from app.window.settings import Settings
 
-TITLE = "Learned Strings"
 SINGLES = 60
 RINGS_S, QUIET_S = 0.4, 0.3  # of a single pluck, before and after it is stopped
-START_PATIENCE_S = 120.0
-TRY_EVERY_S = 0.25  # a key, while the program starts
 SILENCE_S = 1.0
 DECAY_PATIENCE_S = 30.0
 IDLE_S = 5.0
@@ -167,7 +163,7 @@ def measure(
 
     random = Random(seed)
     with contextlib.ExitStack() as stack:
-        stack.enter_context(_ended_politely())
+        stack.enter_context(ended_politely())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="play")))
         tell("sound card and screen")
         server = stack.enter_context(sound_server(folder))
@@ -181,9 +177,9 @@ def measure(
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         control = stack.enter_context(steady_tone(server, folder, buffer))
         started_s = time.monotonic()
-        process = stack.enter_context(_app(folder, settings, server, screen))
-        window, window_s = _open_window(screen, process)
-        _try_keys(screen, recorded, process, started_s)
+        process = stack.enter_context(the_app(folder, settings, server, screen))
+        window, window_s = open_window(screen, process)
+        try_keys(screen, recorded, process, started_s)
         recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
         played = [_phase(screen, server, recorded, process, random, seconds, rate_hz, b, tell) for b in busy]
         tell("idle")
@@ -219,58 +215,6 @@ def measure(
             1000 * clock.spread_s,
             1000 * way.spread_s,
         )
-
-
-@contextlib.contextmanager
-def _ended_politely() -> Iterator[None]:
-    """A request to end the benchmark ends all that it has started."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-@contextlib.contextmanager
-def _app(folder: Path, settings: Settings, server: SoundServer, screen: Screen) -> Iterator[subprocess.Popen[bytes]]:
-    """The program as its command starts it."""
-    file = folder / "settings.json"
-    save_settings(file, settings)
-    environment = {
-        **server.environment,
-        "DISPLAY": screen.name,
-        "QT_QPA_PLATFORM": "xcb",
-        "LEARNED_STRINGS_SETTINGS": str(file),
-    }
-    environment.pop("WAYLAND_DISPLAY", None)
-    command = [sys.executable, "-m", "app.commands.cli"]
-    with (folder / "app.log").open("wb") as log, child(command, environment, stdout=log, stderr=log) as process:
-        yield process
-
-
-def _open_window(screen: Screen, process: subprocess.Popen[bytes]) -> tuple[int, float]:
-    """The program's window, and when it was to be seen."""
-    deadline_s = time.monotonic() + START_PATIENCE_S
-    while (window := screen.find(TITLE)) is None:
-        if process.poll() is not None or time.monotonic() > deadline_s:
-            raise RuntimeError("the app opened no window; start it by hand to see why")
-        time.sleep(0.01)
-    shown_s = time.monotonic()
-    screen.take(window)
-    return window, shown_s
-
-
-def _try_keys(screen: Screen, recorded: Recording, process: subprocess.Popen[bytes], started_s: float) -> None:
-    deadline_s = time.monotonic() + START_PATIENCE_S
-    while True:
-        hands.tap(screen, hands.KEYS[0])
-        if recorded.wait_for_sound(started_s, TRY_EVERY_S):
-            return
-        if process.poll() is not None or time.monotonic() > deadline_s:
-            raise RuntimeError("no key of the app was heard; is its sound device the system's default?")
 
 
 def _phase(
