@@ -425,13 +425,14 @@ def soak(
             ("longest stall of the window, s", found.longest_stall_s, 0.1),
             ("memory when settled, MiB", found.settled_mib, None),
             ("memory at the end, MiB", found.end_mib, None),
-            ("highest above settled, MiB", found.drift_mib, 20),
+            ("furthest from settled, MiB", found.drift_mib, 20),
             ("memory at its most, MiB", found.peak_mib, None),
             ("threads left", len(found.threads_left), 0),
             ("faults", sum(times for _, times in found.faults), 0),
         ]
         print_table(("what", "here", "target"), rows)
-        print("memory at rest, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.at_rest_mib))
+        when = "at each minute" if found.playing else "at rest"
+        print(f"memory {when}, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.memory_mib))
         for kind, told in (("fault", found.faults), ("notice", found.notices)):
             for text, times in told:
                 print(f"{kind}, {times} times: {text}")
