@@ -49,6 +49,7 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
     wanted_s = min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
     plucks = standard_plucks(info)
     errors: list[AudibleErrors] = []
+    parts = len(plucks) + 1  # the last is the end of one of them
     runs_away_s: list[float] = []
     seconds = 0.0
     for number, pluck in enumerate(plucks):
@@ -62,14 +63,21 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
                 pluck,
                 ear,
                 len(truth) / RATE_HZ,
-                lambda share, number=number: report((number + share) / len(plucks)),  # type: ignore[misc]
+                lambda share, number=number: report((number + share) / parts),  # type: ignore[misc]
             )[:, 0]
         except Runaway as error:
             runs_away_s.append(error.time_s)
         else:
             after_s = max(GLIDE_S, info.horizon_s)
             errors.append(audible_errors(model, truth, RATE_HZ, below_hz, after_s))
-    hum_db = None if runs_away_s else _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear)
+    hum_db = None
+    if not runs_away_s:
+
+        def listened(share: float) -> None:
+            report((parts - 1 + share) / parts)
+
+        hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, listened)
+    report(1.0)
     splits = [e.split_cents for e in errors if e.split_cents is not None]
     return Heard(
         name=preset.name,
@@ -85,14 +93,21 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
     )
 
 
-def _hum_db(program: Program, source: ModelSource, info: PresetInfo, pluck: Pluck, ear: Ear) -> float | None:
+def _hum_db(
+    program: Program,
+    source: ModelSource,
+    info: PresetInfo,
+    pluck: Pluck,
+    ear: Ear,
+    advanced: Callable[[float], None],
+) -> float | None:
     """What a model still gives where its voice is made to end, in dB of full scale; None: it is silent by then."""
     if program.ends_s > LONGEST_HUM_S:
         return None
     frames, last = round(program.ends_s * program.rate_hz), round(HUM_S * program.rate_hz)
     kept = np.zeros(0, np.float32)
     try:
-        for block in voice_blocks(program, source, info, pluck, ear, frames / program.rate_hz):
+        for block in voice_blocks(program, source, info, pluck, ear, frames / program.rate_hz, advanced):
             kept = np.concatenate([kept, block[:, 0]])[-last:]
     except Runaway:
         return None
