@@ -1,7 +1,8 @@
-"""bench solver, render, voices, effects, tune, take, train, app, play, notes, soak: what the program costs here."""
+"""bench solver, render, voices, effects, tune, take, train, app, play, notes, unplug, soak: what the program costs."""
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -448,6 +449,47 @@ def _spread_rows(name: str, spreads: Sequence[Spread | None]) -> list[tuple[obje
 
 
 @bench.command()
+def unplug(
+    json: Json = False,
+    times: Annotated[int, typer.Option(min=1, max=1000, help="How often the device goes and comes back.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    patch: Annotated[str, typer.Option(metavar="PATCH", help="What is played meanwhile.")] = "concert_harp",
+) -> None:
+    """The sound device is taken away and given back while the app is played. Status 1 where sound is not back in 2 s.
+
+    In turn the card goes, and the sound server. Linux only; needs PulseAudio and Xvfb, and touches nothing of the
+    sound and the screen in use.
+    """
+    from app.commands.benchmarks.play import unplug as bench
+    from app.commands.console import Failure
+    from app.patches.library import PatchError, find_patch
+
+    try:
+        found_patch = find_patch(patch).patch
+    except PatchError as error:
+        raise Failure(str(error)) from error
+    with progress("bench unplug") as report:
+        found = bench.measure(times, seed, found_patch, report)
+    if json:
+        print_json({**asdict(found), "in_time": found.in_time})
+    else:
+        _print_machine(found.machine)
+        print(f"{found.patch}; seed {found.seed}; loudest sample before {found.loudest_before:.3f}")
+        rows = [
+            (number, loss.kind, f"{loss.gone_s:.1f}", loss.back_s, f"{loss.loudest:.3f}", loss.holes)
+            for number, loss in enumerate(found.losses, 1)
+        ]
+        print_table(("", "what goes", "gone, s", "sound back, s", "loudest sample", "holes then"), rows)
+        if found.back_s:
+            print(f"sound back: median {statistics.median(found.back_s):.2f} s, worst {max(found.back_s):.2f} s")
+        print(f"within {bench.TARGET_S:g} s: {found.in_time} of {times}")
+        ends = "not within a few seconds" if found.ends_s is None else f"{found.ends_s:.2f} s after the key"
+        print(f"all notes stopped: {ends}; the app {'goes on' if found.alive else 'has ended'}")
+    if not found.passed:
+        raise typer.Exit(1)
+
+
+@bench.command()
 def soak(
     json: Json = False,
     minutes: Annotated[float, typer.Option(min=0.01, metavar="MIN", help="Duration in minutes.")] = 10.0,
@@ -480,13 +522,14 @@ def soak(
             ("longest stall of the window, s", found.longest_stall_s, 0.1),
             ("memory when settled, MiB", found.settled_mib, None),
             ("memory at the end, MiB", found.end_mib, None),
-            ("highest above settled, MiB", found.drift_mib, 20),
+            ("furthest from settled, MiB", found.drift_mib, 20),
             ("memory at its most, MiB", found.peak_mib, None),
             ("threads left", len(found.threads_left), 0),
             ("faults", sum(times for _, times in found.faults), 0),
         ]
         print_table(("what", "here", "target"), rows)
-        print("memory at rest, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.at_rest_mib))
+        when = "at each minute" if found.playing else "at rest"
+        print(f"memory {when}, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.memory_mib))
         for kind, told in (("fault", found.faults), ("notice", found.notices)):
             for text, times in told:
                 print(f"{kind}, {times} times: {text}")

@@ -11,7 +11,7 @@ from app.commands.console import print_json, print_table, progress, say
 if TYPE_CHECKING:
     from training.heard_file import Heard
 
-COLUMNS = ("preset", "heard", "spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s")
+COLUMNS = ("preset", "heard", "spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s", "hum dB")
 
 
 def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
@@ -81,4 +81,5 @@ def _figures(heard: Heard) -> tuple[float | None, ...]:
         heard.pitch_cents,
         heard.split_cents,
         heard.runs_away_s,
+        heard.hum_db,
     )

@@ -14,6 +14,7 @@ from training.heard_file import Heard
 NOTICED_CENTS = 3.0
 NOTICED_CHANGE_DB = 2.0
 NOTICED_DISTANCE_DB = 1.0
+NOTICED_HUM_DB = -80.0  # of full scale: 40 dB below a soft pluck; a quiet room hides what is softer
 UNMEASURED = "not measured"
 
 
@@ -49,6 +50,9 @@ def faults(heard: Heard) -> list[str]:
         found.append((heard.split_cents / NOTICED_CENTS, f"two pitches, {heard.split_cents:.0f} cents apart"))
     if heard.pitch_cents is not None and abs(heard.pitch_cents) >= NOTICED_CENTS:
         found.append((abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {_signed(heard.pitch_cents)} cents"))
+    if heard.hum_db is not None and heard.hum_db >= NOTICED_HUM_DB:
+        loudness = 10 ** ((heard.hum_db - NOTICED_HUM_DB) / 20)
+        found.append((loudness, f"hums on at {_signed(heard.hum_db)} dB"))
     return [text for _, text in sorted(found, key=lambda fault: -fault[0])]
 
 

@@ -72,7 +72,9 @@ LARGEST_ENERGY = 48  # R of latents that share a tension
 LARGEST_STRETCH = 49  # R
 PEAK = 50  # R m: of the displacement as it is let go, a least one
 JOINS = 51  # W whether its fade-in is the complement of the other's fade
-HEADER = 52
+ENDS_AT = 52  # W frames since the pluck, from which on it fades out whatever it still gives
+ENDS_IN = 53  # W frames of that fade
+HEADER = 54
 
 
 @njit(inline="always", **COMPILED)

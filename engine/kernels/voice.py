@@ -162,6 +162,8 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
         return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
         counts[at.RELEASE] = counts[at.FADE_FRAMES]
+    if counts[at.FRAME] >= counts[at.ENDS_AT] and counts[at.RELEASE] == 0:
+        counts[at.RELEASE] = counts[at.ENDS_IN]
     release = counts[at.RELEASE]
     wanted = 0.0 if release > 0 else voice[at.WANTED_GAIN]
     if wanted != voice[at.GAIN_TO]:

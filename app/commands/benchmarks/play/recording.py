@@ -100,6 +100,10 @@ class Recording:
         """Waits until nothing audible came for `silence_s`; False where it did not end within `seconds`."""
         return self._wait(lambda: time.monotonic() - self.sounded_s > silence_s, seconds)
 
+    def wait_for_end(self) -> None:
+        """Of the recorder, and all that it still brought."""
+        self._thread.join()
+
     def _wait(self, holds: Callable[[], bool], seconds: float) -> bool:
         deadline_s = time.monotonic() + seconds
         while not holds():
@@ -122,9 +126,12 @@ class Recording:
 def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Recording]:
     """Records what a sink is given into `path` until the block ends."""
     reading, writing = _pipe()
-    with reading, child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
-        writing.close()
-        yield Recording(reading, path)
+    with reading:
+        with child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
+            writing.close()
+            recorded = Recording(reading, path)
+            yield recorded
+        recorded.wait_for_end()
 
 
 @contextlib.contextmanager
