@@ -174,7 +174,7 @@ def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: boo
 
 @dataclass(frozen=True)
 class _Measurement:
-    """What is asked of a preset."""
+    """Measures a preset on a data set, as the options of `evaluate` ask for."""
 
     preset: Preset
     data: Dataset
@@ -184,7 +184,7 @@ class _Measurement:
     report: Shares
 
     def of(self, split: str) -> dict[str, Any]:
-        """Every figure of a split."""
+        """All figures of a split, by name."""
         from training.by_rise import errors_by_rise
         from training.evaluate import evaluate_past_horizon
         from training.results import SHORT_HORIZON
@@ -283,7 +283,7 @@ class _Measurement:
 
 
 def _on(preset: Preset, run: str) -> Preset:
-    """A preset of many strings, of the string, the rate, the modes and the horizon of a run's data."""
+    """A preset of many strings with the string, rate, modes and horizon of a run's data."""
     from engine.presets import of_string
     from training.by_name import load
 
@@ -296,7 +296,7 @@ def _on(preset: Preset, run: str) -> Preset:
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
-    """The data set that a preset names, or that of a run; of a string of many, plucks as hard as the family's."""
+    """The data set of a preset, or of a run; for a string of many, of plucks as hard as the family's."""
     from engine.schema import SchemaError
     from training.by_name import load
     from training.configuration import DatasetConfiguration, read_configuration

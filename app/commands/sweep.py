@@ -83,8 +83,8 @@ def sweep(
         options = Options(file, runs, cache, device, threads, retries)
         if open_to_anybody(scheduler):
             say(
-                f"warning: {scheduler} asks nobody who they are and encrypts nothing: whoever reaches it can run code"
-                " on its workers; use tls:// with certificates, or a network of your own"
+                f"warning: {scheduler} neither authenticates nor encrypts: anyone who can connect to it can run code"
+                " on its workers; use tls:// with certificates, or a private network"
             )
         opened = cluster_workers(scheduler, workers)
     say(f"{chosen.name}: {left} of {len(chosen.runs)} runs to do; rows go to {file}")
