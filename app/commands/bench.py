@@ -1,4 +1,4 @@
-"""bench solver, render, voices, effects, tune, take, train, app, play, notes, unplug, soak: what the program costs."""
+"""bench solver, render, voices, effects, tune, take, train, app, play, notes, unplug, soak: what it costs."""
 
 from __future__ import annotations
 

@@ -115,9 +115,7 @@ BANK_ROWS = 21
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
 FOLLOWING = 6
 TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
-PHYSICAL = (
-    FOLLOWING + 8
-)  # behind those of `kernels.tension.node`, κ p and ω²: amplitudes and speeds, between two moments
+PHYSICAL = FOLLOWING + 8  # behind the rows of `kernels.tension.node`, κ p and ω²: amplitudes and speeds for a moment
 TENSION_ROWS = PHYSICAL + 2
 
 # Slots of the modes that a voice is to have, then the four rows above

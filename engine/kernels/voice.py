@@ -75,9 +75,8 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
             for frame in range(quantum):
                 past[2 * quantum + frame] = out[point, frame]
             if begins and turn == 0 and counts[at.FRAME] == 0:
-                for frame in range(
-                    1, 1 if counts[at.JOINS] else quantum
-                ):  # at rest: before the pluck lies the mirror of what follows
+                mirrored = 1 if counts[at.JOINS] else quantum  # at rest before the pluck: the mirror of what follows
+                for frame in range(1, mirrored):
                     past[2 * quantum - frame] = past[2 * quantum + frame]
                 counts[at.WARM] = WARMED - 1
     for point in range(counts[at.POINTS]):
