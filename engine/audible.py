@@ -25,6 +25,7 @@ RISE_S = 0.5  # between levels that a model's own growth is told from
 LOW_PARTIALS = 6  # one of them is the strongest
 WEAK_DB = 30.0  # a partial so far below the truth has no pitch that means anything
 SECOND_DB = 19.0  # a peak so far below the first makes the level swing by 2 dB, 20 log₁₀ (1 + r)/(1 - r)
+HANN_WIDTH = 1.5  # frequencies over which a Hann window spreads the power of one
 DIP_DB = 3.0  # between two peaks that are two
 
 Array = NDArray[np.float64]
@@ -82,6 +83,14 @@ def audible_errors(
         pitch_cents=pitch,
         split_cents=split,
     )
+
+
+def heard_level_db(sound: NDArray[np.floating], rate_hz: int) -> float:
+    """Of a stationary sound (samples,) of ±1 at full scale, as a sine's amplitude in dB; -200 where it is silent."""
+    window = np.hanning(len(sound))
+    amplitudes = np.abs(np.fft.rfft((sound - np.mean(sound)) * window)) * 2 / window.sum()
+    power = float(np.square(amplitudes[math.ceil(LOWEST_HZ * len(sound) / rate_hz) :]).sum()) / HANN_WIDTH
+    return 10 * math.log10(max(power, 1e-20))
 
 
 def frame_length(rate_hz: int) -> int:

@@ -132,6 +132,8 @@ class PartialErrors:
         cents: of the prediction's frequency over the truth's, by a straight line through the phases.
         t60_s: of the truth, by a straight line through the envelope in dB; NaN where it falls by less than 2 dB.
         t60_error_percent: of the prediction's T60; infinite where that does not decay.
+        glide_cents: of the truth: its frequency in the first third of its segments over that in the last third.
+        glide_error_cents: of the prediction's glide.
     """
 
     energy: Array
@@ -141,6 +143,8 @@ class PartialErrors:
     cents: Array
     t60_s: Array
     t60_error_percent: Array
+    glide_cents: Array
+    glide_error_cents: Array
 
     @classmethod
     def join(cls, errors: Sequence[PartialErrors]) -> PartialErrors:
@@ -159,6 +163,8 @@ class PartialErrors:
                 _median(np.abs(self.cents[:, window, mode])),
                 _median(self.t60_s[:, window, mode]),
                 _median(np.abs(self.t60_error_percent[:, window, mode])),
+                _median(self.glide_cents[:, window, mode]),
+                _median(np.abs(self.glide_error_cents[:, window, mode])),
             )
             for mode in range(self.energy.shape[2])
         ]
@@ -167,7 +173,7 @@ class PartialErrors:
         """The means of the magnitudes over all modes and trajectories, by the truth's energy."""
         weights = self.energy[:, window]
         found = []
-        for errors in (self.level_db, self.phase_cycles, self.cents):
+        for errors in (self.level_db, self.phase_cycles, self.cents, self.glide_error_cents):
             magnitudes = np.abs(errors[:, window])
             there = ~np.isnan(magnitudes)
             total = float(weights[there].sum())
@@ -187,6 +193,8 @@ class PartialSummary:
     cents: float | None
     t60_s: float | None
     t60_error_percent: float | None
+    glide_cents: float | None
+    glide_error_cents: float | None
 
 
 @dataclass(frozen=True)
@@ -199,6 +207,7 @@ class WeightedPartials:
     level_db: float | None
     phase_cycles: float | None
     cents: float | None
+    glide_error_cents: float | None
 
 
 def partial_errors(
@@ -265,8 +274,7 @@ class _Motion:
             found_power = np.where(there, power * level**2, 0.0).sum(1)
             level_db = 10 * np.log10(found_power / true_power)
             phase = np.where(phased.sum(1) >= LEAST_SEGMENTS, _mean(self.phase[:, inside], phased), math.nan)
-            ratio = 1 + _slope(time_s, self.phase[:, inside], phased) / frequency_hz
-            cents = 1200 * np.log2(np.where(ratio > 0, ratio, math.nan))
+            cents = self._cents(inside, phased, frequency_hz)
             true_db = 10 * np.log10(power)
             found_db = true_db + 20 * np.log10(level)
             true_slope, found_slope = (
@@ -276,9 +284,17 @@ class _Motion:
             t60_s = np.where(-true_slope * span_s >= LEAST_DECAY_DB, -60 / true_slope, math.nan)
             found_s = np.where(found_slope >= 0, math.inf, -60 / found_slope)
             t60_error = 100 * (found_s / t60_s - 1)
+            first_hz, last_hz = (_mean(self.frequency_hz[:, inside], third) for third in _outer_thirds(there))
+            glide = np.where(there.sum(1) >= 3 * LEAST_SEGMENTS, _in_cents(first_hz / last_hz), math.nan)
+            first, last = _outer_thirds(phased)
+            glide_error = self._cents(inside, first, first_hz) - self._cents(inside, last, last_hz)
         energy = np.where(enough, true_power * (2 * math.pi * frequency_hz) ** 2, 0.0)
-        rest = (frequency_hz, level_db, phase, cents, t60_s, t60_error)
+        rest = (frequency_hz, level_db, phase, cents, t60_s, t60_error, glide, glide_error)
         return [energy, *(np.where(enough, values, math.nan) for values in rest)]
+
+    def _cents(self, inside: slice, there: NDArray[np.bool_], true_hz: Array) -> Array:
+        """Of the prediction's frequency over the truth's, in the segments that are there, (batch, modes)."""
+        return _in_cents(1 + _slope(self.time_s[inside], self.phase[:, inside], there) / true_hz)
 
 
 def _continued_cycles(gain: NDArray[np.complex128], phased: NDArray[np.bool_]) -> Array:
@@ -287,6 +303,16 @@ def _continued_cycles(gain: NDArray[np.complex128], phased: NDArray[np.bool_]) -
     last = np.maximum.accumulate(place, axis=1)
     angle = np.where(phased, np.angle(np.where(phased, gain, 1.0)), 0.0)
     return np.unwrap(np.take_along_axis(angle, last, axis=1), axis=1) / (2 * math.pi)
+
+
+def _in_cents(ratio: Array) -> Array:
+    return 1200 * np.log2(np.where(ratio > 0, ratio, math.nan))
+
+
+def _outer_thirds(there: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Of the segments that are there, along axis 1."""
+    place, count = there.cumsum(1), there.sum(1, keepdims=True)
+    return there & (3 * place <= count), there & (3 * place > 2 * count)
 
 
 def _mean(values: Array, there: NDArray[np.bool_]) -> Array:

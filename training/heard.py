@@ -8,17 +8,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from engine.audible import FLOOR_DB, AudibleErrors, audible_errors
+from engine.audible import FLOOR_DB, AudibleErrors, audible_errors, heard_level_db
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, Pluck
 from engine.presets import Preset, PresetInfo, preset_digest
 from engine.sources import ModelSource, Runaway
-from engine.voices import Ear, model_program, render_voice, truth_program
+from engine.voices import Ear, Program, model_program, render_voice, truth_program, voice_blocks
+from engine.voices.voice import SILENT_DB
 from training.heard_file import Heard
 
 RATE_HZ = 48_000  # of the device: what is above half the preset's rate is heard of the truth
 AMPLITUDES_MM = (1.5, 4.0, 8.0)  # soft, normal, hard
 LEAST_S, MOST_S = 4.0, 12.0
 UNTIL_DB = 60.0  # or the truth has fallen so far
+HUM_S = 0.5  # before a voice ends
+LONGEST_HUM_S = 300.0  # one that ends later is not listened to so long
 GLIDE_S = 0.25  # pitch is listened to from here on, and past the training
 
 
@@ -46,6 +49,7 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
     wanted_s = min(max(LEAST_S, 2 * info.horizon_s), MOST_S)
     plucks = standard_plucks(info)
     errors: list[AudibleErrors] = []
+    parts = len(plucks) + 1  # the last is the end of one of them
     runs_away_s: list[float] = []
     seconds = 0.0
     for number, pluck in enumerate(plucks):
@@ -59,13 +63,21 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
                 pluck,
                 ear,
                 len(truth) / RATE_HZ,
-                lambda share, number=number: report((number + share) / len(plucks)),  # type: ignore[misc]
+                lambda share, number=number: report((number + share) / parts),  # type: ignore[misc]
             )[:, 0]
         except Runaway as error:
             runs_away_s.append(error.time_s)
         else:
             after_s = max(GLIDE_S, info.horizon_s)
             errors.append(audible_errors(model, truth, RATE_HZ, below_hz, after_s))
+    hum_db = None
+    if not runs_away_s:
+
+        def listened(share: float) -> None:
+            report((parts - 1 + share) / parts)
+
+        hum_db = _hum_db(programs[0], source, info, plucks[len(plucks) // 2], ear, listened)
+    report(1.0)
     splits = [e.split_cents for e in errors if e.split_cents is not None]
     return Heard(
         name=preset.name,
@@ -77,7 +89,30 @@ def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: No
         pitch_cents=_median([e.pitch_cents for e in errors if e.pitch_cents is not None]),
         split_cents=_median(splits) if 2 * len(splits) > len(errors) else None,
         runs_away_s=min(runs_away_s, default=None),
+        hum_db=hum_db,
     )
+
+
+def _hum_db(
+    program: Program,
+    source: ModelSource,
+    info: PresetInfo,
+    pluck: Pluck,
+    ear: Ear,
+    advanced: Callable[[float], None],
+) -> float | None:
+    """What a model still gives where its voice is made to end, in dB of full scale; None: it is silent by then."""
+    if program.ends_s > LONGEST_HUM_S:
+        return None
+    frames, last = round(program.ends_s * program.rate_hz), round(HUM_S * program.rate_hz)
+    kept = np.zeros(0, np.float32)
+    try:
+        for block in voice_blocks(program, source, info, pluck, ear, frames / program.rate_hz, advanced):
+            kept = np.concatenate([kept, block[:, 0]])[-last:]
+    except Runaway:
+        return None
+    level_db = heard_level_db(kept, program.rate_hz)
+    return level_db if level_db > SILENT_DB else None
 
 
 def _bearable(info: PresetInfo, amplitude_mm: float) -> float:

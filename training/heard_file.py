@@ -33,6 +33,7 @@ _BOUNDS = {
     "pitch_cents": (-12_000.0, 12_000.0),
     "split_cents": (0.0, 12_000.0),
     "runs_away_s": (0.0, 600.0),
+    "hum_db": (-200.0, 200.0),
 }
 
 
@@ -46,6 +47,8 @@ class Heard:
         distance_db: the mean over the plucks; a pluck that runs away counts with all of the floor.
         split_cents: None: most plucks have one pitch.
         runs_away_s: the earliest of all plucks; None: none does.
+        hum_db: what is left where a voice is made to end because its string is silent, of full scale; None: nothing,
+            or it has not been measured.
 
     Raises:
         ValueError: a value that no measurement gives.
@@ -61,6 +64,7 @@ class Heard:
     split_cents: float | None = None
     runs_away_s: float | None = None
     method: int = METHOD
+    hum_db: float | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[0-9a-f]{64}", self.sha256):
@@ -74,6 +78,7 @@ class Heard:
 
 
 COLUMNS = tuple(field.name for field in fields(Heard))
+REQUIRED = len(COLUMNS) - 1  # a line of before the last column was measured says nothing of it
 _HINTS = get_type_hints(Heard)
 
 
@@ -117,11 +122,11 @@ def _parsed(path: Path, text: str) -> tuple[dict[str, Heard], list[str]]:
     found: dict[str, Heard] = {}
     problems: list[str] = []
     lines = iter(io.StringIO(text, newline="").readlines())
-    if (head := next(lines, "").strip()) != ",".join(COLUMNS):
+    if next(lines, "").strip() not in (",".join(COLUMNS), ",".join(COLUMNS[:REQUIRED])):
         return {}, [f"{path}: not a table of this program's: its first line must be {','.join(COLUMNS)}"]
     for number, line in enumerate(lines, 2):
         try:
-            heard = _line(head.split(","), line, f"{path}: line {number}")
+            heard = _line(line, f"{path}: line {number}")
         except SchemaError as error:
             problems.append(str(error))
         else:
@@ -132,16 +137,16 @@ def _parsed(path: Path, text: str) -> tuple[dict[str, Heard], list[str]]:
     return found, problems
 
 
-def _line(columns: list[str], line: str, where: str) -> Heard | None:
+def _line(line: str, where: str) -> Heard | None:
     """None for a measurement by another method."""
     try:
         (texts,) = csv.reader([line])
     except (csv.Error, ValueError) as error:
         raise SchemaError(f"{where}: not a line of values ({error})") from error
-    if len(texts) != len(columns):
-        raise SchemaError(f"{where}: holds {len(texts)} values for {len(columns)} columns")
+    if not REQUIRED <= len(texts) <= len(COLUMNS):
+        raise SchemaError(f"{where}: holds {len(texts)} values for {len(COLUMNS)} columns")
     values: dict[str, Any] = {}
-    for name, text in zip(columns, texts, strict=True):
+    for name, text in zip(COLUMNS, texts, strict=False):
         if _HINTS[name] is str:
             values[name] = text
         elif text:

@@ -1,5 +1,5 @@
-"""What views show of model and truth, computed without a window: arrays in, arrays out.
+"""What the views show of model and truth, computed without a window: arrays in, arrays out.
 
-What grows with a take computes a little more at each call (`growing.py`); what takes long is a job that reports and
-can be cancelled (`job.py`).
+What is computed from a take while it is rendered grows with each call (`growing.py`); what takes long is a job that
+reports its progress and can be cancelled (`job.py`).
 """

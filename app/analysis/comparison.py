@@ -1,4 +1,4 @@
-"""Several presets on one pluck: their errors, what is left of the sound, their speed and size."""
+"""Several presets on one pluck: errors, null depth of the sound, speed and size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
 
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
-WARM_UP_FRAMES = 64  # compilation and caches are no part of a model's speed
+WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,12 @@ class ComparedRow:
     """One preset; None: no such figure, or not yet.
 
     Attributes:
-        mse, mae: relative, over the whole string, of the trained horizon.
+        mse, mae: relative, over the whole string and the trained horizon.
         past_mse, past_mae: of all that comes after it; infinite where the output ran away.
-        null_db: what is left of the sound at the listening point where model and truth are subtracted, over the whole
-            pluck.
-        real_time: seconds of sound in a second of rendering the whole string on one core.
-        note: why there are no figures, or what to know of them.
+        null_db: null depth at the listening point over the whole pluck: the level of model minus truth relative to
+            the truth's.
+        real_time: seconds of motion of the whole string that one core renders in a second.
+        note: why there are no figures, or a remark on them.
     """
 
     name: str
@@ -53,13 +53,18 @@ class ComparedRow:
 
     @classmethod
     def of(cls, entry: PresetEntry) -> ComparedRow:
-        """What is known without computing."""
+        """A row with what is known without computing."""
         return cls(entry.name, entry.path.name, entry.title, entry.info.model, entry.info.rate_hz, entry.parameters)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What the presets are compared on: a pluck, its length, where it is heard; of one of many the string too."""
+    """What the presets are compared on.
+
+    Attributes:
+        listen: the listening point, 0 … 1.
+        string: which string presets of many strings are plucked as; None: their own.
+    """
 
     pluck: Pluck
     seconds: float
@@ -75,13 +80,13 @@ def compare(entries: list[PresetEntry], trial: Trial, job: Job) -> None:
             row = _compare_one(entry, trial, truths, done / len(entries), 1 / len(entries), job)
         except Cancelled:
             raise
-        except Exception as error:  # one preset's row: the others are still to come
+        except Exception as error:  # the other presets are still compared
             row = replace(ComparedRow.of(entry), note=str(error) or type(error).__name__)
         job.report((done + 1) / len(entries), row)
 
 
 def same_string(info: PresetInfo, other: PresetInfo) -> bool:
-    """Whether two presets learned one string, at whatever rate."""
+    """Whether two presets have learned the same string, at whatever rate."""
     return (info.string, info.tension_modulated) == (other.string, other.tension_modulated)
 
 
@@ -147,11 +152,11 @@ def _compare_one(
 
 
 def _frames(source: StringSource, trial: Trial, info: PresetInfo, job: Job) -> Iterator[tuple[Tensor, float]]:
-    """Blocks (1, frames, grid_points) in m, and the seconds that this thread worked on each."""
+    """Blocks (1, frames, grid_points) in m, and the processor seconds that each took."""
     state = source.start(_initial(trial, info))
     steps = max(1, round(trial.seconds * info.rate_hz))
     for first in range(0, steps, FRAMES_AT_ONCE):
-        started_s = time.thread_time()  # what others do meanwhile does not count
+        started_s = time.thread_time()  # of this thread alone
         block, state = source.advance(state, min(FRAMES_AT_ONCE, steps - first))
         yield block, time.thread_time() - started_s
         job.check()

@@ -17,13 +17,13 @@ CURVES = ("rmse", "mae", "level_db")
 
 
 class ErrorCourse:
-    """Relative MAE and RMSE of each window, and how much louder the model is there. A `Growing`.
+    """Relative MAE and RMSE of each window, and the level of the model above the truth's. A `Growing`.
 
-    All of the string counts, as in `ErrorSums`, whose windows these are; the initial frame is not among them.
+    Sums are over all pictures and grid points of a window, as in `ErrorSums`, without the initial picture.
 
     Attributes:
-        ready: windows so far. What is left after the last whole one is not shown.
-        middle_s: (windows,), their times.
+        ready: windows so far. Pictures after the last whole window are left out.
+        middle_s: (windows,), the time of each window's middle.
         curves: (windows,) each. "mae": Σ|û - u|/Σ|u|. "rmse": √(Σ(û - u)²/Σu²). "level_db": 10 log₁₀(Σû²/Σu²), not
             finite where one of them is silent.
     """

@@ -1,7 +1,7 @@
-"""The error of a model over all places and amplitudes of a pluck, coarse first, then ever finer.
+"""The error of a model over position and amplitude of the pluck, on grids from coarse to fine.
 
-The grid of each level holds all points of the one before, so that nothing is computed twice. A plane that was left
-unfinished goes on where it was.
+The grid of each level contains the one before, so that nothing is computed twice. A computation that was cancelled
+continues where it stopped.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from engine.truth import default_substeps
 
 SMALLEST_AMPLITUDE_MM = 0.5
 STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level
-FINEST = (49, 33)  # positions, amplitudes: a multiple of the coarsest stride, and one
+FINEST = (49, 33)  # positions, amplitudes: each a multiple of the coarsest stride plus one
 PLUCKS_AT_ONCE = 4
 FRAMES_AT_ONCE = 1000
-COARSER = 4  # sub-steps of the truth against its default's: an error of 1e-5, far below any that is shown
+COARSER = 4  # the truth takes a quarter of its default sub-steps: an error of 1e-5, far below any that is shown
 
 POSITIONS = np.linspace(*POSITION_RANGE, FINEST[0])
 AMPLITUDES_MM = np.geomspace(SMALLEST_AMPLITUDE_MM, LARGEST_AMPLITUDE_MM, FINEST[1])
@@ -39,10 +39,10 @@ class PlanePicture:
     """What can be shown of a plane so far.
 
     Attributes:
-        error: relative MAE over the trained horizon, (positions, amplitudes) of the finest grid; between the points
-            of the finest level that is whole by interpolation of its logarithm.
-        spacing: of that level's points, in steps of the finest grid.
-        share: of all points that are known, 0 … 1.
+        error: relative MAE over the trained horizon, (positions, amplitudes) of the finest grid. Its logarithm is
+            interpolated between the points of the finest complete level.
+        spacing: between the points of that level, in steps of the finest grid.
+        share: of all points, how many are known, 0 … 1.
     """
 
     error: Array
@@ -55,7 +55,7 @@ class PlanePicture:
 
 
 def nearest_cell(position: float, amplitude_mm: float) -> tuple[int, int]:
-    """The place in the finest grid of a pluck, which may lie beyond its edges."""
+    """Indices of the finest grid's point nearest to a pluck; the pluck may lie outside the grid."""
     amplitude_log = math.log(max(amplitude_mm, 1e-6))
     return (
         int(np.abs(POSITIONS - position).argmin()),
@@ -65,18 +65,18 @@ def nearest_cell(position: float, amplitude_mm: float) -> tuple[int, int]:
 
 @dataclass
 class ErrorPlane:
-    """The errors known so far, NaN elsewhere: one thread computes, and takes pictures of it for others."""
+    """The errors known so far, NaN elsewhere. One thread calls `compute`, and hands out copies (`picture`)."""
 
     error: Array = field(default_factory=lambda: np.full(FINEST, math.nan))
 
     @property
     def spacing(self) -> int | None:
-        """Of the finest level that is whole; None before the coarsest is."""
+        """The stride of the finest complete level; None before the coarsest is complete."""
         whole = [stride for stride in STRIDES if not np.isnan(self.error[::stride, ::stride]).any()]
         return whole[-1] if whole else None
 
     def picture(self) -> PlanePicture | None:
-        """None before the coarsest grid is there."""
+        """What can be shown so far; None before the coarsest level is complete."""
         spacing = self.spacing
         if spacing is None:
             return None
@@ -91,8 +91,8 @@ class ErrorPlane:
         """Computes what is not known yet, of plucks with the shape and width of `pluck`.
 
         Raises:
-            Cancelled: the job was; what is known stays.
-            ValueError: the model needs more than a string at rest.
+            Cancelled: the job was cancelled; what is known stays.
+            ValueError: the model cannot start from a displaced string at rest alone.
         """
         errors = error_of_plucks(preset)
         spacing = self.spacing
@@ -109,7 +109,7 @@ class ErrorPlane:
         return picture
 
     def _missing(self) -> Iterator[list[tuple[int, int]]]:
-        """Points in the order of computing, some at a time."""
+        """Points that are not known, in the order of computing, `PLUCKS_AT_ONCE` at a time."""
         for stride in STRIDES:
             rows, columns = np.nonzero(np.isnan(self.error[::stride, ::stride]))
             places = [(int(x) * stride, int(y) * stride) for x, y in zip(rows, columns, strict=True)]
@@ -118,7 +118,10 @@ class ErrorPlane:
 
 
 def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
-    """What computes relative MAEs (plucks,) over the preset's horizon, infinite where the output is not finite."""
+    """A function of plucks and a job that returns their relative MAEs (plucks,) over the preset's horizon.
+
+    They are infinite where the output is not finite.
+    """
     info, model = preset.info, preset.model
     truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // COARSER))
 
@@ -149,7 +152,7 @@ def refine(coarse: Array, factor: int) -> Array:
         before = np.minimum(places.astype(int), max(len(moved) - 2, 0))
         share = (places - before)[:, None]
         after = np.minimum(before + 1, len(moved) - 1)
-        # an infinite error next to a finite one stays infinite only at its own point
+        # ∞ · 0 is not a number: beside an infinite error a known point keeps its own value
         with np.errstate(invalid="ignore"):
             mixed = moved[before] * (1 - share) + moved[after] * share
         fine = np.moveaxis(

@@ -1,20 +1,18 @@
-"""What is computed from a take while it grows, a little at a time."""
+"""The contract of what is computed from a take while it is rendered, a little at a time."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-BLOCK_FRAMES = (
-    2048  # about what is computed at a time: a millisecond or two, so that nobody waits for the interpreter
-)
+BLOCK_FRAMES = 2048  # of a take, computed at a time: a millisecond or two, so that the interpreter is soon free again
 
 
 class Growing(Protocol):
-    """One thread calls `advance`; any thread reads what is below the count of what is ready, which never changes."""
+    """Results of which the first so many are ready and never change: one thread calls `advance`, any thread reads."""
 
     @property
     def complete(self) -> bool:
-        """Whether nothing more will come."""
+        """Whether all results are ready."""
 
     def advance(self) -> bool:
-        """Computes the next few results. False, at once, where the take has nothing new for them yet."""
+        """Computes the next few results; returns False where the take has nothing new for them yet."""

@@ -1,6 +1,6 @@
-"""A take's sources as they are seen and heard: model, truth, another preset's model, or the difference with its gain.
+"""A take's sources as seen and heard: model, truth, another preset's model, or the difference with its gain.
 
-A motion is all of the string, picture by picture; a signal is what the pick-up senses at the listening points, sample
+A motion is the whole string, picture by picture; a signal is what the pick-up senses at the listening points, sample
 by sample. Both grow with their take.
 """
 
@@ -20,7 +20,7 @@ from app.shared.vocabulary import DIFFERENCE
 
 @dataclass(frozen=True)
 class HeardMotion:
-    """Displacement of one source on its grid, at its own rate of pictures; `gain` times what it is."""
+    """Displacement of one source on its grid, at its own rate of pictures, times `gain`."""
 
     take: Take
     source: str
@@ -28,12 +28,12 @@ class HeardMotion:
 
     @property
     def there(self) -> bool:
-        """Whether any of it has been rendered: another preset's model begins later than the take."""
+        """Whether any of it has been rendered; another preset's model may begin after the take."""
         return all(name in SOURCES or name in self.take.others for name in _parts(self.source)) and self.ready > 0
 
     @property
     def rate_hz(self) -> float:
-        """Pictures a second."""
+        """Pictures per second."""
         return self._motions[0].rate_hz
 
     @property
@@ -42,7 +42,7 @@ class HeardMotion:
 
     @property
     def frames(self) -> int:
-        """When complete."""
+        """Pictures when complete."""
         return self._motions[0].frames
 
     @property
@@ -51,7 +51,7 @@ class HeardMotion:
         return min(motion.ready_frames for motion in self._motions)
 
     def read(self, first: int, stop: int) -> NDArray[np.float32]:
-        """What is ready of pictures first … stop, (frames, grid_points) in m."""
+        """The pictures first … stop - 1 that are ready, (frames, grid_points) in m."""
         stop = min(stop, self.ready)
         return _combined([motion.read(first, stop) for motion in self._motions], self.gain)
 
@@ -60,7 +60,7 @@ class HeardMotion:
         return _combined([motion.shape_m(position_s) for motion in self._motions], self.gain)
 
     def strobes(self, position_s: float) -> list[Strobe | None]:
-        """Whose flashes that is made of; None: of a picture nearby."""
+        """The strobes whose flashes `shape` is made of; None where it is the nearest picture instead."""
         return [motion.strobe_at(position_s) for motion in self._motions]
 
     @cached_property
@@ -70,7 +70,7 @@ class HeardMotion:
 
 @dataclass(frozen=True)
 class HeardSignal:
-    """What a pick-up senses of one source at the first listening point, in m or m/s; `gain` times what it is."""
+    """What a pick-up senses of one source at the listening points, in m or m/s, times `gain`."""
 
     listened: Listened
     source: str
@@ -78,7 +78,7 @@ class HeardSignal:
 
     @property
     def there(self) -> bool:
-        """Whether it has begun: another preset's model does so later than the take."""
+        """Whether any of it has been rendered; another preset's model may begin after the take."""
         return all(name in self.listened.signals for name in _parts(self.source)) and self.ready > 0
 
     @property
@@ -87,7 +87,7 @@ class HeardSignal:
 
     @property
     def frames(self) -> int:
-        """When complete."""
+        """Frames when complete."""
         return self._signals[0].frames
 
     @property
@@ -96,7 +96,7 @@ class HeardSignal:
         return min(signal.ready_frames for signal in self._signals)
 
     def read(self, first: int, stop: int) -> NDArray[np.float32]:
-        """What is ready of frames first … stop, (frames,)."""
+        """The frames first … stop - 1 that are ready, at the first listening point, (frames,)."""
         return self.read_points(first, stop)[:, 0]
 
     def read_points(self, first: int, stop: int) -> NDArray[np.float32]:
@@ -110,12 +110,12 @@ class HeardSignal:
 
 
 def _parts(source: str) -> tuple[str, ...]:
-    """What it is made of: one source, or a second that is taken away from it."""
+    """The sources that make it up: one, or two of which the second is subtracted from the first."""
     return SOURCES if source == DIFFERENCE else (source,)
 
 
 def _combined(parts: list[NDArray[np.float32]], gain: float) -> NDArray[np.float32]:
-    values, *taken_away = parts
-    if taken_away:
-        values = values - taken_away[0]
+    values, *subtracted = parts
+    if subtracted:
+        values = values - subtracted[0]
     return values if gain == 1 else np.float32(gain) * values

@@ -1,4 +1,4 @@
-"""How a long computation tells how far it is, and learns that nobody waits for it any more."""
+"""How a long computation reports its progress, and learns that it is cancelled."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ class Cancelled(Exception):
 
 
 class Job(Protocol):
-    """What a computation is given. It calls `check` or `report` a few times a second."""
+    """Passed to a computation, which calls `check` or `report` a few times a second."""
 
     def check(self) -> None:
         """Raises `Cancelled` where the result is no longer wanted."""
 
     def report(self, share: float, so_far: object = None) -> None:
-        """Tells the share that is done, 0 … 1, and, where there is one, a result that can be shown already.
+        """Reports the share that is done, 0 … 1, and, where there is one, a result that can be shown already.
 
         Raises:
             Cancelled: see `check`.

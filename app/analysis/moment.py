@@ -1,4 +1,4 @@
-"""The picture of a moment: the string as a stroboscope shows it, and the blur and the range of real time."""
+"""The string at the playhead: its shape in slow motion, the blur of its motion, and the range of the last second."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from app.analysis.heard import HeardMotion
 from app.analysis.string_frame import Band, StringFrame
 from app.rendering import Take
 
-BLUR_S = 1 / 60  # an eye's or a picture's exposure
+BLUR_S = 1 / 60  # exposure of the blur: one picture of the screen
 ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
 ENVELOPE_BLOCK_S = 0.1
 MM = np.float32(1000)
 
 
 class Envelope:
-    """The range of motion within the last second of a take, kept block by block: each frame is looked at once."""
+    """The range of motion within the last second of a take, kept by blocks, so that each frame is read only once."""
 
     def __init__(self) -> None:
         self._ranges: dict[str, _Range] = {}
         self._bands: dict[str, Band] = {}
 
     def before(self, position_s: float, motions: Iterable[HeardMotion]) -> dict[str, Band]:
-        """Lowest and highest displacement (points,) in mm by source, in whole blocks up to the playhead.
+        """Lowest and highest displacement (points,) in mm by source, over the whole blocks before the playhead.
 
-        The same object as the last time, where nothing has changed since.
+        The same object as at the last call where nothing has changed since.
         """
         bands = {}
         for motion in motions:
@@ -42,7 +42,7 @@ class Envelope:
 
 
 class _Range:
-    """One source's."""
+    """The range of motion of one source."""
 
     def __init__(self, motion: HeardMotion) -> None:
         self.motion = motion
@@ -80,7 +80,12 @@ def frame_at(
     speed: float,
     envelope: Envelope | None = None,
 ) -> StringFrame:
-    """The picture of a take: the motions' shapes in slow motion, blurred over the exposure before the playhead."""
+    """The string of each motion at the playhead, as slow motion shows it, with its blur and, if given, its envelope.
+
+    Args:
+        position_s: the playhead.
+        speed: of slow motion; 1 is real time.
+    """
     there = [motion for motion in motions if motion.there]
     shapes, lowest, highest = {}, {}, {}
     for motion in there:

@@ -1,8 +1,8 @@
-"""A model's learned eigenvalues beside the string's own, as a musician reads them: frequencies and decay times.
+"""A model's learned eigenvalues beside the string's own, as frequencies and decay times.
 
-An eigenvalue tells a frequency up to multiples of the sample rate and its sign. It belongs to the mode that is
-nearest to one of these, and is compared with it there. Decay counts a little, for it tells a mode that is folded back
-from the one that it is folded on.
+An eigenvalue determines a frequency up to its sign and multiples of the sample rate. It is assigned to the mode that
+is nearest to one of these frequencies, and compared with it there. Decay counts a little in the distance, as it tells
+a mode above half the rate from the one that it aliases to.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from engine.presets import Preset, PresetInfo
 
 NEPERS_OF_60_DB = math.log(1000)
 
-BELIEVABLE_S = (1e-3, 100.0)  # decay times beyond these count as these
-DECAY_WEIGHT = 0.25  # of an octave of decay time, against a fundamental's width of frequency
+BELIEVABLE_S = (1e-3, 100.0)  # decay times are clipped to this range
+DECAY_WEIGHT = 0.25  # an octave of decay time counts as this share of the fundamental's frequency
 
 QUIET = "of a quiet string: louder, its network shifts them"
 _NOTES = {
@@ -37,12 +37,12 @@ class Poles:
     """Eigenvalues, one element each.
 
     Attributes:
-        log: log λ per sample, the imaginary part in 0 … π: a real string has both of each pair.
+        log: log λ per sample, one of each conjugate pair: the imaginary part lies in 0 … π.
         folded_hz: the frequency that is heard, 0 … half the rate.
-        t60_s: infinite where it does not decay.
+        t60_s: the time of a decay by 60 dB; infinite where it does not decay.
         mode: the nearest of the string's modes, from 1.
-        mode_hz: the frequency, as near to that mode's as one that sounds the same can be.
-        cents: of that over the mode's own.
+        mode_hz: of the frequencies ±folded_hz + k · rate, which sound the same, the one nearest to that mode's.
+        cents: the interval from the mode's own frequency to `mode_hz`.
         layer: of the model, from 0.
     """
 
@@ -60,7 +60,7 @@ class Poles:
 
 @dataclass(frozen=True)
 class PoleFigure:
-    """What the view shows of a preset; `learned` is empty where the model has none, and `note` says why."""
+    """What the view shows of a preset; `learned` is empty where the model has no eigenvalues, and `note` says why."""
 
     rate_hz: int
     learned: Poles
@@ -70,7 +70,7 @@ class PoleFigure:
 
 
 def pole_figure(preset: Preset) -> PoleFigure:
-    """The eigenvalues of a preset's model, and those of its string when it is quiet."""
+    """The eigenvalues of a preset's model, and those of its string for small amplitudes."""
     info = preset.info
     own = (info.resonator.eigenvalues() / info.rate_hz).numpy().astype(np.complex128)
     found = [log.numpy() for log in preset.model.log_eigenvalues()]
@@ -110,10 +110,10 @@ def _octaves(t60_s: Array) -> Array:
 
 
 def _nearest(folded_hz: Array, modes_hz: Array, rate_hz: int, octaves_off: Array) -> tuple[NDArray[np.int64], Array]:
-    """Places of the nearest modes, and of each frequency what is nearest to it of ±f + k · rate.
+    """Index of the nearest mode, and which of ±f + k · rate is nearest to it, (eigenvalues,) each.
 
     Args:
-        octaves_off: (eigenvalues, modes), of decay times.
+        octaves_off: (eigenvalues, modes), the ratio of decay times in octaves.
     """
     candidates = []
     for signed in (folded_hz, -folded_hz):

@@ -1,8 +1,8 @@
-"""Displacement over time and place as a picture, at any zoom without aliasing.
+"""Displacement over time and place as an image, at any zoom without aliasing.
 
-Where a pixel's column is less than a picture, every picture is drawn. Where it is many, but a small part of a period,
-each place shows its extreme in the column. Where it is more, signs would be moiré: each place shows its largest
-magnitude, from envelopes that were computed once.
+Where a column of pixels is shorter than the time between two of the take's pictures, every picture is drawn. Where it
+is longer, but a small part of a period, each place shows its extreme, with its sign. Where it is longer still, signs
+would alias (moiré): each place shows its largest magnitude, from envelopes that are computed once.
 """
 
 from __future__ import annotations
@@ -18,17 +18,19 @@ from app.rendering import SOURCES, Take
 
 QUANTITIES = (*SOURCES, "error")
 STRIDE_S = 0.001  # of the envelopes
-LARGEST_SHARE = 1 / 12  # of the fundamental's period that a column may be, where signs are drawn
+LARGEST_SHARE = 1 / 12  # the longest column, as a share of the fundamental's period, for which signs are drawn
 
 Detail = Literal["frames", "extremes", "envelope"]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """Displacement in m, float32 (places, columns), of the times start_s … stop_s.
+    """An image of the motion.
 
     Attributes:
-        detail: what a column is: a picture, the extreme of its pictures, or their largest magnitude.
+        displacement_m: float32 (places, columns).
+        start_s, stop_s: the times of its edges.
+        detail: what a column shows: one picture of the take, the extreme of several, or their largest magnitude.
     """
 
     displacement_m: NDArray[np.float32]
@@ -38,11 +40,11 @@ class Picture:
 
     @property
     def signed(self) -> bool:
-        """Else it is of magnitudes."""
+        """Whether it shows displacements with their signs, and not magnitudes."""
         return self.detail != "envelope"
 
     def at(self, time_s: float, place: float) -> float | None:
-        """What is drawn at a time and a place of the string, 0 … 1; None beside the picture."""
+        """The displacement in m drawn at a time and a place of the string, 0 … 1; None outside the image."""
         places, columns = self.displacement_m.shape
         if not (self.start_s <= time_s < self.stop_s and 0 <= place <= 1):
             return None
@@ -51,7 +53,7 @@ class Picture:
 
 
 def motion_of(take: Take, quantity: str, first: int, last: int) -> NDArray[np.float32]:
-    """Pictures first … last (pictures, places) of "model", "truth" or "error": model − truth, in m."""
+    """Pictures first … last - 1 in m, (pictures, places), of "model", "truth" or "error": model − truth."""
     if quantity == "error":
         return take.motion_m("model")[first:last] - take.motion_m("truth")[first:last]
     return take.motion_m(quantity)[first:last]
@@ -64,7 +66,7 @@ class Envelopes:
         self.take = take
         self.stride = max(round(STRIDE_S * take.picture_hz), 1)  # pictures
         self.ready = 0
-        columns = take.frames // self.stride  # what is left at the end is less than a pixel
+        columns = take.frames // self.stride  # the rest at the end, below a millisecond, is left out
         self._largest_m = {name: np.empty((columns, take.info.grid_points), np.float32) for name in QUANTITIES}
         self._peaks_m = {name: np.empty(columns, np.float32) for name in QUANTITIES}  # of all places
         self._columns = columns
@@ -88,11 +90,11 @@ class Envelopes:
         return True
 
     def largest_m(self, quantity: str) -> NDArray[np.float32]:
-        """What is ready, (columns, places)."""
+        """The largest magnitudes that are ready, (columns, places)."""
         return self._largest_m[quantity][: self.ready]
 
     def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
-        """Half as much again as the median over these times of the string's peak, as far as it is ready."""
+        """1.5 times the median, over these times, of the string's peak, as far as it is ready; 0 where nothing is."""
         column_s = self.stride / self.take.picture_hz
         first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
         peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]
@@ -100,7 +102,7 @@ class Envelopes:
 
 
 def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], columns: int) -> Picture | None:
-    """What there is so far of the times in view, in about `columns` columns; None where there is nothing yet."""
+    """The image of `times_s` as far as it is ready, in about `columns` columns; None where nothing is."""
     take = envelopes.take
     rate_hz = take.picture_hz
     detail = detail_for(take, times_s, columns)
@@ -109,7 +111,7 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
     first = int(times_s[0] * rate_hz) // stride
     last = int(np.ceil(times_s[1] * rate_hz / stride)) + 1
     edges = np.arange(first, last + 1) if last - first <= columns else _edges(first, last, columns)
-    edges = edges[edges <= ready]  # a column is drawn when all of it is there: what has been drawn stays
+    edges = edges[edges <= ready]  # only whole columns, so that what has been drawn does not change
     if len(edges) < 2:
         return None
     begin, end = int(edges[0]), int(edges[-1])
@@ -123,7 +125,7 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
 
 
 def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail:
-    """What a column can show of `times_s`."""
+    """What a column shows where `times_s` is drawn in so many columns."""
     column_s = (times_s[1] - times_s[0]) / columns
     if column_s * take.picture_hz <= 1:
         return "frames"
@@ -135,6 +137,6 @@ def _edges(first: int, last: int, columns: int) -> NDArray[np.int64]:
 
 
 def _extremes(motion: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np.float32]:
-    """The value furthest from 0, with its sign, in each stretch (stretches, places)."""
+    """The value furthest from 0, with its sign, of each segment that begins at `starts`, (segments, places)."""
     highest, lowest = np.maximum.reduceat(motion, starts), np.minimum.reduceat(motion, starts)
     return np.where(highest >= -lowest, highest, lowest)

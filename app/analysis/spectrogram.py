@@ -12,16 +12,17 @@ from app.rendering import SOURCES, Take
 from app.rendering.take import Listened
 
 FLOOR_DB = -150.0
-WINDOW_PERIODS = 7.0  # of the fundamental: the fewest that tell partials apart with a Hann window, and some more
-OVERLAP = 8  # windows at any time
+WINDOW_PERIODS = 7.0  # of the fundamental: a little more than a Hann window needs to separate partials
+OVERLAP = 8  # windows over any one time
 COLUMNS_AT_A_TIME = 32
 
 
 class Spectrogram:
-    """Model, truth and error in dB, 0 dB for a sine of the listening's full scale. A `Growing`.
+    """Model, truth and error in dB; a sine at the pick-up's full scale is 0 dB. A `Growing`.
 
-    Column k is of the window around the time k·hop_s; the last one ends with the take. Before the take lies its
-    mirror: a string that is let go from rest has moved so, and a sudden start would be a click that nobody hears.
+    Column k is of the window centred at k·hop_s; the last one ends with the take. Before its start the take is
+    mirrored, as the motion of a string released from rest would be: a sudden start would show as a click that is not
+    heard.
 
     Attributes:
         ready: columns so far.
@@ -51,7 +52,7 @@ class Spectrogram:
 
     @property
     def bin_hz(self) -> float:
-        """The distance of two bins."""
+        """The distance between two bins."""
         return self.take.info.rate_hz / self.window_frames
 
     def advance(self) -> bool:
@@ -66,7 +67,7 @@ class Spectrogram:
         return True
 
     def _possible(self) -> int:
-        """Columns whose window has been rendered whole."""
+        """How many columns have a window that is rendered to its end."""
         return self._columns_of(min(heard.ready for heard in self._heard.values()))
 
     def _columns_of(self, frames: int) -> int:
@@ -89,10 +90,10 @@ class Spectrogram:
 
 
 class FrequencyRows:
-    """Levels of bins as levels of a picture's rows, from `lowest_hz` up to half the rate.
+    """Turns levels of bins into levels of an image's rows, from `lowest_hz` up to half the rate.
 
-    Where rows are wider than bins, a row is the loudest of its bins, so that no partial falls between two rows;
-    where they are narrower, it is interpolated.
+    Where a row is wider than a bin it is the loudest of its bins, so that no partial is lost between two rows; where
+    it is narrower it is interpolated.
     """
 
     def __init__(self, bins: int, bin_hz: float, rows: int, lowest_hz: float, logarithmic: bool) -> None:

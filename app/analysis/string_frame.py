@@ -1,4 +1,4 @@
-"""What a picture of the string shows at one moment."""
+"""What the string's picture shows at one moment, as a value."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-Band = tuple[NDArray[np.float32], NDArray[np.float32]]  # lowest and highest
+Band = tuple[NDArray[np.float32], NDArray[np.float32]]  # lowest and highest displacement, (points,) each
 
 
 @dataclass(frozen=True)
 class StringFrame:
-    """What the string looks like at one moment; displacements (points,) in mm.
+    """The string at one moment; displacements (points,) in mm.
 
     Attributes:
         shapes: by source.
-        lowest, highest: by source, the extremes since the last frame: the blur of a string in real time.
-        envelopes: by source, the extremes of a longer time before; empty where they are not shown.
+        lowest, highest: by source, the extremes within `moment.BLUR_S`: the blur of the motion in real time.
+        caption: the time, and the slow motion's speed.
+        past_horizon: whether the model is past the end of its training.
+        envelopes: by source, the extremes within `moment.ENVELOPE_S`; empty where they are not shown.
     """
 
     shapes: dict[str, NDArray[np.float32]]
@@ -29,6 +31,6 @@ class StringFrame:
     envelopes: Mapping[str, Band] = field(default_factory=dict)
 
     def largest_mm(self) -> float:
-        """The largest displacement that is drawn of the motion itself; 0 where nothing is drawn yet."""
+        """The largest displacement, in mm, of the motion without its envelopes; 0 where nothing is drawn yet."""
         bands = [*self.lowest.values(), *self.highest.values()]
         return max((float(np.abs(band).max()) for band in bands), default=0.0)

@@ -1,4 +1,4 @@
-"""The partials of a take, mode by mode: what a table says of them, and why of some it says nothing."""
+"""The partials of a take, mode by mode, as rows of a table; a note says why a row has no figures."""
 
 from __future__ import annotations
 
@@ -31,9 +31,12 @@ WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}
 
 @dataclass(frozen=True)
 class PartialRow:
-    """One mode in one window; None: there is no such figure. Signs: the model's minus the truth's.
+    """One mode in one window; None: there is no such figure. Differences are the model's minus the truth's.
 
     Attributes:
+        mode: from 1.
+        cents: of the frequencies.
+        level_db: of the levels.
         note: why the row is grey, in a few words; empty for a mode that can be heard and compared.
     """
 
@@ -51,8 +54,11 @@ class PartialRow:
 def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     """Rows by window (`WINDOWS`); a window of which the take has too little is left out.
 
-    Both are rendered again, mode by mode, for a take holds pictures alone; the truth more densely than a frame, for
-    its phasors need what lies between.
+    Model and truth are rendered again, mode by mode, because a take holds pictures and not every frame; the truth in
+    steps shorter than a frame, which its phasors need.
+
+    Raises:
+        Cancelled: the job was cancelled.
     """
     info = take.info
     last = round((take.seconds if take.model_ends_s is None else take.model_ends_s) * info.rate_hz)
@@ -91,7 +97,7 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
 def _model_modes(take: Take, steps: int, block: int) -> Iterator[torch.Tensor]:
     """The model's modal amplitudes in m, (1, up to `block`, modes), of frames 1 … steps."""
     info, source = take.info, take.model
-    if source is None or not source.any_frame:  # every frame of it is kept
+    if source is None or not source.any_frame:  # the take holds every frame
         motion = take.motion("model")
         for first in range(1, steps + 1, block):
             frames = torch.from_numpy(motion.read(first, min(first + block, steps + 1)))

@@ -1,4 +1,4 @@
-"""Which device is used, and how it is opened."""
+"""The chosen output device and how it is opened, as the settings keep them."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
-Buffer = Literal["low", "medium", "high", 128, 256, 512, 1024, 2048]  # a latency, or frames
+Buffer = Literal["low", "medium", "high", 128, 256, 512, 1024, 2048]  # a latency, or a number of frames
 
 
 class DeviceChoice(BaseModel):
-    """An output device by name and host API, never by index: indices drift."""
+    """An output device by name and host API; its index changes when devices come and go."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -19,7 +19,7 @@ class DeviceChoice(BaseModel):
 
 
 class SoundChoice(BaseModel):
-    """How a device is opened. rate_hz 0: at its own rate."""
+    """How a device is opened. `rate_hz`: 0 for the device's own rate."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -15,8 +15,8 @@ from typing import Any, Protocol
 from app.audio.problems import no_device, not_started, portaudio_missing, refused, vanished
 from engine.voices.mixer import Mixer
 
-SMALLEST_BLOCK = 64
-PERIODS = 4  # of a buffer: a pluck waits for the next
+SMALLEST_BLOCK = 64  # frames
+PERIODS = 4  # in a buffer: the device asks for a quarter of it at a time, so that a pluck waits for less
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class AudioDevice:
 
     name: str
     host_api: str
-    default_rate_hz: int = 0  # 0 in a remembered choice that has not been looked up yet
+    default_rate_hz: int = 0  # 0 in a saved choice that has not been looked up yet
     channels: int = 2
     is_default: bool = False
 
@@ -50,17 +50,21 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
     """All sound outputs, the system's default first.
 
     Args:
-        rescan: PortAudio looks for devices only once, when it starts. True starts it anew, which would end every
-            open stream: it counts only while none is open.
+        rescan: starts PortAudio anew, as it looks for devices only when it starts. Has no effect while a stream is
+            open, which a new start would end.
 
     Raises:
-        AudioUnavailable: If PortAudio is missing. No output at all is an empty list.
+        AudioUnavailable: PortAudio is missing or does not start. Where it finds no output, the list is empty.
     """
     return sorted((device for _, device in _list(rescan)), key=lambda device: not device.is_default)
 
 
 def default_device(rescan: bool = False) -> AudioDevice:
-    """The system's default output, or the first if it names none; AudioUnavailable if there is no output."""
+    """The system's default output, or the first where none is the default.
+
+    Raises:
+        AudioUnavailable: there is no output, or PortAudio is missing.
+    """
     devices = output_devices(rescan)
     if not devices:
         raise no_device()
@@ -68,20 +72,24 @@ def default_device(rescan: bool = False) -> AudioDevice:
 
 
 def find(name: str, host_api: str, rescan: bool = False) -> AudioDevice:
-    """The output of this name; AudioUnavailable says that it has vanished."""
+    """The output of this name and host API.
+
+    Raises:
+        AudioUnavailable: it is not connected (any more), or PortAudio is missing.
+    """
     return _find(name, host_api, rescan)[1]
 
 
 def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream:
-    """Opens, but does not start, a float32 stream at the device's own rate, so that no rate is forced on it.
+    """Opens, but does not start, a float32 stream at `device.default_rate_hz`, of two channels at most.
 
-    The device calls the compiled mixer itself, in its own thread: the interpreter has no part in it. Its buffer is
-    `buffer_s`, or what it calls low latency where that is longer; a quarter of it is asked for at a time.
+    The device calls the compiled mixer in its own thread, without the Python interpreter. Its buffer is `buffer_s`,
+    or the latency that the device calls low where that is longer.
 
     Raises:
-        AudioUnavailable: With the reason in plain words.
+        AudioUnavailable: it is gone, in use, or refuses the rate.
     """
-    from engine.kernels.mixer import call  # compiled, or loaded: only when it is needed
+    from engine.kernels.mixer import call  # imported late, because it may have to be compiled first
 
     sounddevice = _sounddevice()
     with _lock:
@@ -90,7 +98,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
         low_s = sounddevice.query_devices(index)["default_low_output_latency"]
         frames = max(SMALLEST_BLOCK, round(buffer_s * device.default_rate_hz / PERIODS))
         try:
-            # made for other libraries to hand over a callback of their own, as rtmixer does
+            # The private base class is the only one that takes a compiled callback; rtmixer uses it as well.
             stream: RawStream = sounddevice._StreamBase(
                 kind="output",
                 samplerate=device.default_rate_hz,
@@ -109,7 +117,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
 
 
 def close_device(stream: RawStream) -> None:
-    """Stops at once and frees the device; nothing can be done about one that cannot even stop."""
+    """Stops at once and frees the device; errors of a device that cannot be stopped are ignored."""
     with _lock:
         for end in (stream.abort, stream.close):
             with contextlib.suppress(Exception):
@@ -117,8 +125,8 @@ def close_device(stream: RawStream) -> None:
         _streams.discard(stream)
 
 
-_lock = threading.RLock()  # PortAudio's listing and opening are not made for two threads
-_streams: set[RawStream] = set()  # open ones: PortAudio must not be started anew under them
+_lock = threading.RLock()  # PortAudio does not allow listing and opening from two threads
+_streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started anew
 
 
 def _find(name: str, host_api: str, rescan: bool = False) -> tuple[int, AudioDevice]:
@@ -161,7 +169,7 @@ def _sounddevice() -> ModuleType:
         import sounddevice
     except (ImportError, OSError) as error:
         raise portaudio_missing(str(error)) from error
-    except Exception as error:  # the module starts PortAudio as it is imported, and has its own exception for it
+    except Exception as error:  # importing the module starts PortAudio, which fails with an exception of its own
         raise not_started(str(error)) from error
     module: ModuleType = sounddevice
     return module

@@ -1,4 +1,4 @@
-"""Reads an impulse response from a sound file: a stranger's, so that nothing of it is believed."""
+"""Reads an impulse response from a sound file, which may come from anywhere and is checked in every respect."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FORMATS = ("WAV", "WAVEX", "RF64", "FLAC", "AIFF")
 
 
 class ImpulseError(Exception):
-    """A file that is no impulse response. The message names the file, what is wrong and the remedy, in one line."""
+    """A file cannot be used as an impulse response. The message, one line, names it, what is wrong and the remedy."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
@@ -24,10 +24,11 @@ def read_impulse(path: Path) -> Impulse:
     """The impulse response in a WAV, FLAC or AIFF file, at its own rate; effects resample it to the mixer's.
 
     Raises:
-        ImpulseError: it cannot be read, or is no response that can be used: see `engine.bounds`.
+        ImpulseError: it cannot be read, is of another format, or lies outside `engine.bounds` (size, rate, channels,
+            duration, values).
     """
     try:
-        if not path.is_file():  # a pipe would be waited for
+        if not path.is_file():  # opening a pipe would block
             raise ImpulseError(f"{path}: no file; check the name")
         if path.stat().st_size > bounds.LARGEST_IMPULSE_BYTES:
             raise ImpulseError(

@@ -1,4 +1,4 @@
-"""Where the mixer's frames go: a device that calls for them, or a clock that takes them where there is none."""
+"""What takes the mixer's frames: a device, or, where there is none, a clock that drops them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from app.shared.thread_priority import native_threads, put_first
 from engine.voices.mixer import Mixer
 
 STALLED_AFTER_S = 2.5  # without a call: longer than any start of a sound server that was seen
-LOST_AFTER_S = 6.0  # a stall that is this long does not end: the device was unplugged, or its driver hangs
-CLOCK_FRAMES = 512
-LONGEST_LAG_S = 0.1  # further behind than this, the clock goes on from now instead of racing to catch up
+LOST_AFTER_S = 6.0  # a stall of this length does not end: the device was unplugged, or its driver hangs
+CLOCK_FRAMES = 512  # taken at a time
+LONGEST_LAG_S = 0.1  # further behind than this, the clock skips what it has missed
 
 
 class Output(Protocol):
     """What takes the mixer's frames.
 
     Attributes:
-        device: None where there is none.
-        latency_s: of the output, as it said when it was opened: its buffer.
+        device: None for the clock.
+        rate_hz: at which frames are taken.
+        latency_s: the length of the output's buffer, as reported when it was opened.
     """
 
     device: AudioDevice | None
@@ -31,22 +32,26 @@ class Output(Protocol):
     latency_s: float
 
     def now_s(self) -> float:
-        """The clock by which voices say when they began."""
+        """The output's time in seconds, on the clock of the times at which voices began."""
 
     def load(self) -> float:
-        """The share of its time that the mixer takes, 0 … 1."""
+        """The share of the output's time that the mixer takes, 0 … 1."""
 
     def stalled(self) -> bool:
-        """Whether it takes nothing at the moment."""
+        """Whether it has taken no frames for a while, and may recover."""
 
     def lost(self) -> bool:
-        """Whether it has gone."""
+        """Whether it has gone and must be opened anew."""
 
     def close(self) -> None: ...
 
 
 class DeviceOutput:
-    """A device that plays, at its own rate. Raises AudioUnavailable where it cannot be opened or started."""
+    """A device that plays, at its own rate.
+
+    Raises:
+        AudioUnavailable: it cannot be opened or started.
+    """
 
     def __init__(self, device: AudioDevice, buffer_s: float, mixer: Mixer) -> None:
         self.device: AudioDevice | None = device
@@ -66,7 +71,7 @@ class DeviceOutput:
         self.real_time = put_first(native_threads() - threads)
 
     def now_s(self) -> float:
-        with self._closing:  # asked from any thread: PortAudio must not look at a stream that was freed
+        with self._closing:  # called from any thread: PortAudio must not be given a stream that was freed
             if self._closed:
                 raise RuntimeError("the output has been closed")
             return float(self._stream.time)
@@ -80,7 +85,7 @@ class DeviceOutput:
     def lost(self) -> bool:
         try:
             active = self._stream.active
-        except Exception:  # PortAudio itself has already given up the stream
+        except Exception:  # PortAudio has closed the stream by itself
             active = False
         return not active or self._silent_s() > LOST_AFTER_S
 
@@ -90,7 +95,7 @@ class DeviceOutput:
         close_device(self._stream)
 
     def _silent_s(self) -> float:
-        """Since the last call. To be asked again and again, by one thread."""
+        """Seconds since the device last called the mixer, as far as this was polled; from one thread only."""
         now_s, calls = time.monotonic(), self._mixer.calls
         if calls != self._calls:
             self._calls, self._called_s = calls, now_s
@@ -98,7 +103,7 @@ class DeviceOutput:
 
 
 class ClockOutput:
-    """Takes frames at the pace of time and drops them, so that pictures move without a device."""
+    """Takes frames in real time and drops them, so that pictures move without a device."""
 
     device: AudioDevice | None = None
     latency_s = 0.0

@@ -1,4 +1,4 @@
-"""What can go wrong between the player and a sound device, in words for the user."""
+"""Faults of the sound output, in words for the user."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True)
 class AudioProblem:
-    """One fault: what happened, what to do about it, and what the system said."""
+    """One fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none)."""
 
     kind: ProblemKind
     message: str
@@ -30,7 +30,7 @@ class AudioProblem:
 
 
 class AudioUnavailable(Exception):
-    """No sound can be had for now. Pictures and export do not need any."""
+    """No sound output can be used at present; pictures and export go on."""
 
     def __init__(self, problem: AudioProblem) -> None:
         super().__init__(str(problem))
@@ -106,12 +106,11 @@ def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
 
 
 def refused(error: Exception, device_name: str, rate_hz: int) -> AudioUnavailable:
-    """Explains from PortAudio's code and the system's text why a device did not open or start."""
+    """Tells by PortAudio's error code and the text of the error why a device did not open or start."""
     detail = str(error)
     text = detail.lower()
     code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)
-    # PortAudio reports much of what a driver says as one "unanticipated host error", hence the look at the
-    # text.
+    # PortAudio reports many errors of drivers as "unanticipated host error", hence the search in the text.
     if code == _PA_INVALID_SAMPLE_RATE or "sample rate" in text:
         problem = AudioProblem(
             ProblemKind.RATE_REFUSED,

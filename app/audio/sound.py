@@ -1,7 +1,7 @@
-"""The sound of the app: a mixer, the output that takes its frames, and a thread that looks after the output.
+"""The sound of the app: a mixer, the output that takes its frames, and a thread that supervises the output.
 
 any thread ── voices, gains ──► Mixer ◄── device's own thread (compiled, without the interpreter) ──► loudspeaker
-caretaker thread: opens and changes devices, finds lost ones again, frees what has rung out
+caretaker thread: opens and changes devices, reopens lost ones, frees voices that have ended
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from engine.voices.mixer import Gap, Mixer
 
 DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
 BUFFER_S = 0.012
-TRY_AGAIN_S = 1.0  # between two looks for a device that vanished
-LOOK_EVERY_S = 0.05
-MOST_GAPS = 200  # that are remembered
+TRY_AGAIN_S = 0.5  # between two looks for a device that vanished; one takes 25 ms of a processor
+LOOK_EVERY_S = 0.05  # the caretaker's period
+MOST_GAPS = 200  # kept; older ones are dropped
 JOIN_TIMEOUT_S = 5.0
 
 LookUp = Callable[[AudioDevice | None, bool], AudioDevice]
@@ -37,13 +37,13 @@ class SoundStatus:
     """A snapshot, some 50 ms old at most.
 
     Attributes:
-        device: None: silent.
-        rate_hz: of the mixer; opening a device may change it, and most voices end then.
-        latency_s: the device's buffer.
-        gaps: silences that nobody asked for, of this run.
-        load: the share of the device's time that the mixer takes.
-        changes_done: how many calls of `open` have been obeyed, or refused.
-        problem: why there is no sound, or why the last device could not be opened.
+        device: the one that plays; None where none does.
+        rate_hz: of the mixer; it may change when a device is opened.
+        latency_s: the length of the device's buffer.
+        gaps: unintended silences (drop-outs), the last `MOST_GAPS` of them.
+        load: the share of the device's time that the mixer takes, 0 … 1.
+        changes_done: how many calls of `open` have been carried out or refused.
+        problem: why there is no sound, or why the last device could not be opened; None where all is well.
     """
 
     device: AudioDevice | None = None
@@ -57,7 +57,7 @@ class SoundStatus:
 
 @dataclass(frozen=True)
 class _Wish:
-    """An output as it was asked for; see `Sound.open`."""
+    """The arguments of a call of `Sound.open`."""
 
     device: AudioDevice | None = None
     buffer_s: float = BUFFER_S
@@ -66,6 +66,7 @@ class _Wish:
     rescan: bool = False
 
     def at_its_rate(self, found: AudioDevice) -> AudioDevice:
+        """`found` with the wanted rate, or, for 0, with its own."""
         return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
 
     def buffer_s_at(self, rate_hz: int) -> float:
@@ -73,16 +74,17 @@ class _Wish:
 
 
 def look_up(device: AudioDevice | None, rescan: bool) -> AudioDevice:
-    """The device as it is now, or, for None, the system's default."""
+    """The device as PortAudio lists it now; for None the system's default. Errors as `devices.find`."""
     return default_device(rescan) if device is None else find(device.name, device.host_api, rescan)
 
 
 class Sound:
-    """Every public method may be called from any thread and returns at once.
+    """Public methods may be called from any thread; all but `set_effects` and `close` return at once.
 
     Args:
-        on_problem: Called once for each fault of a device, from the caretaker thread.
-        look_up, open_output: Find and open a device; tests put others in.
+        on_problem: called once for each fault of a device, from the caretaker thread.
+        rate_hz: of the mixer until a device is opened.
+        look_up, open_output: find and open a device; replaced in tests.
     """
 
     def __init__(
@@ -101,9 +103,9 @@ class Sound:
         self._wishes: SimpleQueue[_Wish] = SimpleQueue()
         self._woken = threading.Event()
         self._closing = threading.Event()
-        self._lost: _Wish | None = None  # its device vanished while it was ours: tried again now and then
+        self._lost: _Wish | None = None  # its device vanished while it was in use: opened again when it is back
         self._try_again_s = 0.0
-        self._stalled = False  # and told
+        self._stalled = False  # whether a stall has been reported
         self._gaps: deque[Gap] = deque(maxlen=MOST_GAPS)
         self._status = SoundStatus(rate_hz=rate_hz)
         self._caretaker = threading.Thread(target=self._take_care, name="sound-caretaker", daemon=True)
@@ -117,15 +119,16 @@ class Sound:
         buffer_frames: int = 0,
         rescan: bool = False,
     ) -> None:
-        """Changes to another device, known by name and host API, or, for None, to the system's default.
+        """Asks the caretaker thread to open another device, or the present one in another way.
 
-        The present one is taken again if a new one, or a new rate or buffer, is refused; then `on_problem` hears of
-        it. What rings goes on where the rate stays. Where it changes, voices end, and notes go on as new ones.
+        If it is refused, the present device is opened again as it was, and `on_problem` is called. Voices go on
+        ringing where rate and channels stay; otherwise there is a new mixer, and notes that ring need new voices.
 
         Args:
-            buffer_s: the device's buffer: longer is safer, shorter more prompt.
+            device: known by name and host API; None for the system's default.
+            buffer_s: the length of the device's buffer: longer is safer, shorter has less latency.
             rate_hz: 0 for the device's own.
-            buffer_frames: the buffer in frames at that rate; 0 for `buffer_s`.
+            buffer_frames: the buffer in frames at that rate, instead of `buffer_s`; 0 for `buffer_s`.
             rescan: looks for devices that were plugged in meanwhile, which interrupts the present one.
         """
         self._wishes.put(_Wish(device, buffer_s, rate_hz, buffer_frames, rescan))
@@ -136,33 +139,37 @@ class Sound:
         return self.mixer.rate_hz
 
     def now_s(self) -> float:
-        """The clock of the output, by which a gesture is timed."""
+        """The output's time in seconds, by which gestures are timed; 0 while the output is being changed."""
         try:
             return self._output.now_s()
         except Exception:  # the output is being changed
             return 0.0
 
     def set_volume_db(self, volume_db: float) -> None:
-        """0 dB leaves the samples as they are, minus infinity mutes."""
+        """0 dB leaves the samples as they are, minus infinity mutes.
+
+        Raises:
+            ValueError: it is not a number, or plus infinity.
+        """
         if math.isnan(volume_db) or volume_db == math.inf:
             raise ValueError(f"The volume cannot be {volume_db} dB.")
         self._volume_db = volume_db
         self.mixer.set_volume(10 ** (volume_db / 20))
 
     def set_effects(self, effects: Effects | None) -> None:
-        """Body and room of everything from now on; see `Mixer.set_effects`. It takes milliseconds, or tens."""
+        """Sets body and room of all that sounds from now on, within tens of ms; see `Mixer.set_effects`."""
         self._effects = effects
         self.mixer.set_effects(effects)
 
     def sound_tone(self, side: str) -> None:
-        """A soft tone for a second on "left", "right" or "both" sides, whatever else is playing."""
+        """Plays a soft tone for a second on "left", "right" or "both" sides, beside whatever else is playing."""
         self.mixer.sound_tone(side)
 
     def status(self) -> SoundStatus:
         return self._status
 
     def close(self) -> None:
-        """Cuts the sound, ends the thread and frees the device; may be called again."""
+        """Cuts the sound, ends the thread, for which it waits, and frees the device; may be called again."""
         self._closing.set()
         self._woken.set()
         if threading.current_thread() is not self._caretaker:
@@ -229,7 +236,11 @@ class Sound:
             self._report(error.problem)
 
     def _adopt(self, device: AudioDevice, wish: _Wish) -> None:
-        """Opens a device; its mixer is the present one where the rate stays."""
+        """Opens a device, with the present mixer where rate and channels stay, else with a new one.
+
+        Raises:
+            AudioUnavailable: it could not be opened; the clock takes the frames then.
+        """
         rate_hz, channels = device.default_rate_hz, min(device.channels, 2)
         mixer = self.mixer
         if rate_hz != mixer.rate_hz or channels != mixer.channels:
@@ -247,7 +258,7 @@ class Sound:
         self._status = replace(self._status, problem=None)
 
     def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
-        """The device as it was before a change that was refused; if it is gone too, it is looked for."""
+        """Opens the device again as before a change that was refused; if that fails too, it counts as lost."""
         try:
             self._adopt(device, wish)
         except AudioUnavailable:
@@ -280,11 +291,11 @@ class Sound:
                 pass
 
     def _lose(self, wish: _Wish) -> None:
-        """It is taken again when it is back; until then nothing more is said of it."""
+        """Marks an output as lost: it is opened again when it is back, and until then no fault is reported."""
         self._lost, self._try_again_s = wish, time.monotonic() + TRY_AGAIN_S
 
     def _report(self, problem: AudioProblem) -> None:
-        # who hears of it may look at once
+        # before the call, because the callee may read the status
         self._status = replace(self._status, problem=str(problem), device=self._output.device)
         if self._on_problem is not None:
             self._on_problem(problem)

@@ -1,4 +1,4 @@
-"""abx show: the record of a listening test."""
+"""abx show: prints the record of a listening test."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def group() -> None:
 
 @abx.command()
 def show(file: Annotated[Path, typer.Argument(metavar="FILE", help="A record that the app has saved.")]) -> None:
-    """Check a record and print it in words."""
+    """Check the record of a listening test and print it as text."""
     from app.analysis.abx.record import load_record
     from app.analysis.abx.text import as_text
     from engine.plain_text import printable

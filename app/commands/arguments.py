@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,45 +14,66 @@ if TYPE_CHECKING:
 
 PresetName = Annotated[str, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Cache = Annotated[Path | None, typer.Option(help="Folder of the data sets; made where it is not there.")]
+Cache = Annotated[
+    Path | None,
+    typer.Option(help="Folder of the data sets; default LEARNED_STRINGS_CACHE, else cache in the project's folder."),
+]
+Runs = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder of runs, each with its checkpoint and log.csv; default LEARNED_STRINGS_RUNS, else runs in the "
+        "project's folder."
+    ),
+]
+Device = Literal["cpu", "cuda", "auto"]
 
 StringName = Annotated[
     str | None,
     typer.Option(
         "--string",
         metavar="NAME|STRING.toml",
-        help="For a preset of many strings: another one, by name, or a file of a configuration's [data.string].",
+        help="For a preset of many strings: the string, by name (nylon_b3) or as a file of its parameters.",
     ),
 ]
 StringRate = Annotated[
-    int | None, typer.Option("--rate", metavar="HZ", help="For a preset of many strings: another sample rate.")
+    int | None,
+    typer.Option("--rate", metavar="HZ", help="For a preset of many strings: sample rate; default its own."),
 ]
 StringModes = Annotated[
     int | None,
-    typer.Option("--modes", min=1, metavar="M", help="And so many modes; default all below 20 kHz."),
+    typer.Option(
+        "--modes",
+        min=1,
+        metavar="M",
+        help="For a preset of many strings: number of modes; default all below 20 kHz.",
+    ),
 ]
 
 POSITION_HELP = "Where to pluck: 0 and 1 are the fixed ends, 0.5 the middle."
 AMPLITUDE_HELP = "Peak displacement in mm."
 SECONDS_HELP = "Duration in s."
-Position = Annotated[float, typer.Option(help=POSITION_HELP)]
-AmplitudeMm = Annotated[float, typer.Option(help=AMPLITUDE_HELP)]
-Seconds = Annotated[float, typer.Option(help=SECONDS_HELP)]
+Position = Annotated[float, typer.Option(metavar="X", help=POSITION_HELP)]
+AmplitudeMm = Annotated[float, typer.Option(metavar="MM", help=AMPLITUDE_HELP)]
+Seconds = Annotated[float, typer.Option(metavar="S", help=SECONDS_HELP)]
 Shape = Annotated[plucks.Shape, typer.Option(help="The pluck's shape.")]
-Width = Annotated[float, typer.Option(help="Width of the pluck in lengths of the string.")]
+Width = Annotated[float, typer.Option(metavar="X", help="Width of the pluck as a fraction of the string's length.")]
 DEFAULT_SHAPE = plucks.Pluck().shape
 DEFAULT_WIDTH = plucks.Pluck().width
 
 
 def check_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Ends the command with exit status 2 and a message that names the option, its value and its range."""
+    """Checks that low ≤ value ≤ high.
+
+    Raises:
+        typer.BadParameter: it is not: the command ends with exit status 2 and names option, value and range.
+    """
     if not low <= value <= high:
         text = f" {unit}" if unit else ""
         raise typer.BadParameter(f"must lie in {low:.10g} … {high:.10g}{text}, not {value:.10g}", param_hint=option)
 
 
 def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width: float) -> plucks.Pluck:
-    """The pluck, its options checked."""
+    """The pluck of these options, whose ranges are checked."""
     check_range("--position", position, *plucks.POSITION_RANGE)
     check_range("--amplitude-mm", amplitude_mm, 0, plucks.LARGEST_AMPLITUDE_MM, "mm")
     check_range("--width", width, *plucks.WIDTH_RANGE)
@@ -60,7 +81,7 @@ def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width
 
 
 def open_preset(name_or_path: str) -> Preset:
-    """The preset of a name (the user's own among them) or a path. Raises PresetError."""
+    """Loads a preset by its name, of the shipped ones and the user's own, or by its path. Raises PresetError."""
     from app.presets.folders import usable_files
     from engine.presets import find_preset, load_preset
 
@@ -70,10 +91,10 @@ def open_preset(name_or_path: str) -> Preset:
 def open_preset_of_string(
     name_or_path: str, string: str | None, rate_hz: int | None = None, modes: int | None = None
 ) -> Preset:
-    """The same, of the string of a file, at a rate, with so many modes; None: the preset's own.
+    """Loads a preset, and chooses string, rate and number of modes of one of many strings; None: the preset's own.
 
     Raises:
-        PresetError, SchemaError: no such preset or string; or the preset is of one string.
+        PresetError, SchemaError: there is no such preset or string, or the preset is not of many strings.
     """
     if rate_hz is not None:
         check_range("--rate", rate_hz, 1_000, 1_000_000, "Hz")
@@ -81,7 +102,7 @@ def open_preset_of_string(
 
 
 def open_preset_to_render(name_or_path: str, string: str | None, rate_hz: int | None, modes: int | None) -> Preset:
-    """The same for a sound file of a rate: a model of many strings plays at it, any other at its own.
+    """As `open_preset_of_string`, for a sound file of `rate_hz`: presets of one string keep their own rate.
 
     Raises:
         As `open_preset_of_string`.

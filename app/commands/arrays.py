@@ -15,11 +15,11 @@ from app.shared.whole_file import whole_file
 from engine.plain_text import one_line
 
 LARGEST_RESULT_BYTES = 4 * 2**30
-BYTES_AT_ONCE = 16 * 2**20  # of a result; the file does not depend on it
+BYTES_AT_ONCE = 16 * 2**20  # of a result, computed at a time
 FRAMES_AT_ONCE = 4096
-IMPLAUSIBLE_PEAK_M = 0.1  # more is likely millimetres
+IMPLAUSIBLE_PEAK_M = 0.1  # a larger displacement is probably meant in millimetres
 
-# displacements (batch, points) -> blocks (batch, frames, points) from frame 0 to the last
+# displacements (batch, points) -> blocks (batch, frames, points) from frame 0 to the last, in m
 Motion = Callable[[Tensor], Iterator[Tensor]]
 
 
@@ -43,7 +43,11 @@ def read_displacements(path: Path) -> Tensor:
 
 
 def check_result_size(batch: int, frames: int, points: int) -> None:
-    """Refuses what would surely not fit, before any work."""
+    """Refuses a result, float64 (batch, frames, points), above `LARGEST_RESULT_BYTES`, before any work.
+
+    Raises:
+        Failure: it is larger.
+    """
     size = 8 * batch * frames * points
     if size > LARGEST_RESULT_BYTES:
         raise Failure(
@@ -53,9 +57,11 @@ def check_result_size(batch: int, frames: int, points: int) -> None:
 
 
 def write_motion(path: Path, initial: Tensor, steps: int, motion: Motion, report: Report) -> None:
-    """Writes float64 (batch, steps + 1, points) in m, whole or not at all.
+    """Writes float64 (batch, steps + 1, points) in m, whole or not at all, a few trajectories at a time.
 
-    A few trajectories at a time, so that memory holds no more than those.
+    Raises:
+        Failure: the motion is not finite.
+        WriteError: the file cannot be written.
     """
     batch, points = initial.shape
     rows = max(1, BYTES_AT_ONCE // (8 * (steps + 1) * points))
@@ -74,19 +80,19 @@ def write_motion(path: Path, initial: Tensor, steps: int, motion: Motion, report
 
 
 def blocks_of(steps: int) -> Iterator[int]:
-    """Lengths of the blocks that make up `steps`."""
+    """The lengths of the blocks of at most `FRAMES_AT_ONCE` frames that make up `steps`."""
     for first in range(0, steps, FRAMES_AT_ONCE):
         yield min(FRAMES_AT_ONCE, steps - first)
 
 
 def _load(path: Path) -> np.ndarray:
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a false header claims no memory
+        array = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a damaged header allocates no memory
     except FileNotFoundError:
         raise Failure(f"{path}: no such file; give a NumPy .npy file of shape (batch, points) in m") from None
     except OSError as error:
         raise Failure(f"{path}: cannot be read ({error.strerror or error}); give a NumPy .npy file") from error
-    except Exception as error:  # NumPy reads the header as Python's words, with all of their errors
+    except Exception as error:  # NumPy parses the header as a Python literal, which may raise nearly anything
         told = one_line(str(error), 200)
         raise Failure(f"{path}: not a whole NumPy .npy file of numbers ({told}); save it with numpy.save") from error
     if not isinstance(array, np.ndarray):

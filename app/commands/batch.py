@@ -28,17 +28,24 @@ if TYPE_CHECKING:
 
 
 def batch(
-    presets: Annotated[str, typer.Option(help="Names or paths of presets, a comma between two.")],
-    positions: Annotated[str, typer.Option(help="Where to pluck, 0 … 1, a comma between two.")],
-    amplitudes: Annotated[str, typer.Option(help="Peak displacements in mm, a comma between two.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder; made where it is not there.")],
+    presets: Annotated[str, typer.Option(metavar="PRESET,…", help="Names or paths of presets, separated by commas.")],
+    positions: Annotated[
+        str, typer.Option(metavar="X,…", help="Where to pluck, 0 … 1 of the length, separated by commas.")
+    ],
+    amplitudes: Annotated[str, typer.Option(metavar="MM,…", help="Peak displacements in mm, separated by commas.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder, made if needed.")],
     seconds: arguments.Seconds,
     strings: Annotated[
         str | None,
-        typer.Option(help="For presets of many strings: names of strings or .toml files, a comma between two."),
+        typer.Option(
+            metavar="STRING,…",
+            help="For presets of many strings: names of strings or .toml files, separated by commas.",
+        ),
     ] = None,
     modes: arguments.StringModes = None,
-    sources: Annotated[str, typer.Option(help="Of model, truth, difference, both; a comma between two.")] = "model",
+    sources: Annotated[
+        str, typer.Option(metavar="SOURCE,…", help="Of model, truth, difference, both; separated by commas.")
+    ] = "model",
     rate: Rate = None,
     bits: BitsOption = "24",
     listen: Listen = DEFAULT_LISTEN,
@@ -49,12 +56,12 @@ def batch(
     shape: arguments.Shape = arguments.DEFAULT_SHAPE,
     width: arguments.Width = arguments.DEFAULT_WIDTH,
     normalise: Normalise = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Render again what is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Render files again that are there.")] = False,
 ) -> None:
-    """Render positions × amplitudes × presets × strings × sources to WAV files.
+    """Render many plucks of many presets to WAV files.
 
-    index.csv lists them with peaks and errors. A batch that was stopped goes on with the same command: whole files
-    are kept.
+    All combinations of positions, amplitudes, presets, strings and sources are rendered. index.csv lists the files
+    with their peaks and errors. The same command continues a batch that was stopped: whole files are kept.
     """
     places, heights = _numbers("--positions", positions), _numbers("--amplitudes", amplitudes)
     for place in places:
@@ -111,7 +118,7 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
     try:
         found = tuple(float(word) for word in _words(text))
     except ValueError as error:
-        raise typer.BadParameter(f"must be numbers with commas between, not {text!r}", param_hint=option) from error
+        raise typer.BadParameter(f"must be numbers separated by commas, not {text!r}", param_hint=option) from error
     if not found:
         raise typer.BadParameter("give at least one number", param_hint=option)
     return found

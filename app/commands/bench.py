@@ -1,7 +1,8 @@
-"""bench solver, render, voices, effects, tune, take, train, app, play, notes, soak: what the program costs here."""
+"""bench solver, render, voices, effects, tune, take, train, app, play, notes, unplug, soak: what it costs."""
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from app.commands.benchmarks.machine import Machine
     from app.commands.benchmarks.play.spread import Spread
 
-bench = typer.Typer(help="Measure speed on this machine: medians of repeats.", no_args_is_help=True)
+bench = typer.Typer(help="Measure speed, sound and memory on this machine.", no_args_is_help=True)
 
 
 @bench.command()
@@ -25,7 +26,10 @@ def solver(
     batch: Annotated[int, typer.Option(min=1, max=1000, help="Trajectories at once.")] = 100,
     steps: Annotated[int, typer.Option(min=1, help="Samples of each trajectory.")] = 4000,
 ) -> None:
-    """Cost and error of the fast solver against DOP853, on the worst case of the paper's data sets."""
+    """Cost and error of the fast solver against DOP853.
+
+    On the worst trajectory of each of the paper's data sets.
+    """
     from app.commands.benchmarks.solver import measure
 
     with progress("bench solver") as report:
@@ -73,7 +77,10 @@ def solver(
 
 @bench.command()
 def render(json: Json = False) -> None:
-    """Real-time factor (below 1 is faster than it sounds) and first-block latency of every model, on one thread."""
+    """Real-time factor and first-block latency of every model.
+
+    On one thread. A factor below 1 is faster than real time.
+    """
     from app.commands.benchmarks.render import measure
 
     with progress("bench render") as report:
@@ -102,7 +109,10 @@ def render(json: Json = False) -> None:
 
 @bench.command()
 def voices(json: Json = False) -> None:
-    """What a voice of a model or the truth costs and how exact it is, how many fit on a core, what a strike costs."""
+    """Cost and error of a voice, and the cost of a pluck.
+
+    Of the models of all studio presets and of the truth, and how many voices fit on a core.
+    """
     from app.commands.benchmarks import voices as bench
 
     with progress("bench voices") as report:
@@ -136,7 +146,10 @@ def voices(json: Json = False) -> None:
 
 @bench.command()
 def effects(json: Json = False) -> None:
-    """What body and room cost: shares of a core, the dearest quantum, and what it takes to set them."""
+    """Cost of body and room.
+
+    Shares of a core, the slowest quantum, and the time to set them.
+    """
     from app.commands.benchmarks.effects import measure
 
     with progress("bench effects") as report:
@@ -167,10 +180,13 @@ def tune(
     patch: Annotated[
         list[str] | None, typer.Argument(metavar="PATCH", help="Names or files of patches; default: all.")
     ] = None,
-    every: Annotated[int, typer.Option(min=1, max=24, help="So many semitones between two keys.")] = 6,
+    every: Annotated[int, typer.Option(min=1, max=24, help="Semitones from one measured key to the next.")] = 6,
     json: Json = False,
 ) -> None:
-    """Patches as they are heard: pitch and loudness over their range, chords, and the model beside the truth."""
+    """Pitch and loudness of patches over their range.
+
+    Also the level of a chord, and the model's error against the truth while a key is bent and plucked again.
+    """
     from app.commands.arguments import open_preset
     from app.commands.benchmarks.tune import measure
     from app.commands.console import Failure
@@ -217,7 +233,10 @@ def tune(
 
 @bench.command()
 def take(json: Json = False) -> None:
-    """What the pictures and signals of a pluck of ten seconds cost: time, memory, a listening point that moves."""
+    """Time and memory of a pluck's pictures and signals.
+
+    Of ten seconds, and after its listening point has moved.
+    """
     from app.commands.benchmarks.take import measure
 
     with progress("bench take") as report:
@@ -232,7 +251,10 @@ def take(json: Json = False) -> None:
 
 @bench.command()
 def train(json: Json = False) -> None:
-    """Seconds of a train step of every model: 50 trajectories, 400 frames (50 for fgru and frnn)."""
+    """Time of a training step of every model.
+
+    With 50 trajectories of 400 frames (of 50 frames for fgru and frnn).
+    """
     from app.commands.benchmarks.train import measure
 
     with progress("bench train") as report:
@@ -249,10 +271,15 @@ def train(json: Json = False) -> None:
 @bench.command()
 def app(
     json: Json = False,
-    seconds: Annotated[float, typer.Option(min=0.1, help="How long the picture is watched.")] = 5.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, metavar="S", help="How long the picture is observed, in s.")
+    ] = 5.0,
     starts: Annotated[int, typer.Option(min=1, help="Starts that are timed, after one that is not.")] = 3,
 ) -> None:
-    """The window: how soon it is there and can be plucked, how smoothly the picture moves. It opens for a minute."""
+    """Time until the window can be played, and its frame rate.
+
+    A window opens for a minute.
+    """
     from app.commands.benchmarks.app import measure
 
     with progress("bench app") as report:
@@ -270,21 +297,26 @@ def app(
 @bench.command()
 def play(
     json: Json = False,
-    seconds: Annotated[float, typer.Option(min=1.0, help="How long it is played.")] = 60.0,
-    rate: Annotated[float, typer.Option(min=0.5, max=20.0, help="Plucks a second.")] = 12.0,
-    buffer: Annotated[str, typer.Option(help="low, medium, high, or 128 ... 2048 frames.")] = "medium",
+    seconds: Annotated[float, typer.Option(min=1.0, metavar="S", help="How long it is played, in s.")] = 60.0,
+    rate: Annotated[float, typer.Option(min=0.5, max=20.0, help="Plucks per second.")] = 12.0,
+    buffer: Annotated[
+        str, typer.Option(help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
+    ] = "medium",
     busy: Annotated[
         bool | None,
-        typer.Option("--busy/--alone", help="Only beside a process that keeps a core busy, or only without one."),
+        typer.Option(
+            "--busy/--alone", help="Only beside a process that keeps a core busy, or only without; default both."
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random keys.")] = 0,
     patch: Annotated[
-        str, typer.Option(metavar="PATCH", help="What is played; the default rings on when a key is let go.")
+        str, typer.Option(metavar="PATCH", help="What is played; the default rings on after a key's release.")
     ] = "concert_harp",
 ) -> None:
-    """What its user hears: the app on a private screen, played by keys from outside, and its sound recorded.
+    """Holes, clicks and latency of the app's sound, recorded.
 
-    Linux only; needs PulseAudio and Xvfb, and touches nothing of the sound and the screen in use.
+    The app runs on a private screen and is played by keys. Linux only. Needs PulseAudio and Xvfb; starts a sound
+    server and a screen of its own, and leaves yours alone.
     """
     from app.commands.benchmarks.play.measure import measure
     from app.commands.console import Failure
@@ -313,7 +345,7 @@ def play(
         ("holes", *(phase.holes for phase in found.phases)),
         ("holes together, ms", *(phase.holes_ms for phase in found.phases)),
         ("longest hole, ms", *(phase.longest_hole_ms for phase in found.phases)),
-        ("holes of a steady tone beside it", *(phase.control_holes for phase in found.phases)),
+        ("holes of another process's steady tone", *(phase.control_holes for phase in found.phases)),
         ("these together, ms", *(phase.control_holes_ms for phase in found.phases)),
         ("the longest of these, ms", *(phase.control_longest_ms for phase in found.phases)),
         ("fades", *(phase.fades for phase in found.phases)),
@@ -342,16 +374,19 @@ def play(
 @bench.command()
 def notes(
     json: Json = False,
-    by: Annotated[Literal["midi", "keys", "both"], typer.Option(help="What plays.")] = "both",
-    buffer: Annotated[str, typer.Option(help="low, medium, high, or 128 ... 2048 frames.")] = "medium",
-    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    by: Annotated[Literal["midi", "keys", "both"], typer.Option(help="What the notes are played by.")] = "both",
+    buffer: Annotated[
+        str, typer.Option(help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
+    ] = "medium",
+    seed: Annotated[int, typer.Option(min=0, help="Of the random single notes.")] = 0,
     patch: Annotated[
         str, typer.Option(metavar="PATCH", help="What is played, without its body and room.")
     ] = "classical_guitar",
 ) -> None:
-    """What notes sound like: a melody, chords, repeats, bends and a pedal, by MIDI and keys, recorded and measured.
+    """Pitch, loudness, damping and latency of notes, recorded.
 
-    Linux only; needs PulseAudio and Xvfb, for MIDI JACK as well, and touches nothing of the sound and screen in use.
+    A melody, chords, repeats, bends and a pedal are played by MIDI and by keys. Linux only. Needs PulseAudio, Xvfb
+    and, for MIDI, JACK; starts a sound server and a screen of its own, and leaves yours alone.
     """
     from app.commands.benchmarks.play.notes import measure
     from app.commands.console import Failure
@@ -414,15 +449,57 @@ def _spread_rows(name: str, spreads: Sequence[Spread | None]) -> list[tuple[obje
 
 
 @bench.command()
+def unplug(
+    json: Json = False,
+    times: Annotated[int, typer.Option(min=1, max=1000, help="How often the device goes and comes back.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    patch: Annotated[str, typer.Option(metavar="PATCH", help="What is played meanwhile.")] = "concert_harp",
+) -> None:
+    """The sound device is taken away and given back while the app is played. Status 1 where sound is not back in 2 s.
+
+    In turn the card goes, and the sound server. Linux only; needs PulseAudio and Xvfb, and touches nothing of the
+    sound and the screen in use.
+    """
+    from app.commands.benchmarks.play import unplug as bench
+    from app.commands.console import Failure
+    from app.patches.library import PatchError, find_patch
+
+    try:
+        found_patch = find_patch(patch).patch
+    except PatchError as error:
+        raise Failure(str(error)) from error
+    with progress("bench unplug") as report:
+        found = bench.measure(times, seed, found_patch, report)
+    if json:
+        print_json({**asdict(found), "in_time": found.in_time})
+    else:
+        _print_machine(found.machine)
+        print(f"{found.patch}; seed {found.seed}; loudest sample before {found.loudest_before:.3f}")
+        rows = [
+            (number, loss.kind, f"{loss.gone_s:.1f}", loss.back_s, f"{loss.loudest:.3f}", loss.holes)
+            for number, loss in enumerate(found.losses, 1)
+        ]
+        print_table(("", "what goes", "gone, s", "sound back, s", "loudest sample", "holes then"), rows)
+        if found.back_s:
+            print(f"sound back: median {statistics.median(found.back_s):.2f} s, worst {max(found.back_s):.2f} s")
+        print(f"within {bench.TARGET_S:g} s: {found.in_time} of {times}")
+        ends = "not within a few seconds" if found.ends_s is None else f"{found.ends_s:.2f} s after the key"
+        print(f"all notes stopped: {ends}; the app {'goes on' if found.alive else 'has ended'}")
+    if not found.passed:
+        raise typer.Exit(1)
+
+
+@bench.command()
 def soak(
     json: Json = False,
-    minutes: Annotated[float, typer.Option(min=0.01, help="How long.")] = 10.0,
-    playing: Annotated[bool, typer.Option("--playing", help="Twelve keys a second, without a pause.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is random.")] = 0,
+    minutes: Annotated[float, typer.Option(min=0.01, metavar="MIN", help="Duration in minutes.")] = 10.0,
+    playing: Annotated[bool, typer.Option("--playing", help="Twelve keys per second, without a pause.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random plucks and changes.")] = 0,
 ) -> None:
-    """The window under a restless user: holes in the sound, memory, threads, faults. Status 1 where there are faults.
+    """Holes, memory, threads and faults of a long session.
 
-    Linux only; needs PulseAudio, and touches nothing of the sound in use.
+    Of random plucks and changes, or, with --playing, of keys alone. Exit status 1 where there are faults. Linux only.
+    Needs PulseAudio; starts a sound server of its own, and leaves yours alone.
     """
     from app.commands.benchmarks.soak import soak as run_soak
 
@@ -445,13 +522,14 @@ def soak(
             ("longest stall of the window, s", found.longest_stall_s, 0.1),
             ("memory when settled, MiB", found.settled_mib, None),
             ("memory at the end, MiB", found.end_mib, None),
-            ("highest above settled, MiB", found.drift_mib, 20),
+            ("furthest from settled, MiB", found.drift_mib, 20),
             ("memory at its most, MiB", found.peak_mib, None),
             ("threads left", len(found.threads_left), 0),
             ("faults", sum(times for _, times in found.faults), 0),
         ]
         print_table(("what", "here", "target"), rows)
-        print("memory at rest, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.at_rest_mib))
+        when = "at each minute" if found.playing else "at rest"
+        print(f"memory {when}, MiB: " + ", ".join(f"{mib:.0f}" for mib in found.memory_mib))
         for kind, told in (("fault", found.faults), ("notice", found.notices)):
             for text, times in told:
                 print(f"{kind}, {times} times: {text}")

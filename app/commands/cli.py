@@ -1,7 +1,7 @@
 """The command line: `learned-strings` opens the app, its sub-commands work without a window.
 
-Exit status 0 on success, 2 on bad usage, 1 on a failure told in one line on standard error (with the
-environment variable LEARNED_STRINGS_DEBUG set, the traceback comes before it), 130 when interrupted.
+Exit status: 0 on success, 2 on bad usage, 130 when interrupted, 1 on any other failure, which is explained in one
+line on standard error (after its traceback where the environment variable LEARNED_STRINGS_DEBUG is set).
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def start(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
-    """Audition learned strings, compare them with the physics, and export WAV.
+    """Play learned strings, compare them with the physics, and export them as WAV.
 
-    Without a command, the app opens.
+    Without a command, the app opens. Every command has its own --help.
     """
     if context.invoked_subcommand is not None:
         return
@@ -116,13 +116,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def describe(error: Exception) -> str:
-    """A failure in one line: what, where and the remedy."""
+    """A failure in words, meant for one line: what failed, where, and the remedy."""
     if isinstance(error, ImportError) and error.name:
         return f"this needs {error.name}, which cannot be imported ({error}); install it, or use another command"
     if isinstance(error, OSError):
         if error.filename and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS):
             return explain(Path(os.fsdecode(error.filename)), error)
-        if error.errno is None and str(error):  # of this program's own words
+        if error.errno is None and str(error):  # raised by this program, with its own message
             return str(error)
         place = f"{error.filename}: " if error.filename else ""
         return f"{place}{error.strerror or error}; check the path, its permissions and the free space"

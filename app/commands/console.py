@@ -1,4 +1,4 @@
-"""What the commands say: results on standard output, everything else on standard error."""
+"""Output of the commands: results on standard output, notes, progress and failures on standard error."""
 
 from __future__ import annotations
 
@@ -7,50 +7,63 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
 from app.shared.durations import duration
 from engine.plain_text import one_line
 
-LINE_EVERY_S = 10.0  # of progress, where standard error is not a terminal
-WIDTH_WITHOUT_TERMINAL = 1000  # a line stays a line
+LINE_EVERY_S = 10.0  # between two lines of progress, where standard error is not a terminal
+WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped
 
 
 class Report(Protocol):
-    """Is told how far a piece of work is."""
+    """Called with the progress of a piece of work."""
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None) -> None:
-        """`share` in 0 … 1; `left_s` where the work knows better than its past speed what is left."""
+        """`share`: done, 0 … 1; `left_s`: the time left; None: it is estimated from the time taken so far."""
+
+
+class Shares:
+    """Progress of several pieces of work of equal length, one after the other."""
+
+    def __init__(self, report: Report, pieces: int) -> None:
+        self._report, self._pieces, self._begun = report, pieces, 0
+
+    def next(self) -> Callable[[float], None]:
+        """Begins the next piece; returns a function that is called with the share of it that is done, 0 … 1."""
+        before, self._begun = self._begun, self._begun + 1
+        return lambda share: self._report((before + share) / self._pieces)
 
 
 class Failure(Exception):
-    """A command cannot be done. The message is one line: what is wrong, where, and the remedy."""
+    """A command cannot be carried out. The message, one line, says what is wrong, where, and the remedy."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
 
 
 def say(text: str) -> None:
-    """One line on standard error, whatever a file's text holds."""
+    """Prints one line on standard error; line breaks and control characters in `text` are escaped."""
     print(f"learned-strings: {one_line(text)}", file=sys.stderr, flush=True)
 
 
 def use_any_output() -> None:
-    """Output that is not UTF-8 shows what it can: other characters are written as their codes."""
+    """Makes output in an encoding without some characters print their codes instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def print_json(value: Any) -> None:
+    """Prints JSON, with null for infinity and not-a-number, and unprintable characters escaped."""
     text = json.dumps(_finite(value), indent=2, allow_nan=False, ensure_ascii=False)
     print("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text))
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """A table; columns whose cells are numbers stand to the right."""
+    """Prints a table; columns of numbers are aligned to the right."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -66,9 +79,10 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 @contextmanager
 def progress(what: str) -> Iterator[Report]:
-    """A function that shows how far the work is and how long it will take.
+    """A function that shows the progress of the work and the time left: a bar in a terminal, else lines.
 
-    A bar where standard error is a terminal, else a line now and then.
+    Args:
+        what: the name of the work.
     """
     if not sys.stderr.isatty():
         yield _Lines(what)
@@ -93,7 +107,7 @@ def progress(what: str) -> Iterator[Report]:
 
 
 class _Lines:
-    """Progress for a log: a line at most every few seconds, none for what is quickly done."""
+    """Progress for a log: a line every `LINE_EVERY_S` at most, none for work that takes less."""
 
     def __init__(self, what: str) -> None:
         self._what = what
@@ -115,7 +129,7 @@ def _left(started: float, share: float, left_s: float | None) -> str:
 
 
 def number(value: float | None) -> str:
-    """An error for people: four digits, or a dash for one that is not known."""
+    """A number for people: four digits, or "-" for None."""
     return "-" if value is None else f"{value:.4g}"
 
 
@@ -126,7 +140,7 @@ def _cell(value: object) -> str:
 
 
 def _finite(value: Any) -> Any:
-    """JSON knows neither infinity nor not-a-number: null stands for them."""
+    """`value` with None for infinity and not-a-number, which JSON does not have."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from app.commands.arguments import Cache, Json, check_range, open_preset
-from app.commands.console import Failure, number, print_json, print_table, progress
+from app.commands import arguments
+from app.commands.arguments import Cache, Json, check_range, open_preset_of_string
+from app.commands.console import Failure, Shares, number, print_json, print_table, progress, say
 from app.commands.training import load_data
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
-    from app.commands.console import Report
     from engine.presets import Preset
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Split = Literal["validation", "test", "both"]
 WINDOWS = 4  # of the horizon
 LONGEST_PAST_S = 60.0
+FEWEST_PLUCKS = 10  # of a string that none was trained on
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
 TOLD = {
     "se": "standard error, by which trajectories are drawn (bootstrap)",
@@ -41,38 +42,53 @@ def evaluate(
     preset: Annotated[
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
-    split: Annotated[Split, typer.Option(help="The tables of the paper are of validation.")] = "validation",
-    past: Annotated[float, typer.Option(metavar="S", help="Go on so many s past the training horizon.")] = 0.0,
+    split: Annotated[
+        Split, typer.Option(help="Which trajectories; the paper's tables are of validation.")
+    ] = "validation",
+    past: Annotated[float, typer.Option(metavar="S", help="Measure so many s past the training horizon, too.")] = 0.0,
     partials: Annotated[
-        bool, typer.Option("--partials", help="Level, phase, frequency and decay of each mode, too.")
+        bool, typer.Option("--partials", help="Level, phase, frequency, decay and glide of each mode, too.")
     ] = False,
     trajectories: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Only the first N of a split; default all.")
     ] = None,
     table: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write every figure to a table, one a row.")
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write all figures to a CSV file, one per row.")
     ] = None,
     fresh: Annotated[
         int | None,
-        typer.Option("--held-out", min=10, max=10_000, metavar="N", help="Fresh plucks of its draw, not a split."),
+        typer.Option(
+            "--held-out",
+            min=FEWEST_PLUCKS,
+            max=10_000,
+            metavar="N",
+            help=f"Measure N new plucks instead of a split; default {FEWEST_PLUCKS} for a preset of many strings.",
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of --held-out.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draw of --held-out.")] = 1,
+    string: arguments.StringName = None,
+    rate: arguments.StringRate = None,
+    modes: arguments.StringModes = None,
     on: Annotated[
         str | None,
-        typer.Option("--on", metavar="CONFIG", help="A preset of many strings: on the data of this run, by name."),
+        typer.Option("--on", metavar="CONFIG", help="For a preset of many strings: measure it on this run's data."),
     ] = None,
     heard: Annotated[
-        bool, typer.Option("--heard", help="Instead: what a listener would notice of a few plucks, by name.")
+        bool, typer.Option("--heard", help="Instead, say in words what a listener would notice on a few plucks.")
     ] = False,
     everything: Annotated[bool, typer.Option("--all", help="With --heard: all presets.")] = False,
     write: Annotated[
-        bool, typer.Option("--write", help="With --heard: keep it beside the preset, for cards and browser.")
+        bool, typer.Option("--write", help="With --heard: add it to heard.csv beside the preset, for the app.")
     ] = False,
     cache: Cache = None,
     json: Json = False,
 ) -> None:
-    """Measure a preset's errors on the data set that it was trained with, beside those stored in it."""
+    """Measure a preset's errors on its own data set.
+
+    They are printed beside those stored in the preset. A preset of many strings is measured on new plucks of one.
+    """
     of_heard = (("--all", everything), ("--write", write))
+    of_string = (("--string", string), ("--rate", rate), ("--modes", modes))
     of_data = (
         ("--past", past),
         ("--partials", partials),
@@ -80,20 +96,26 @@ def evaluate(
         ("--csv", table),
         ("--held-out", fresh),
         ("--on", on),
+        *of_string,
     )
     for option, given in of_data if heard else of_heard:
         if given:
             raise typer.BadParameter(f"does not go {'with' if heard else 'without'} --heard", param_hint=option)
+    for option, given in of_string if on is not None else ():
+        if given:
+            raise typer.BadParameter("does not go with --on, whose run has a string", param_hint=option)
     if heard:
         _evaluate_heard(preset, everything, write, json)
         return
     if preset is None:
         raise typer.BadParameter("is missing: give a preset's name or file", param_hint="PRESET")
     check_range("--past", past, 0, LONGEST_PAST_S, "s")
-    loaded = open_preset(preset)
+    loaded = open_preset_of_string(preset, string, rate, modes)
     if on is not None:
         loaded = _on(loaded, on)
     info = loaded.info
+    if info.family is not None and on is None:
+        fresh = fresh or FEWEST_PLUCKS
     if 0 < past * info.rate_hz < 1:
         raise typer.BadParameter(f"must hold a sample of {info.rate_hz} Hz, not {past:g} s", param_hint="--past")
     configuration = _data_of(loaded, on)
@@ -113,11 +135,13 @@ def evaluate(
             except ValueError as error:
                 raise typer.BadParameter(str(error), param_hint="--seed") from error
         with progress("evaluate") as report:
-            shares = _Shares(report, len(splits) * (2 if partials else 1))
+            shares = Shares(report, len(splits) * (2 if partials else 1))
             measurement = _Measurement(loaded, data, past, partials, trajectories, shares)
             measured = {HELD_OUT if name == "all" else name: measurement.of(name) for name in splits}
         if file is not None:
             file.write(_csv(loaded.name, measured).encode())
+    for words in info.family.outside(info.string) if info.family is not None and on is None else ():
+        say(f"warning: {words}")
     if json:
         first = next(iter(measured.values()))
         facts = {
@@ -148,32 +172,19 @@ def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: boo
     show_heard(files if preset is None else [find_preset(preset, files)], write, json)
 
 
-class _Shares:
-    """Progress of several pieces of work, one after the other."""
-
-    def __init__(self, report: Report, pieces: int) -> None:
-        self._report, self._pieces, self._done = report, pieces, 0
-
-    def __call__(self, share: float) -> None:
-        self._report((self._done + share) / self._pieces)
-
-    def next(self) -> None:
-        self._done += 1
-
-
 @dataclass(frozen=True)
 class _Measurement:
-    """What is asked of a preset."""
+    """Measures a preset on a data set, as the options of `evaluate` ask for."""
 
     preset: Preset
     data: Dataset
     past_s: float
     partials: bool
     trajectories: int | None
-    report: _Shares
+    report: Shares
 
     def of(self, split: str) -> dict[str, Any]:
-        """Every figure of a split."""
+        """All figures of a split, by name."""
         from training.by_rise import errors_by_rise
         from training.evaluate import evaluate_past_horizon
         from training.results import SHORT_HORIZON
@@ -188,9 +199,8 @@ class _Measurement:
             horizon=info.horizon_steps,
             windows_s=[(0.0, info.horizon_s), *windows],
             trajectories=self.trajectories,
-            report=self.report,
+            report=self.report.next(),
         )
-        self.report.next()
         whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
         found: dict[str, Any] = {
             "trajectories": len(motion.string.per_trajectory()[0]),
@@ -232,7 +242,6 @@ class _Measurement:
                 found[name] = {"rel_mse": second.rel_mse, "rel_mae": second.rel_mae}
         if self.partials:
             found["partials"] = self._partials(split, windows)
-            self.report.next()
         return found
 
     def _stored(self, split: str) -> dict[str, float | None]:
@@ -249,7 +258,7 @@ class _Measurement:
         horizon_s, end_s = self.preset.info.horizon_s, windows[-1][1]
         windows = [(0.0, horizon_s), *([(horizon_s, end_s)] if self.past_s else []), *windows]
         errors = evaluate_partials(
-            self.preset.model, self.data, split, windows, trajectories=self.trajectories, report=self.report
+            self.preset.model, self.data, split, windows, trajectories=self.trajectories, report=self.report.next()
         )
         return [
             {
@@ -274,7 +283,7 @@ class _Measurement:
 
 
 def _on(preset: Preset, run: str) -> Preset:
-    """A preset of many strings, of the string, the rate, the modes and the horizon of a run's data."""
+    """A preset of many strings with the string, rate, modes and horizon of a run's data."""
     from engine.presets import of_string
     from training.by_name import load
 
@@ -287,17 +296,26 @@ def _on(preset: Preset, run: str) -> Preset:
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
-    """The data set that a preset names, or that of a run."""
+    """The data set of a preset, or of a run; for a string of many, of plucks as hard as the family's."""
     from engine.schema import SchemaError
     from training.by_name import load
-    from training.configuration import read_configuration
+    from training.configuration import DatasetConfiguration, read_configuration
 
     info = preset.info
     if on is not None:
         return load(on).data
     if info.family is not None:
-        raise Failure(
-            f"{preset.path}: learned many strings: `family evaluate` measures it on such, --on CONFIG on a run's data"
+        return DatasetConfiguration(
+            initial="pluck",
+            rate_hz=info.rate_hz,
+            modes=info.modes,
+            tension_modulated=info.tension_modulated,
+            steps=info.horizon_steps,
+            count=FEWEST_PLUCKS,
+            grid_points=info.grid_points,
+            seed=-1,  # no pluck of it was trained on, whatever --seed
+            string=info.string,
+            largest_tension_rise=info.family.tension_rise[1],
         )
     try:
         data = read_configuration(info.training, f"{preset.path}: metadata.training").data
@@ -362,10 +380,22 @@ def _by_rise(group: dict[str, Any]) -> list[object]:
 def _print_partials(split: str, found: dict[str, Any]) -> None:
     past = ", past the training horizon" if found["past_horizon"] else ""
     print(f"{split}, partials of {found['start_s']:g} … {found['stop_s']:g} s{past}: medians of the magnitudes")
-    columns = ("mode", "trajectories", "Hz", "level dB", "phase cycles", "cents", "T60 s", "T60 error %")
+    figures = ("Hz", "level dB", "phase cycles", "cents", "T60 s", "T60 error %", "glide cents", "glide error")
+    columns = ("mode", "trajectories", *figures)
     rows = [list(mode.values()) for mode in found["modes"]]
     w = found["weighted"]
-    mean = ["all, by energy", "", "", w["level_db"], w["phase_cycles"], w["cents"], "", ""]
+    mean = [
+        "all, by energy",
+        "",
+        "",
+        w["level_db"],
+        w["phase_cycles"],
+        w["cents"],
+        "",
+        "",
+        "",
+        w["glide_error_cents"],
+    ]
     print_table(columns, [*rows, mean])
 
 

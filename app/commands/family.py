@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Json, PresetName, open_preset
-from app.commands.console import Failure, number, print_json, print_table, progress
+from app.commands.arguments import Cache, Json, PresetName, check_range, open_preset
+from app.commands.console import Failure, Shares, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from app.commands.console import Report
-    from training.family.errors import StringError
+    from engine.presets import Preset
+    from training.family.errors import FamilyErrors, StringError
+    from training.family.partials import StringPartials
+    from training.family.strings import Column
 
 family = typer.Typer(help="One model of many strings.", no_args_is_help=True)
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
-RISES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
-MAP_RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
-MAP_INHARMONICITIES = (2e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)  # the first and the last range are beyond the family
+RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
+INHARMONICITIES = (2e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)  # the first and the last range are beyond the family
+PARTIALS = {  # figures of `_partials_facts`
+    "quiet_first_cents": "quiet pluck, the first mode's pitch, cents",
+    "quiet_cents_largest": "quiet pluck, any partial, cents",
+    "level_db_mean": "level of the partials by energy, dB",
+    "level_db_largest": "level of any, dB",
+    "t60_percent_mean": "T60 by energy, %",
+    "t60_percent_largest": "T60 of any, %",
+    "glide_cents_mean": "glide by energy, cents",
+    "glide_cents_largest": "glide of any, cents",
+}
 Strings = Annotated[int, typer.Option(min=1, max=10_000, help="Held-out strings of each column.")]
 Rate = Annotated[int, typer.Option(min=1_000, max=192_000, metavar="HZ", help="Sample rate.")]
 Seed = Annotated[int, typer.Option(min=0, help="Of the strings.")]
@@ -86,49 +96,36 @@ def evaluate(
     import torch
 
     from training.family.errors import Player, by_cell, by_rise, knowing_physics, measure, player
-    from training.family.strings import COLUMNS
 
     torch.set_num_threads(1)
     if picture is not None:
         from training.figures.style import check_format
 
         check_format(picture)
-    loaded = open_preset(preset)
-    if loaded.info.family is None:
-        raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")
+    loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     players |= knowing_physics() if baselines else {}
     players |= _trained(runs) if runs else {}
-    found: dict[str, Any] = {}
     own: list[Any] = []  # errors of the preset, both columns
     with progress("family evaluate") as report:
-        for place, column in enumerate(COLUMNS):
-            errors = measure(
-                players,
-                column,
-                "test",
-                strings,
-                rate,
-                (0.0, 1.0),
-                seed=seed,
-                report=partial(_report, report, place / 2, 0.2 if tenth else 0.5),
-            )
-            of_column = {name: _facts(one) for name, one in errors.items()}
-            of_preset = errors[loaded.name].strings
+        shares = Shares(report, 2 * (1 + (tenth > 0)))
+        measured = _measured(players, strings, rate, seed, shares)
+        found = {column: {name: _facts(one) for name, one in errors.items()} for column, errors in measured.items()}
+        for column, errors in measured.items():
+            of_preset, facts = errors[loaded.name].strings, found[column][loaded.name]
             own += of_preset
-            of_column[loaded.name]["by_rise"] = [
+            facts["by_rise"] = [
                 {"from": low, "to": high, "strings": len(part.strings), **_facts(part)}
-                for low, high, part in by_rise(of_preset, RISES)
+                for (low, high), part in by_rise(of_preset, RISES)
             ]
             if tenth:
                 alone = {loaded.name: players[loaded.name]}
-                told = partial(_report, report, place / 2 + 0.2, 0.3)
-                last = measure(alone, column, "test", tenth, rate, (9.0, 10.0), seed=seed, report=told)[loaded.name]
-                of_column[loaded.name]["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
-            found[column] = of_column
+                span_s, told = (9.0, 10.0), shares.next()
+                last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=told)[loaded.name]
+                facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
     cells = [
         {"rise": rises, "inharmonicity": edges, "strings": len(part.strings), **_facts(part)}
-        for rises, edges, part in (by_cell(own, MAP_RISES, MAP_INHARMONICITIES) if error_map else ())
+        for rises, edges, part in (by_cell(own, RISES, INHARMONICITIES) if error_map else ())
     ]
     if picture is not None:
         from training.figures.family_map import family_map
@@ -141,14 +138,14 @@ def evaluate(
         return
     for column_name, of_column in found.items():
         _print_column(column_name, of_column, strings, rate)
-        parts = of_column[loaded.name]["by_rise"]
+        facts = of_column[loaded.name]
         rows = [
             [f"{p['from']:g} … {p['to']:g}", p["strings"], number(p["geometric_mean"]), number(p["worst"])]
-            for p in parts
+            for p in facts["by_rise"]
         ]
         print_table(("rise of tension", "strings", "geometric mean", "worst"), rows)
         if tenth:
-            last = of_column[loaded.name]["tenth_second"]
+            last = facts["tenth_second"]
             print(
                 f"tenth second, {last['strings']} of {tenth} strings still sound: "
                 f"{number(last.get('geometric_mean'))}, worst {number(last.get('worst'))}; "
@@ -156,6 +153,50 @@ def evaluate(
             )
     if error_map:
         _print_map(cells)
+
+
+@family.command()
+def partials(
+    preset: PresetName,
+    strings: Strings = 200,
+    seconds: Annotated[float, typer.Option(help="After each pluck.")] = 0.5,
+    rate: Rate = 48_000,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Pitch after a quiet pluck, level, T60 and glide of the partials, on the held-out strings of `evaluate`.
+
+    Those of one string, mode by mode: `evaluate PRESET --string NAME --partials`.
+    """
+    import torch
+
+    from training.family.errors import player
+    from training.family.partials import QUIET_RISE, measure_partials
+    from training.family.strings import COLUMNS
+
+    check_range("--seconds", seconds, 0.25, 10, "s")  # thirds of it tell the glide of a low string
+    torch.set_num_threads(1)
+    loaded = _open_preset_of_many(preset)
+    play = player(loaded.model)
+    found: dict[str, dict[str, Any]] = {}
+    with progress("family partials") as report:
+        shares = Shares(report, len(COLUMNS))
+        for column in COLUMNS:
+            of_strings = measure_partials(
+                play, column, "test", strings, rate, seconds, seed=seed, report=shares.next()
+            )
+            found[column] = _partials_facts(of_strings)
+    if json:
+        facts = {"preset": loaded.name, "strings": strings, "seconds": seconds, "rate_hz": rate, "seed": seed}
+        print_json({**facts, "quiet_rise": QUIET_RISE, **found})
+        return
+    print(
+        f"{strings} strings a column, {seconds:g} s at {rate} Hz: errors of partials, of the middle string and of "
+        f"the worst; a quiet pluck raises the tension by {QUIET_RISE:g}, the other plucks are each string's own"
+    )
+    for column_name, figures in found.items():
+        rows = [[text, *figures[name].values()] for name, text in PARTIALS.items()]
+        print_table((column_name, "median", "worst", "worst at"), rows)
 
 
 @family.command()
@@ -175,17 +216,15 @@ def baseline(
     import torch
 
     from training.family.baselines import BASELINES, baseline_player
-    from training.family.errors import measure
-    from training.family.fit_baseline import checkpoint_file, fit_baseline
+    from training.family.fit_baseline import FRAMES, ROWS, checkpoint_file, fit_baseline
     from training.family.preset import read_configuration
-    from training.family.strings import COLUMNS
     from training.run import default_runs
 
     torch.set_num_threads(1)
     if name not in BASELINES:
         raise typer.BadParameter(f"{name!r} is not one of {', '.join(BASELINES)}", param_hint="NAME")
     with progress(f"family baseline {name}") as report:
-        model = fit_baseline(
+        fitted = fit_baseline(
             name,
             read_configuration(),
             checkpoint_file(runs or default_runs(), name),
@@ -196,15 +235,23 @@ def baseline(
                 p.share, f"step {p.steps}, train {p.train:.3g}, validation {p.validation:.3g}", p.left_s
             ),
         )
-    players, found = {name: baseline_player(model)}, {}
     with progress("family evaluate") as report:
-        for place, column in enumerate(COLUMNS):
-            told = partial(_report, report, place / 2, 0.5)
-            errors = measure(players, column, "test", strings, rate, (0.0, 1.0), seed=seed, report=told)
-            found[column] = {name: _facts(errors[name])}
+        measured = _measured({name: baseline_player(fitted.model)}, strings, rate, seed, Shares(report, 2))
+    found = {column: {name: _facts(errors[name])} for column, errors in measured.items()}
+    told = {
+        "parameters": sum(parameter.numel() for parameter in fitted.model.parameters()),
+        "steps": fitted.steps,
+        "train": fitted.train,
+        "validation": fitted.validation,
+    }
     if json:
-        print_json({"baseline": name, "minutes": minutes, "strings": strings, "rate_hz": rate, "seed": seed, **found})
+        facts = {"baseline": name, "minutes": minutes, "strings": strings, "rate_hz": rate, "seed": seed}
+        print_json({**facts, **told, **found})
         return
+    print(
+        f"{name}: {told['parameters']:,} numbers, {fitted.steps:,} steps of {ROWS} strings and {FRAMES} "
+        f"frames; geometric mean {number(fitted.train)} in training, {number(fitted.validation)} in validation"
+    )
     for column_name, of_column in found.items():
         _print_column(column_name, of_column, strings, rate)
 
@@ -219,8 +266,24 @@ def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any
         print(path)
 
 
-def _report(report: Report, start: float, length: float, share: float) -> None:
-    report(start + length * share)
+def _open_preset_of_many(name_or_path: str) -> Preset:
+    loaded = open_preset(name_or_path)
+    if loaded.info.family is None:
+        raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")
+    return loaded
+
+
+def _measured(
+    players: dict[str, Any], strings: int, rate_hz: int, seed: int, shares: Shares
+) -> dict[Column, dict[str, FamilyErrors]]:
+    """Errors of the first second by column and player."""
+    from training.family.errors import measure
+    from training.family.strings import COLUMNS
+
+    return {
+        column: measure(players, column, "test", strings, rate_hz, (0.0, 1.0), seed=seed, report=shares.next())
+        for column in COLUMNS
+    }
 
 
 def _trained(runs: Path) -> dict[str, Any]:
@@ -229,7 +292,7 @@ def _trained(runs: Path) -> dict[str, Any]:
     from training.family.fit_baseline import checkpoint_file, trained_baseline
 
     files = {name: checkpoint_file(runs, name) for name in BASELINES}
-    found = {name: baseline_player(trained_baseline(file)) for name, file in files.items() if file.exists()}
+    found = {name: baseline_player(trained_baseline(file).model) for name, file in files.items() if file.exists()}
     if not found:
         raise Failure(f"{runs}: no baseline was trained here; `family baseline NAME --runs {runs}` does")
     return {f"{name}, trained": play for name, play in found.items()}
@@ -253,6 +316,21 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
     return {"strings": len(pairs), **_facts(late), "over_first": late.geometric_mean / early.geometric_mean}
 
 
+def _partials_facts(strings: list[StringPartials]) -> dict[str, Any]:
+    """Of each figure the median over the strings and the worst; of a string's partials the mean or the largest."""
+    from training.family.partials import middle_and_worst
+
+    figures: dict[str, list[float]] = {"quiet_first_cents": [one.quiet_first_cents for one in strings]}
+    for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
+        for kind in ("mean", "largest"):
+            figures[f"{name}_{kind}"] = [getattr(getattr(one, name), kind) for one in strings]
+    facts = {}
+    for name, values in figures.items():
+        median, worst, place = middle_and_worst(values)
+        facts[name] = {"median": median, "worst": worst, "worst_at": "" if place is None else _place(strings[place])}
+    return facts
+
+
 def _print_map(cells: list[dict[str, Any]]) -> None:
     print("both columns: geometric mean; worst (strings), by rise of tension and inharmonicity B")
     told = {
@@ -262,21 +340,24 @@ def _print_map(cells: list[dict[str, Any]]) -> None:
         ): f"{cell['geometric_mean']:.1e}; {cell['worst']:.1e} ({cell['strings']})"
         for cell in cells
     }
-    edges = list(pairwise(MAP_INHARMONICITIES))
+    edges = list(pairwise(INHARMONICITIES))
     rows = [
         [f"{low:g} … {high:g}", *(told.get(((low, high), edge), "") for edge in edges)]
-        for low, high in pairwise(MAP_RISES)
+        for low, high in pairwise(RISES)
     ]
     print_table(("rise", *(f"B {low:g} … {high:g}" for low, high in edges)), rows)
 
 
-def _facts(errors: Any) -> dict[str, Any]:
+def _place(string: StringError | StringPartials) -> str:
+    return f"{string.pitch_hz:.0f} Hz, B {string.inharmonicity:.1e}, rise {string.tension_rise:.2f}"
+
+
+def _facts(errors: FamilyErrors) -> dict[str, Any]:
     worst = errors.worst
-    place = f"{worst.pitch_hz:.0f} Hz, B {worst.inharmonicity:.1e}, rise {worst.tension_rise:.2f}"
     return {
         "geometric_mean": errors.geometric_mean,
         "worst": worst.rel_mse,
         "share_large": errors.share_large,
         "processor_s": errors.processor_s,
-        "worst_at": place,
+        "worst_at": _place(worst),
     }

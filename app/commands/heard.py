@@ -1,4 +1,4 @@
-"""evaluate --heard: how true presets sound, by name, and the table that the browser reads it from."""
+"""evaluate --heard: how true presets sound, in words, and the table (`heard.csv`) from which the browser reads it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from app.commands.console import print_json, print_table, progress, say
 if TYPE_CHECKING:
     from training.heard_file import Heard
 
-COLUMNS = ("preset", "heard", "spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s")
+COLUMNS = ("preset", "heard", "spectra dB", "level dB", "rise dB", "cents", "second cents", "runs away s", "hum dB")
 
 
 def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
-    """Listens to presets and prints what is heard, the truest first; a broken one is told and hides no other.
+    """Compares the sound of presets with the truth and prints the differences, the truest preset first.
+
+    Presets that cannot be used are reported and left out.
 
     Args:
-        write: keep it in the table beside each preset.
+        write: add the results to the table beside each preset.
     """
     from app.presets.heard_words import heard_word
     from engine.presets import PresetError
@@ -52,10 +54,13 @@ def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
 
 
 def measure(path: Path, write: bool, report: Callable[[float], None] = lambda share: None) -> Heard:
-    """What is heard of a preset; into the table of its folder, where `write` says so.
+    """Compares the sound of a preset with the truth.
+
+    Args:
+        write: add the result to the table in the preset's folder.
 
     Raises:
-        PresetError, ValueError: it cannot be used, or not be let go from rest.
+        PresetError, ValueError: the file cannot be used, or its model cannot start from a displaced string at rest.
         OSError: the table cannot be written.
     """
     from engine.presets import load_preset
@@ -76,4 +81,5 @@ def _figures(heard: Heard) -> tuple[float | None, ...]:
         heard.pitch_cents,
         heard.split_cents,
         heard.runs_away_s,
+        heard.hum_db,
     )

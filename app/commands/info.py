@@ -1,4 +1,4 @@
-"""info: what a WAV file says of how it was made."""
+"""info: the recipe in a WAV file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ def info(
     file: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A file that render, batch or the app wrote.")],
     json: Json = False,
 ) -> None:
-    """Show the recipe of a WAV file; `render --recipe FILE.wav` makes it again."""
+    """Show the recipe of a WAV file.
+
+    `render --recipe FILE.wav` renders it again.
+    """
     from app.export.recipe import RecipeError, preset_of, read_recipe
     from app.presets.folders import usable_files
 

@@ -1,4 +1,4 @@
-"""presets, models: what there is."""
+"""presets, models: lists of them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PRESET_FIELDS = (
 
 
 def presets(json: Json = False) -> None:
-    """List the presets, the user's own among them. A broken file is told on standard error and hides no other."""
+    """List the presets, shipped and your own. Files that cannot be used are reported on standard error."""
     from app.presets.folders import usable_files
     from engine.presets import PresetError
     from training.heard_file import read_heard
@@ -48,7 +48,7 @@ def presets(json: Json = False) -> None:
             found.append(_facts(path, known))
         except PresetError as error:
             say(str(error))
-        except Exception as error:  # whatever one file brings about, the others are listed
+        except Exception as error:  # no fault of one file may keep the others from being listed
             say(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file")
     if json:
         print_json(found)
@@ -57,7 +57,7 @@ def presets(json: Json = False) -> None:
 
 
 def models(json: Json = False) -> None:
-    """List the models and their parameters at the paper's sizes."""
+    """List the models, with their parameters at the paper's sizes."""
     import torch
 
     from engine.models import MODELS, count_parameters

@@ -1,4 +1,4 @@
-"""simulate, predict, compare: motion of the whole string, from physics and from models."""
+"""simulate, predict, compare: the motion of the whole string, by the physics and by models."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (bat
 Steps = Annotated[int, typer.Option(min=1, help="Frames after the initial one.")]
 STRING_KINDS = ("linear", "nonlinear")
 Solver = Literal["fast", "dop853"]
-LONGEST_S = 600.0  # of a comparison
+LONGEST_S = 600.0  # the longest comparison
 
 
 def simulate(
@@ -36,21 +36,29 @@ def simulate(
         str,
         typer.Option(
             metavar="KIND|NAME|STRING.toml",
-            help='"linear" or "nonlinear" (tension-modulated), the nylon B3; or another one, by name or file.',
+            help='The paper\'s nylon B3, "linear" or "nonlinear" (tension-modulated); or a nonlinear string by name '
+            "(steel_e4) or as a file of its parameters.",
         ),
     ],
-    rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate in Hz.")],
-    modes: Annotated[int, typer.Option(min=1, help="Modes kept.")],
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate.")],
+    modes: Annotated[int, typer.Option(min=1, metavar="M", help="Number of modes.")],
     steps: Steps,
-    solver: Annotated[Solver, typer.Option(help="dop853 is slow: what the fast one is checked against.")] = "fast",
+    solver: Annotated[
+        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
+    ] = "fast",
     substeps: Annotated[
         int | None,
-        typer.Option(min=1, help="Of the fast solver, per sample: fewer are faster. Default: exact to 1e-7."),
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Sub-steps of the fast solver per sample: fewer are faster, and less accurate. Default: enough for "
+            "a relative error of 1e-7 on the paper's data.",
+        ),
     ] = None,
 ) -> None:
-    """Simulate the string by its physics.
+    """Simulate the motion of a string by the physics.
 
-    U0 is in metres, at rest, on any grid of at least MODES + 2 points.
+    U0 is its displacement at rest, in metres, on any grid of at least M + 2 points.
     """
     arguments.check_range("--rate", rate, 1, 1_000_000, "Hz")
     parameters, tension_modulated = _string_of(string)
@@ -90,9 +98,9 @@ def predict(
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,
 ) -> None:
-    """Predict the motion with a preset's model: of its own string at its own rate, unless told.
+    """Predict the motion of a string with a preset's model.
 
-    U0 is in metres, at rest, on the preset's grid.
+    U0 is its displacement at rest, in metres, on the preset's grid.
     """
     loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     from app.commands import arrays
@@ -112,7 +120,7 @@ def predict(
 
 
 def _outside_family(info: PresetInfo, initial: Tensor) -> list[str]:
-    """How a string, and displacements of it, lie beyond those that a preset of many has learned."""
+    """In which respects a string and its displacements lie outside those that a preset of many has learned."""
     if info.family is None:
         return []
     found = info.family.outside(info.string)
@@ -136,7 +144,7 @@ def compare(
 ) -> None:
     """Compare a preset's model with the physics on one pluck.
 
-    Relative errors over the whole grid, in total and by window.
+    Prints relative errors over the whole grid, in total, by second, and past the training horizon.
     """
     pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
@@ -195,7 +203,7 @@ def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
 
 
 def window_edges(seconds: float, info: PresetInfo) -> list[float]:
-    """Whole seconds and the training horizon, from 0 to `seconds`."""
+    """Times of the edges in s: whole seconds and the training horizon, from 0 to `seconds`."""
     inner = {float(second) for second in range(int(seconds) + 1)} | {info.horizon_s}
     return [*sorted(edge for edge in inner if edge < seconds), seconds]
 
@@ -221,7 +229,7 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 
 
 def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
-    """A string, and whether its stretch adds to its tension."""
+    """A string, and whether its tension is modulated by its stretch. Raises typer.BadParameter."""
     from engine.presets import PresetError, find_string, read_string
     from engine.resonators import StringParameters
 

@@ -9,7 +9,7 @@ FIELDS = ("name", "title", "category", "own", "description", "file")
 
 
 def patches(json: Json = False) -> None:
-    """List the patches, the user's own among them. A broken file is told on standard error and hides no other."""
+    """List the patches, shipped and your own. Files that cannot be used are reported on standard error."""
     from app.patches.library import list_patches
 
     entries, problems = list_patches()

@@ -1,4 +1,4 @@
-"""play: a MIDI file through a patch, to a WAV file."""
+"""play: a MIDI file, played by a patch, to a WAV file."""
 
 from __future__ import annotations
 
@@ -20,16 +20,19 @@ def play(
     patch: Annotated[str, typer.Option(metavar="PATCH", help="A patch's name, or the path of its file.")],
     out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
     source: Annotated[
-        Literal["model", "truth"], typer.Option(help="Whether the learned model sounds, or the solved string.")
+        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
     ] = "model",
     rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = DEFAULT_RATE_HZ,
     bits: BitsOption = "24",
     seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="How long the file is; default until all has died away.")
+        float | None, typer.Option(metavar="S", help="Duration in s; default until all notes have decayed.")
     ] = None,
-    normalise: Annotated[bool, typer.Option("--normalise", help="To -1 dBFS.")] = False,
+    normalise: Annotated[bool, typer.Option("--normalise", help="Normalise to -1 dBFS.")] = False,
 ) -> None:
-    """Play a MIDI file through a patch, faster than it sounds. The same files give the same samples."""
+    """Render a MIDI file, played by a patch, to WAV.
+
+    The same files give the same samples.
+    """
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
 
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
@@ -69,7 +72,7 @@ def play(
     except (ValueError, WriteError) as error:
         raise Failure(str(error)) from error
     took_s, level = time.monotonic() - began_s, written.level
-    say(
+    print(
         f"{out}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
         f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
     )

@@ -1,15 +1,15 @@
-"""render: a pluck to a WAV file, or again what a WAV file's recipe says."""
+"""render: a pluck to a WAV file, or the recipe of a WAV file once more."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from app.commands import arguments
 from app.commands.console import Failure, progress, say
-from app.shared.vocabulary import Pickup, Source
+from app.shared.vocabulary import Bits, Pickup, Source
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
@@ -18,29 +18,32 @@ if TYPE_CHECKING:
     from engine.presets import Preset
 
 Value = TypeVar("Value")
-SILENT_DB = -120.0
-
-Bits = Literal["16", "24", "32f"]  # app.export.wav.Bits, known without soundfile
+SILENT_DB = -120.0  # peak below which a note says that the file is silent
 
 Rate = Annotated[
     int | None,
     typer.Option(
         metavar="HZ",
-        help="Sample rate; default the preset's own. A model of many strings plays at it; others are resampled.",
+        help="Sample rate; default the preset's own. Only a preset of many strings gains bandwidth by a higher one.",
     ),
 ]
-BitsOption = Annotated[Bits, typer.Option(help="16 is dithered; 32f is floating point and never clips.")]
-Listen = Annotated[float, typer.Option(help="Where to listen, 0 … 1 as for --position.")]
+BitsOption = Annotated[Bits, typer.Option(help="16 (dithered) or 24 bits, or 32f: floating point, never clips.")]
+Listen = Annotated[float, typer.Option(metavar="X", help="Listening point: 0 and 1 are the fixed ends.")]
 ListenRight = Annotated[
-    float | None, typer.Option(help="Where the right channel listens; the file is stereo then.", metavar="PLACE")
+    float | None, typer.Option(help="Listening point of a right channel; without it the file is mono.", metavar="X")
 ]
-PickupOption = Annotated[Pickup, typer.Option(help="velocity is brighter by 6 dB an octave; 30 m/s are full scale.")]
+PickupOption = Annotated[
+    Pickup,
+    typer.Option(help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s."),
+]
 DecayDb = Annotated[
     float | None,
-    typer.Option(metavar="DB", help="End when the sound has fallen so far; --seconds is the longest then."),
+    typer.Option(metavar="DB", help="End when the sound has decayed by so much, after --seconds at the latest."),
 ]
-GainDb = Annotated[float, typer.Option(help="How much louder the difference is made, in dB.")]
-Normalise = Annotated[bool, typer.Option("--normalise", help="To -1 dBFS, one gain for model and truth.")]
+GainDb = Annotated[float, typer.Option(metavar="DB", help="Gain of the difference.")]
+Normalise = Annotated[
+    bool, typer.Option("--normalise", help="Normalise to -1 dBFS, with one gain for model and truth.")
+]
 
 
 def render(
@@ -48,9 +51,9 @@ def render(
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
     out: Annotated[Path | None, typer.Argument(metavar="OUT.wav", help="The file to write.")] = None,
-    position: Annotated[float | None, typer.Option(help=arguments.POSITION_HELP)] = None,
-    amplitude_mm: Annotated[float | None, typer.Option(help=arguments.AMPLITUDE_HELP)] = None,
-    seconds: Annotated[float | None, typer.Option(help=arguments.SECONDS_HELP)] = None,
+    position: Annotated[float | None, typer.Option(metavar="X", help=arguments.POSITION_HELP)] = None,
+    amplitude_mm: Annotated[float | None, typer.Option(metavar="MM", help=arguments.AMPLITUDE_HELP)] = None,
+    seconds: Annotated[float | None, typer.Option(metavar="S", help=arguments.SECONDS_HELP)] = None,
     string: arguments.StringName = None,
     modes: arguments.StringModes = None,
     rate: Rate = None,
@@ -60,7 +63,7 @@ def render(
     pickup: PickupOption = "displacement",
     source: Annotated[
         Source,
-        typer.Option(help="difference is model minus truth; both has the model on the left, the truth on the right."),
+        typer.Option(help="truth: the solved physics; difference: model minus truth; both: model left, truth right."),
     ] = "model",
     difference_gain_db: GainDb = 0.0,
     decay_db: DecayDb = None,
@@ -71,12 +74,15 @@ def render(
         Path | None,
         typer.Option(
             metavar="FILE.wav",
-            help="Render again what this file's recipe says; then only OUT.wav is given, by default a name after "
-            "the recipe in this folder.",
+            help="Render the recipe in this WAV file again. Give only OUT.wav with it; by default its name follows "
+            "from the recipe, in the current folder.",
         ),
     ] = None,
 ) -> None:
-    """Render a pluck to a WAV file. 10 mm of displacement at the listening point are full scale."""
+    """Render a pluck to a WAV file. 10 mm of displacement at the listening point are full scale.
+
+    PRESET, OUT.wav, --position, --amplitude-mm and --seconds are needed, except with --recipe.
+    """
     if recipe is not None:
         if out is not None or any(value is not None for value in (position, amplitude_mm, seconds, string, modes)):
             raise typer.BadParameter(
@@ -111,7 +117,7 @@ def check_sound(
     difference_gain_db: float,
     decay_db: float | None,
 ) -> None:
-    """Checks the ranges of options that every command that writes sound has."""
+    """Checks the ranges of the options that `render` and `batch` share. Raises as `arguments.check_range`."""
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
     from app.export.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB
 
@@ -127,7 +133,7 @@ def check_sound(
 
 
 def check_shortest(preset: Preset, seconds: float) -> None:
-    """A sound has a sample at least."""
+    """Checks that `seconds` are one sample of the preset's own rate at least. Raises typer.BadParameter."""
     if round(seconds * preset.info.rate_hz) < 1:
         raise typer.BadParameter(
             f"must hold a sample of {preset.info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
@@ -166,7 +172,7 @@ def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
 
     with progress("render") as report:
         written = export_sound(request, out, settings, progress=report)
-    for note in _notes(request, written):  # after the work: a failure is told in one line, alone
+    for note in _notes(request, written):  # after the work, so that a failure is the only line
         say(note)
     if written.peak_db < SILENT_DB:
         say("note: the file is silent; amplitude 0, or the string does not move at the listening point")

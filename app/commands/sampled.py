@@ -1,52 +1,55 @@
-"""sampled: a patch as an instrument for samplers, SFZ or SoundFont 2."""
+"""sampled: a patch as an instrument for samplers, in SFZ or SoundFont 2."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from app.commands.console import Failure, progress, say
+from app.shared.key_names import key_named
 
-ASKED_ABOVE_BYTES = 2**30
+ASKED_ABOVE_BYTES = 2**30  # refused without --yes
 
 
 def sampled(
     patch: Annotated[str, typer.Argument(metavar="PATCH", help="A patch's name or the path of its file.")],
     out: Annotated[Path, typer.Argument(metavar="OUT.sfz|OUT.sf2", help="An SFZ has a folder of samples beside it.")],
     keys: Annotated[
-        str | None, typer.Option(metavar="LOW-HIGH", help="MIDI keys, as in 40-76; default all of the patch.")
+        str | None, typer.Option(metavar="LOW-HIGH", help="Keys, as in E2-E5 or 40-76; default all of the patch.")
     ] = None,
     every: Annotated[
-        int, typer.Option(metavar="N", help="A sample for every N keys; those between are transposed.")
+        int, typer.Option(metavar="N", help="Sample one of every N keys; the others transpose its samples.")
     ] = 1,
     layers: Annotated[int, typer.Option(metavar="N", help="Velocity layers.")] = 4,
     seconds: Annotated[
-        float, typer.Option(help="The longest sample; one that still rings is faded out. Silent ones end sooner.")
+        float, typer.Option(metavar="S", help="Longest sample in s; what still rings then is faded out.")
     ] = 8.0,
     rate: Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")] = 48_000,
     form: Annotated[
-        Literal["flac", "wav"] | None, typer.Option("--format", help="Of an SFZ's samples; default flac.")
+        Literal["flac", "wav"] | None, typer.Option("--format", help="Of the samples of an SFZ; default flac.")
     ] = None,
     bits: Annotated[
-        Literal["16", "24"] | None, typer.Option(help="Of an SFZ's samples; default 24. A SoundFont has 16.")
+        Literal["16", "24"] | None, typer.Option(help="Of the samples of an SFZ; default 24. A SoundFont has 16.")
     ] = None,
-    source: Annotated[Literal["model", "truth"], typer.Option(help="What plays the patch.")] = "model",
+    source: Annotated[
+        Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
+    ] = "model",
     dry: Annotated[
-        bool, typer.Option("--dry", help="Without the patch's room, which would end with each key that is let go.")
+        bool, typer.Option("--dry", help="Leave out the patch's room, whose tail would end at each key's release.")
     ] = False,
-    size_only: Annotated[bool, typer.Option("--size-only", help="Tell the size, and render nothing.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Go on, however large it is.")] = False,
+    size_only: Annotated[bool, typer.Option("--size-only", help="Print the size, and render nothing.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Allow more than 1 GiB.")] = False,
 ) -> None:
-    """Render a patch for a sampler: each key at several velocities, without loops.
+    """Render a patch as an instrument for samplers.
 
-    An export that was stopped goes on with the same command: whole samples are kept while the patch is the same.
+    Each key is rendered at several velocities, without loops. The same command continues an export that was stopped:
+    whole samples are kept as long as the patch is the same.
     """
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
-    from app.export.sampled.words import counted, largest_bytes, megabytes, notes
+    from app.export.sampled.words import counted, megabytes, needed_bytes, notes, size_words
     from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
@@ -81,12 +84,11 @@ def sampled(
         planned(plan, out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    size = largest_bytes(plan, soundfont)
-    words = f"{counted(plan)}, at most {megabytes(size)}"
+    words = f"{counted(plan)}, {size_words(plan, soundfont)}"
     if size_only:
         print(f"{out}: {words}")
         return
-    if size > ASKED_ABOVE_BYTES and not yes:
+    if needed_bytes(plan, soundfont) > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
     say(words)
     from engine.presets import load_preset
@@ -103,7 +105,9 @@ def sampled(
 def _keys(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
-    found = re.fullmatch(r"\s*(\d{1,3})\s*(?:-\s*(\d{1,3})\s*)?", text, re.ASCII)
-    if not found:
-        raise typer.BadParameter(f"must be two MIDI keys as in 40-76, not {text!r}", param_hint="--keys")
-    return int(found[1]), int(found[2] or found[1])
+    parts = [(text, text), *((text[:place], text[place + 1 :]) for place, sign in enumerate(text) if sign == "-")]
+    for part in parts:  # C-1 has a minus of its own
+        low, high = map(key_named, part)
+        if low is not None and high is not None:
+            return low, high
+    raise typer.BadParameter(f"must be two keys as in E2-E5 or 40-76, not {text!r}", param_hint="--keys")

@@ -1,4 +1,4 @@
-"""sweep, results merge, results measure: many runs, and the file of their rows."""
+"""sweep, results merge, results measure: many runs, and the results file with their rows."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Json
+from app.commands.arguments import Cache, Device, Json, Runs
 from app.commands.console import Failure, number, print_json, print_table, say
 from app.shared.durations import duration
 from engine.plain_text import one_line
@@ -24,11 +24,10 @@ if TYPE_CHECKING:
     from training.sweeping.plan import Plan, Run
     from training.sweeping.workers.base import Noted, Progressed
 
-Device = Literal["cpu", "cuda", "auto"]
-LINE_EVERY_S = 60.0  # of a run's progress, where standard error is not a terminal
-NAMED = 3  # failed runs in a message
+LINE_EVERY_S = 60.0  # between two lines of a run's progress, where standard error is not a terminal
+NAMED = 3  # failed runs that a message names at most
 
-results = typer.Typer(no_args_is_help=True, help="The results file: one row a run.", rich_markup_mode=None)
+results = typer.Typer(no_args_is_help=True, help="The results file: one row per run.", rich_markup_mode=None)
 Results = Annotated[Path | None, typer.Option(help="The results file; default training/results.csv.")]
 
 
@@ -37,30 +36,31 @@ def sweep(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="A Dask scheduler, as tls://HOST:PORT; default workers on this machine."
+            metavar="ADDRESS", help="A Dask scheduler, such as tls://HOST:PORT; default workers on this machine."
         ),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Runs at once; default one on each core, or --per-device on each GPU.")
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of the CPU in each worker.")] = None,
-    device: Annotated[Device, typer.Option(help="auto takes CUDA devices where there are some.")] = "auto",
+    device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "auto",
     per_device: Annotated[
         int, typer.Option(min=1, help="Runs at once on each GPU: several small models fill it better than one.")
     ] = 1,
     results: Annotated[
         Path | None,
-        typer.Option(help="The results file; default training/results.csv, for a trial one in its folder of runs."),
+        typer.Option(help="The results file; default training/results.csv, or, for a trial, one in --runs."),
     ] = None,
-    runs: Annotated[Path | None, typer.Option(help="Folder of runs, each with its checkpoint and log.csv.")] = None,
+    runs: Runs = None,
     cache: Cache = None,
     retries: Annotated[int, typer.Option(min=0, help="Further tries of a run that failed.")] = 1,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the runs in their order, and do nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the runs in their order, and train none.")] = False,
     json: Json = False,
 ) -> None:
-    """Train all that a plan names, the most valuable first; one row a run goes to the results file.
+    """Train all runs of a plan.
 
-    What is finished is skipped, and what failed is tried again: the same command goes on after any interruption.
+    In the plan's order; each adds a row to the results file. Finished runs are skipped and failed ones tried again:
+    the same command continues after an interruption.
     """
     from training.results import read_results
     from training.sweeping.plan import load_plan
@@ -83,8 +83,8 @@ def sweep(
         options = Options(file, runs, cache, device, threads, retries)
         if open_to_anybody(scheduler):
             say(
-                f"warning: {scheduler} asks nobody who they are and encrypts nothing: whoever reaches it can run code"
-                " on its workers; use tls:// with certificates, or a network of your own"
+                f"warning: {scheduler} neither authenticates nor encrypts: anyone who can connect to it can run code"
+                " on its workers; use tls:// with certificates, or a private network"
             )
         opened = cluster_workers(scheduler, workers)
     say(f"{chosen.name}: {left} of {len(chosen.runs)} runs to do; rows go to {file}")
@@ -109,9 +109,9 @@ def merge(
     ],
     results: Results = None,
 ) -> None:
-    """Add the rows of other results files. Of one run the later row stays, and one that is done before any other.
+    """Add the rows of other results files. Of several rows of a run the latest is kept, a finished one before others.
 
-    Rows of an earlier version are found under this one's digests, as far as their names still mean their runs.
+    Rows of an earlier version get the digests of this version where their names still mean the same runs.
     """
     from training.migration import migrated
     from training.results import RESULTS, add_rows, read_results
@@ -132,9 +132,9 @@ def measure(
     results: Results = None,
     cache: Cache = None,
 ) -> None:
-    """Fill what earlier rows lack, standard errors over the trajectories, by measuring their presets again.
+    """Add the standard errors that earlier rows lack.
 
-    Nothing is trained, and no figure that a row has is changed.
+    Their presets are measured again. Nothing is trained, and no figure that a row has is changed.
     """
     from engine.presets import find_preset, preset_files, read_info
     from training.results import RESULTS, add_rows, read_results
@@ -169,7 +169,11 @@ def _list(plan: Plan, known: list[Row], json: bool) -> None:
 
 
 def _tell(rows: list[Row], json: bool) -> None:
-    """The rows on standard output; failed ones are the command's failure."""
+    """Prints the rows.
+
+    Raises:
+        Failure: one has failed.
+    """
     from engine.schema import write
 
     if json:
@@ -192,18 +196,20 @@ def _time(row: Row) -> str:
 
 @dataclass
 class Board:
-    """How far a sweep is.
+    """The progress of a sweep.
 
     Attributes:
-        left: runs that have not ended.
-        running: the last that each run told, None: nothing so far.
+        left: number of runs that have not ended.
+        ended: number of runs by status.
+        running: the last report of each run; None before its first.
+        maes: of the last validation of each run.
     """
 
     left: int
     ended: dict[str, int] = field(default_factory=lambda: {"done": 0, "diverged": 0, "failed": 0})
     running: dict[str, Progressed | None] = field(default_factory=dict)
-    maes: dict[str, float] = field(default_factory=dict)  # of the last validation
-    _seconds: list[float] = field(default_factory=list)  # of runs that are done
+    maes: dict[str, float] = field(default_factory=dict)
+    _seconds: list[float] = field(default_factory=list)  # that finished runs took
 
     def started(self, run: Run) -> None:
         self.running[run.name] = None
@@ -223,7 +229,7 @@ class Board:
             self._seconds.append(row.seconds)
 
     def seconds_left(self, at_once: int) -> float | None:
-        """Until all is done, if what waits takes as long as what is known; None where nothing is known."""
+        """Until all runs have ended, `at_once` at a time, if each takes as long as those so far; None: unknown."""
         told = [event.progress for event in self.running.values() if event]
         whole = self._seconds + [progress.seconds + progress.seconds_left for progress in told]
         if not whole:
@@ -246,7 +252,7 @@ class Board:
 
 
 class _Lines:
-    """A sweep as lines of a log."""
+    """Shows a sweep as lines of a log."""
 
     def __init__(self, board: Board, at_once: int) -> None:
         self._board, self._at_once = board, at_once
@@ -277,7 +283,7 @@ class _Lines:
 
 
 class _Live(_Lines):
-    """A sweep as a picture of what runs, below the lines."""
+    """Shows a sweep as lines with a live table of the present runs below them."""
 
     def progressed(self, event: Progressed) -> None:
         self._board.progressed(event)
@@ -296,7 +302,7 @@ class _Live(_Lines):
 
 @contextmanager
 def _watching(left: int, capacity: Any) -> Iterator[_Lines]:
-    """What is told on standard error: a live picture in a terminal, else lines."""
+    """What shows the sweep on standard error: a live table in a terminal, else lines."""
     if not sys.stderr.isatty():
         yield _Lines(Board(left), capacity())
         return
@@ -305,6 +311,6 @@ def _watching(left: int, capacity: Any) -> Iterator[_Lines]:
 
     console = Console(stderr=True, markup=False, highlight=False)
     watch = _Live(Board(left), capacity())
-    # what is printed meanwhile is shown above the picture
+    # lines that are printed meanwhile appear above the table
     with Live(get_renderable=watch.picture, console=console, refresh_per_second=2, transient=True):
         yield watch

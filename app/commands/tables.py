@@ -1,4 +1,4 @@
-"""table, figure: the results beside the paper's, and pictures of presets."""
+"""table, figure: the results beside the paper's, and figures of presets."""
 
 from __future__ import annotations
 
@@ -20,14 +20,18 @@ if TYPE_CHECKING:
     from app.commands.console import Report
     from engine.presets import Preset
 
-figure = typer.Typer(help="Draw presets beside the truth: PNG, SVG or PDF.", no_args_is_help=True)
+figure = typer.Typer(help="Draw figures of presets beside the truth, as PNG, SVG or PDF.", no_args_is_help=True)
 
 PresetNames = Annotated[
     list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
 ]
-Trajectory = Annotated[int, typer.Option(min=0, help="Which one of the validation set.")]
-Listen = Annotated[float, typer.Option(help="Listening point in lengths of the string; 0.37 is the paper's 24 cm.")]
-Output = Annotated[Path | None, typer.Option(help="The file; its suffix is the format. Default: FIGURE.png, here.")]
+Trajectory = Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")]
+Listen = Annotated[
+    float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
+]
+Output = Annotated[
+    Path | None, typer.Option(help="The file; its suffix gives the format. Default FIGURE.png in this folder.")
+]
 MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
 LISTEN_RANGE = (0.01, 0.99)
 
@@ -35,15 +39,19 @@ LISTEN_RANGE = (0.01, 0.99)
 def table(
     results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
     recipe: Annotated[
-        Literal["ours", "blind", "hinted", "paper", "all"], typer.Option(help="Whose recipe the runs followed.")
+        Literal["ours", "blind", "hinted", "paper", "all"],
+        typer.Option(help="Only runs of this recipe of training/recipes."),
     ] = "all",
-    format: Annotated[Literal["markdown", "csv"], typer.Option(help="csv is tidy: a line a cell.")] = "markdown",
+    format: Annotated[
+        Literal["markdown", "csv"], typer.Option(help="csv has a line for each cell (tidy data).")
+    ] = "markdown",
     rows: Annotated[
         bool, typer.Option("--rows", help="List the runs behind the figures, with the command that repeats each.")
     ] = False,
-    output: Annotated[Path | None, typer.Option(help="A file in place of standard output.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Write to this file instead of standard output.")] = None,
     into: Annotated[
-        Path | None, typer.Option(metavar="FILE.md", help=f"Put them into a file, in place of all after {MARKER}.")
+        Path | None,
+        typer.Option(metavar="FILE.md", help=f"Replace all that follows the line {MARKER} in this file."),
     ] = None,
 ) -> None:
     """Print the paper's two tables with our results beside its figures."""
@@ -70,10 +78,10 @@ def table(
 
 
 def _before(document: Path) -> str:
-    """What stands in a document up to its marker, and the marker."""
+    """A document up to its marker, which is included."""
     kept, marker, _ = document.read_text(encoding="utf-8").partition(f"{MARKER}\n")
     if not marker:
-        raise Failure(f"{document}: has no line {MARKER}; put it where the tables shall begin")
+        raise Failure(f"{document}: has no line {MARKER}; put it where the tables are to begin")
     return f"{kept}{marker}\n"
 
 
@@ -81,11 +89,14 @@ def _before(document: Path) -> str:
 def evolution(
     presets: PresetNames,
     trajectory: Trajectory = 0,
-    seconds: Annotated[float, typer.Option(help="From the start on.")] = 0.1,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Time shown, from the start, in s.")] = 0.1,
     listen: Listen = DEFAULT_LISTEN,
     output: Output = None,
 ) -> None:
-    """Displacement of the whole string over time, errors, and spectra (the paper's Fig. 2)."""
+    """Figure 2 of the paper: displacement, errors and spectra.
+
+    Of the whole string over time.
+    """
     from training.figures import evolution as drawing
 
     check_range("--listen", listen, *LISTEN_RANGE)
@@ -101,13 +112,20 @@ def evolution(
 @figure.command()
 def extrapolation(
     presets: PresetNames,
-    seconds: Annotated[float | None, typer.Option(help="Default: twice the training horizon.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(metavar="S", help="Time shown, in s; default twice the training horizon.")
+    ] = None,
     trajectory: Trajectory = 0,
-    trajectories: Annotated[int, typer.Option(min=1, help="Of the validation set, for the common error.")] = 10,
+    trajectories: Annotated[
+        int, typer.Option(min=1, help="How many of the validation set the error is taken over, from the first on.")
+    ] = 10,
     listen: Listen = DEFAULT_LISTEN,
     output: Output = None,
 ) -> None:
-    """Waveforms, spectra and errors before and past the end of training (the paper's Fig. 3)."""
+    """Figure 3 of the paper: past the training horizon.
+
+    Waveforms, spectra and errors, up to the horizon and past it.
+    """
     from training.figures import extrapolation as drawing
 
     check_range("--listen", listen, *LISTEN_RANGE)
@@ -124,13 +142,18 @@ def extrapolation(
 @figure.command()
 def error(
     presets: PresetNames,
-    seconds: Annotated[float | None, typer.Option(help="Default: one and a half times the training horizon.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(metavar="S", help="Time shown, in s; default 1.5 times the training horizon.")
+    ] = None,
     trajectories: Annotated[
-        int | None, typer.Option(min=1, help="Of the validation set, from the first on; default all.")
+        int | None, typer.Option(min=1, help="How many of the validation set, from the first on; default all.")
     ] = None,
     output: Output = None,
 ) -> None:
-    """Relative error in each time step, over the validation set (the paper's Fig. 4)."""
+    """Figure 4 of the paper: relative error in each time step.
+
+    Over the validation set.
+    """
     from training.figures import error as drawing
 
     if seconds is not None:
@@ -140,7 +163,10 @@ def error(
 
 @figure.command()
 def eigenvalues(presets: PresetNames, output: Output = None) -> None:
-    """Learned eigenvalues in the unit circle, decay rates over frequency, beside the linear string's."""
+    """Learned eigenvalues beside the linear string's.
+
+    In the unit circle, and as decay rates over frequency.
+    """
     from training.figures import eigenvalues as drawing
 
     _write(presets, output, "eigenvalues", lambda loaded, report: drawing.eigenvalues(loaded))

@@ -1,13 +1,13 @@
-"""dataset, train: data sets and presets."""
+"""dataset, train: a run's data set and its training."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Json
+from app.commands.arguments import Cache, Device, Json, Runs
 from app.commands.console import Failure, number, print_json, progress, say
 from app.shared.durations import duration
 
@@ -20,13 +20,19 @@ if TYPE_CHECKING:
     from training.fitting.fit import Progress
 
 Configuration = Annotated[
-    str, typer.Argument(metavar="CONFIG", help="A configuration's name, or the path of its .toml file.")
+    str,
+    typer.Argument(
+        metavar="CONFIG",
+        help="The name of a run (a cell of the tables, or a file of training/configurations), or a .toml file.",
+    ),
 ]
-Device = Literal["cpu", "cuda", "auto"]
 
 
 def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> None:
-    """Make the data set of a training configuration, or find it in the cache, and describe it."""
+    """Make and describe the data set of a run.
+
+    A data set that is in the cache is not made again.
+    """
     from training.by_name import load
     from training.data.dataset import dataset_folder, dataset_key, draw_initial
 
@@ -60,14 +66,14 @@ def train(
     output: Annotated[
         Path | None, typer.Option(help="The preset to write; default presets/CONFIG.safetensors.")
     ] = None,
-    runs: Annotated[Path | None, typer.Option(help="Folder of runs, each with its checkpoint and log.csv.")] = None,
-    device: Annotated[Device, typer.Option(help="auto takes a CUDA device where there is one.")] = "cpu",
+    runs: Runs = None,
+    device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "cpu",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of the CPU; default all cores.")] = None,
     cache: Cache = None,
 ) -> None:
-    """Train a preset: data set, fit, and the errors of the preset that was written.
+    """Train a preset and measure its errors.
 
-    An interrupted run goes on where it was; the same command continues it.
+    Its data set is made if needed. The same command continues a run that was interrupted.
     """
     import torch
 
@@ -114,19 +120,19 @@ def train(
 
 
 def _tell_heard(file: Path) -> None:
-    """Listens to the preset that was written; kept beside it, where cards and browser look."""
+    """Compares the sound of the preset with the truth, and adds the result to the table beside it."""
     from app.commands.heard import measure
     from app.presets.heard_words import heard_word
 
     try:
         with progress("listen") as report:
             print(f"heard       {heard_word(measure(file, True, report))}")
-    except ValueError as error:  # a model that cannot be let go from rest
+    except ValueError as error:  # the model cannot start from a displaced string at rest alone
         say(f"not listened to: {error}")
 
 
 def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Dataset:
-    """A data set from the cache, or made, with its progress told."""
+    """The data set of a configuration, from the cache or made, with its progress shown."""
     from training.data.dataset import load_dataset
 
     with progress("data set") as report:

@@ -1,7 +1,7 @@
 """A batch: positions × amplitudes × presets × strings × sources, a WAV file each, and an index of them as CSV.
 
-A batch that was stopped goes on where it was: a file that is there with the same recipe and has its row is kept. The
-index is written anew after every pluck; files that a kill left without their rows are made again, as they were.
+A batch that was stopped continues: a file with the same recipe and a row in the index is kept. The index is written
+after every pluck; files that have no row yet, because the process was killed, are rendered again.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from engine.presets import Preset, load_preset, of_string
 from engine.resonators.string import StringParameters
 from engine.sources import Runaway
 
-BatchProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known
+BatchProgress = Callable[[float, str, float | None], None]  # share done, what is rendered, seconds left if known
 
 
 @dataclass(frozen=True)
 class NamedString:
-    """A string for presets of many, and its name in the index and in names of files."""
+    """A string for presets of many strings, with its name in the index and in file names."""
 
     name: str
     parameters: StringParameters
@@ -46,18 +46,19 @@ class Instrument:
 
     @property
     def name(self) -> str:
+        """As in file names."""
         return f"{self.preset.stem}_{self.string.name}" if self.string else self.preset.stem
 
 
 @dataclass(frozen=True)
 class BatchPlan:
-    """What a batch makes. Everything that is one value is the same for all files, as in `SoundRequest`.
+    """What a batch renders. Fields that are no lists are the same for all files, as in `SoundRequest`.
 
     Attributes:
-        pluck: its shape and width count; position and amplitude come from the lists.
-        overwrite: render also what is there already.
+        pluck: gives shape and width; position and amplitude come from the lists.
+        overwrite: render files again that are there already.
         strings: each preset plays all of these; empty: its own string.
-        modes: of a preset of many strings; None: all below 20 kHz. Its model plays at the files' rate.
+        modes: how many a preset of many strings has; None: all below 20 kHz. Its model plays at the files' rate.
 
     Raises:
         ValueError: a list is empty or has a value twice, or a pluck is out of its range.
@@ -94,6 +95,7 @@ class BatchPlan:
 
     @property
     def files(self) -> int:
+        """How many there are in all."""
         strings = max(1, len(self.strings))
         return len(self.presets) * strings * len(self.positions) * len(self.amplitudes_mm) * len(self.sources)
 
@@ -141,12 +143,15 @@ def run_batch(
     progress: BatchProgress = lambda share, text, left_s: None,
     cancelled: Cancelled = lambda: False,
 ) -> list[BatchRow]:
-    """Makes the files and the index, in the plan's folder, which is made where it is not there.
+    """Renders the files and writes the index, in the plan's folder, which is made if needed.
 
-    A preset or a pluck that fails does not hinder the others: its row says why.
+    Where a preset or a pluck fails, its row says why, and the others are still rendered.
+
+    Returns:
+        A row for each file.
 
     Raises:
-        ExportCancelled: `cancelled` said so; whole files and their rows stay.
+        ExportCancelled: `cancelled` returned True; whole files and their rows stay.
         ExportError: the folder or the index cannot be written.
     """
     try:
@@ -176,7 +181,7 @@ def run_batch(
 
 
 def _sorted_out(plan: BatchPlan, index: BatchIndex) -> tuple[list[_Job], list[BatchRow]]:
-    """What is to be rendered, and rows of what is not: kept, or of a preset that cannot be used."""
+    """What is to be rendered, and the rows of all else: files that are kept, or a preset that cannot be used."""
     jobs, rows = [], []
     for instrument in plan.instruments():
         try:
@@ -201,7 +206,7 @@ def _sorted_out(plan: BatchPlan, index: BatchIndex) -> tuple[list[_Job], list[Ba
 def _kept(
     plan: BatchPlan, instrument: Instrument, preset: Preset, pluck: Pluck, source: Source, index: BatchIndex
 ) -> BatchRow | None:
-    """The row of a file that is there; None where it is to be rendered."""
+    """The row of a file that is there, "failed" where it is another sound; None where it is to be rendered."""
     row = _row(plan, instrument, preset.info.rate_hz, pluck, source)
     path = plan.folder / row.file
     if not path.exists():
@@ -250,7 +255,7 @@ def _rendered(
 
 
 def _outside(instrument: Instrument, preset: Preset) -> str:
-    """How the string differs from those that a model of many has learned; empty where it does not."""
+    """A warning that the string lies outside those that a model of many has learned; "" where it does not."""
     words = preset.info.family.outside(preset.info.string) if preset.info.family else []
     return f"warning: {instrument.name}: {'; '.join(words)}" if words else ""
 
@@ -269,11 +274,11 @@ def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, floa
 
 
 def _errors(preset: Preset, voices: Voices) -> tuple[float | None, float | None]:
-    """Within the training and in all; None where there is nothing to compare."""
+    """Relative MAE up to the training horizon, and over all; None where there is nothing to compare."""
     if len(voices.sounds) < 2:
         return None, None
     model, truth = voices.sounds["model"], voices.sounds["truth"]
-    sums = np.zeros((2, 2))  # of |error| and |truth|, within the training and past it
+    sums = np.zeros((2, 2))  # up to the training horizon and past it: of |error| and |truth|
     for first, true in blocks(truth):
         error = np.abs(model[first : first + len(true)] - true)
         frame = np.arange(first, first + len(true))
@@ -287,7 +292,7 @@ def _errors(preset: Preset, voices: Voices) -> tuple[float | None, float | None]
 
 
 def _ratio(error: float, truth: float) -> float:
-    """A silent truth matched by silence is no error, unmatched an infinite one."""
+    """With four digits. Where the truth is silent: 0 for silence, else infinite."""
     return float(f"{error / truth:.4g}") if truth else 0.0 if error == 0 else math.inf
 
 

@@ -25,8 +25,11 @@ class BatchRow:
     """A line of the index. Errors are the model's relative MAE at the listening points; the truth has none.
 
     Attributes:
-        string: of a preset of many strings; empty: its own.
-        rel_mae_trained: as far as the model was trained; rel_mae: over the whole file.
+        status: "kept": a file that was there already with the same recipe.
+        clipped: number of samples.
+        rel_mae_trained: up to the training horizon; rel_mae: over the whole file.
+        message: why it failed, or a warning.
+        string: the name of the string that a preset of many plays; "": the preset's own.
     """
 
     file: str
@@ -46,16 +49,17 @@ class BatchRow:
 
 
 class BatchIndex:
-    """The CSV file, with rows of earlier batches in the same folder."""
+    """The CSV file; `rows`, by file name, has those of earlier batches in the same folder too."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self.rows = _read_rows(path)
 
     def add(self, rows: Sequence[BatchRow]) -> None:
-        """Adds to what is there by now: another batch may write into the same folder. Raises ExportError.
+        """Adds rows to the file as it is now, as another batch may write into the same folder; none: does nothing.
 
-        Without any row there is no file.
+        Raises:
+            ExportError: the file cannot be written.
         """
         if not rows:
             return
@@ -79,7 +83,7 @@ class BatchIndex:
 
 
 def _read_rows(path: Path) -> dict[str, BatchRow]:
-    """By file; none where there is no index, or one that is not ours: it is written anew."""
+    """By file name; empty where there is no index, or one that cannot be read and will be replaced."""
     try:
         if path.stat().st_size > bounds.LARGEST_TABLE_BYTES:
             return {}
@@ -108,5 +112,5 @@ def _read_row(cells: dict[str, str]) -> BatchRow:
         number("rel_mae_trained"),
         number("rel_mae"),
         cells["message"],
-        cells.get("string", ""),  # earlier batches had none
+        cells.get("string", ""),  # a column that earlier versions did not write
     )

@@ -1,4 +1,4 @@
-"""What the export dialog was last set to."""
+"""The last settings of the export dialog."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.shared.vocabulary import Bits, Source
 
 
 class BatchChoices(BaseModel):
-    """The batch page's last state; lists as they were typed."""
+    """The last settings of the batch page; lists as they were typed."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -22,7 +22,7 @@ class BatchChoices(BaseModel):
 
 
 class ExportChoices(BaseModel):
-    """The export dialog's last state. rate_hz 0: the model's own rate; source "files": both, a file each."""
+    """The last settings. `rate_hz`: 0 for the model's own; `source`: "files" for model and truth in a file each."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -1,6 +1,6 @@
-"""Export: the sound of a pluck as WAV files that carry their recipe, each whole or absent.
+"""Export: the sound of a pluck as WAV files with their recipes, each written whole or not at all.
 
-The window and the command line write the same files through this module.
+The window and the command line both write through this module.
 """
 
 from __future__ import annotations
@@ -13,9 +13,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
-
-import numpy as np
-from numpy.typing import NDArray
 
 from app.export.recipe import Recipe
 from app.export.recording import Sound
@@ -32,21 +29,20 @@ from app.export.sound import (
     render_sound,
     render_voices,
 )
-from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, encode_wav
-from app.export.wav import write_wav as write_blocks
+from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, write_wav
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import BITS, Bits
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine.pluck import Pluck
 from engine.presets import PresetError
 
-END_OF_TRAINING = "end of training"  # the marker's name
-LONGEST_NAME = 150  # characters of a preset in a file's name
-DECAY_FADE_S = 0.05  # where a sound ends by its decay
+END_OF_TRAINING = "end of training"  # the name of the marker at the training horizon
+LONGEST_NAME = 150  # characters of a preset's name in a file's name
+DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
 
 class ExportError(Exception):
-    """An export that failed. The message names the path, what happened and the remedy. No file is left."""
+    """An export failed. The message names the path, what happened and the remedy. No file is left."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +51,10 @@ class WavReport:
 
     Attributes:
         peak_db: the largest sample in dBFS before any clipping; -inf for silence.
-        clipped: samples beyond full scale that were cut; always 0 in floating point.
-        past_training_s: how much of the end the model was not trained on; 0 for the truth.
-        decayed: False where the sound was to last until it had decayed, and the longest duration came first.
+        clipped: samples beyond full scale that were clipped; always 0 in floating point.
+        gain_db: the gain of normalising; 0 without.
+        past_training_s: how much of the sound lies past the model's training horizon; 0 for the truth.
+        decayed: False where the sound was to end by its decay but reached its longest duration first.
     """
 
     path: Path
@@ -86,9 +83,9 @@ def export_sound(
     """Renders and writes a WAV file, whole or not at all.
 
     Raises:
-        ExportError: the file cannot be written, or the preset is gone.
-        ExportCancelled: `cancelled` said so.
-        Runaway: the model's output stopped being a string's.
+        ExportError: the file cannot be written, or the preset's file cannot be read any more.
+        ExportCancelled: `cancelled` returned True.
+        Runaway: the model's output grew without bound or is not finite.
     """
     (report,) = export_sounds(request, {request.source: path}, settings, progress=progress, cancelled=cancelled)[0]
     return report
@@ -103,11 +100,12 @@ def export_sounds(
     progress: Progress = lambda share: None,
     cancelled: Cancelled = lambda: False,
 ) -> tuple[list[WavReport], Voices]:
-    """Renders a pluck once and writes a file for each source, with one gain.
+    """Renders a pluck once and writes a file for each source, with one gain for all.
 
     Args:
-        request: its own `source` is not looked at.
-        measured: render model and truth whatever the sources, to compare them.
+        request: its own `source` is ignored.
+        paths: the file of each source.
+        measured: render both model and truth whatever the sources, to compare them.
 
     Returns:
         The reports in the order of `paths`, and what was rendered.
@@ -123,7 +121,7 @@ def export_sounds(
             recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
         except PresetError as error:
             raise ExportError(str(error)) from error
-        # opened first, so that a folder that refuses is told before the work
+        # opened first, so that a folder that cannot be written to fails before the work
         opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
         try:
@@ -145,7 +143,7 @@ def export_sounds(
             with _explained(path):
                 labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
                 tags = _tags(info.title, recipes[source])
-                level = write_blocks(file, sound, rate_hz, settings, tags, beside, labels)
+                level = write_wav(file, sound, rate_hz, settings, tags, beside, labels)
             report = _report(path, file, len(sound), rate_hz, level)
             past_s = max(0.0, report.seconds - info.horizon_s) if labels else 0.0
             reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
@@ -153,46 +151,26 @@ def export_sounds(
 
 
 def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
-    """The settings that a request is written with: an end by decay fades longer."""
+    """`settings` with the longer fade-out of a sound that ends by its decay."""
     if request.decay_db is None:
         return settings
     return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
-def write_wav(
-    path: Path,
-    samples: NDArray[np.floating],
-    rate_hz: int,
-    settings: WavSettings | None = None,
-    *,
-    title: str = "",
-) -> WavReport:
-    """Writes samples (frames,) or (frames, channels), ±1 being full scale, whole or not at all.
-
-    Raises:
-        ExportError: the file cannot be written, or a sample is not finite.
-    """
-    with _written_whole(path) as file, _explained(path):
-        wav = encode_wav(samples, rate_hz, settings or WavSettings(), _tags(title))
-        file.write(wav.data)
-        return _report(path, file, wav.frames, wav.rate_hz, wav.level)
-
-
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
-    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`: one name, never a path, whatever `preset` is."""
+    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`: a name alone, no path, whatever `preset` is."""
     preset = re.sub(r"[^\w .+-]", "_", preset[:LONGEST_NAME]).lstrip(". -") or "preset"
     place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
     return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"
 
 
 def _digits(value: float, least: int) -> str:
-    """At least so many decimals, and as many more as tell the value from its neighbours in a file name."""
+    """With at least so many decimals, and more, up to six, where they are needed to give the value exactly."""
     return next((text for places in range(least, 6) if float(text := f"{value:.{places}f}") == value), f"{value:.6f}")
 
 
-def _tags(title: str, recipe: Recipe | None = None) -> dict[str, str]:
-    comment = recipe.model_dump_json() if recipe else ""
-    tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": comment}
+def _tags(title: str, recipe: Recipe) -> dict[str, str]:
+    tags = {"title": title, "software": f"{PROGRAM} {program_version()}", "comment": recipe.model_dump_json()}
     return {name: text for name, text in tags.items() if text}
 
 
@@ -239,5 +217,4 @@ __all__ = [
     "export_sounds",
     "render_sound",
     "settings_of",
-    "write_wav",
 ]

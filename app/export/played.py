@@ -1,4 +1,4 @@
-"""What is played through a patch, as files: a WAV that is rendered from its events, and the events as a MIDI file."""
+"""What is played through a patch, as files: a WAV file rendered from the events, and the events as a MIDI file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RATE_HZ = 48_000
 
 @dataclass(frozen=True)
 class PlayedFile:
-    """What was written: how long it is, and its level."""
+    """What was written: its duration and its level."""
 
     seconds: float
     level: Level
@@ -38,14 +38,15 @@ def write_played(
     seconds: float | None = None,
     advanced: Callable[[float], None] = lambda seconds: None,
 ) -> PlayedFile:
-    """A WAV file, whole or not at all. Memory does not grow with its length.
+    """Writes a WAV file, whole or not at all. Memory does not grow with its length.
 
     Args:
+        source: "model" or "truth".
         seconds, advanced: see `render_events`.
 
     Raises:
-        ValueError: a key has no possible string, or `source` is none.
-        WriteError: the file cannot be written; told before the work where the folder says so.
+        ValueError: a key has no possible string, or `source` is unknown.
+        WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
     rate_hz = settings.rate_hz or RATE_HZ
     with whole_file(path) as file:
@@ -58,13 +59,13 @@ def write_played(
 
 
 def recorded_files(path: Path) -> tuple[Path, Path]:
-    """The WAV and the MIDI file that what was played is written to, of a name that was chosen."""
+    """The WAV and the MIDI file that a recording of what is played is written to, from the chosen path."""
     sound = path if path.suffix.lower() == ".wav" else path.with_name(f"{path.name}.wav")
     return sound, sound.with_suffix(".mid")
 
 
 def write_recorded(path: Path, patch: Patch, preset: Preset, events: Sequence[TimedEvent], source: str) -> str:
-    """Both `recorded_files`; what was written, in words. Raises as `write_played`."""
+    """Writes both `recorded_files` and returns in words what was written. Raises as `write_played`."""
     sound_file, midi_file = recorded_files(path)
     written = write_played(sound_file, patch, preset, events, source)
     with whole_file(midi_file) as file:

@@ -1,4 +1,4 @@
-"""The recipe of a WAV file: all choices that made its sound, as JSON in its comment, so that it can be made again."""
+"""The recipe of a WAV file: all choices that its sound follows from, as JSON in the file's comment tag."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from engine.sources import FULL_SCALE_M
 
 
 class RecipeError(Exception):
-    """A file without a usable recipe. The message names the file, what is wrong and the remedy, in one line."""
+    """A file has no usable recipe. The message, one line, names the file, what is wrong and the remedy."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
 
 
 class NoRecipe(RecipeError):
-    """A sound file that was not exported by us."""
+    """A sound file without a recipe: not exported by this program, or its tags were removed."""
 
 
 class Recipe(BaseModel):
-    """See the module. Lengths and rates as in `SoundRequest` and `WavSettings`; what is absent has its default.
+    """See the module. Fields as in `SoundRequest` and `WavSettings`; a field that is absent has its default.
 
     Attributes:
-        preset_rate_hz: at which the model played.
-        string: of a preset of many strings, which it played, with so many `modes`; None: the preset's own.
-        horizon_s: the model's training ends here; what lies past it is extrapolation.
+        preset_rate_hz: the rate at which the model played.
+        string: the string that a preset of many played, with so many `modes`; None: the preset's own.
+        horizon_s: the training horizon, past which the model extrapolates.
         full_scale_m: the displacement that is 0 dBFS.
     """
 
@@ -70,12 +70,16 @@ class Recipe(BaseModel):
     @field_validator("string", mode="before")
     @classmethod
     def _check_string(cls, data: object) -> object:
-        """As a string of a file is checked: no unknown field, no text for a number, all within their bounds."""
+        """Checks it as a string in a preset: no unknown field, no text for a number, all within their bounds."""
         return data if data is None or isinstance(data, StringParameters) else read(StringParameters, data, "string")
 
     @classmethod
     def of(cls, request: SoundRequest, settings: WavSettings) -> Recipe:
-        """Raises PresetError: the preset's file cannot be read any more."""
+        """The recipe of a request that is written with these settings.
+
+        Raises:
+            PresetError: the preset's file cannot be read any more.
+        """
         info = request.preset.info
         many = info.family is not None
         return cls(
@@ -103,10 +107,13 @@ class Recipe(BaseModel):
         )
 
     def request(self, preset: Preset) -> SoundRequest:
-        """What is to be rendered. Raises ValueError where the values do not go together.
+        """The request that renders the sound again.
 
         Args:
-            preset: as it was loaded.
+            preset: as loaded from its file; if it is of many strings, the recipe's string is chosen here.
+
+        Raises:
+            ValueError: values do not go together.
         """
         if self.string is not None:
             preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
@@ -132,7 +139,7 @@ def read_recipe(path: Path) -> Recipe:
 
     Raises:
         NoRecipe: it is a sound file without one.
-        RecipeError: the file is missing or no WAV, or its recipe is broken or of a newer version.
+        RecipeError: the file is missing or no sound file, or its recipe is damaged or of a newer version.
     """
     try:
         with soundfile.SoundFile(path) as file:
@@ -152,12 +159,12 @@ def read_recipe(path: Path) -> Recipe:
         first = error.errors()[0]
         field = ".".join(map(str, first["loc"])) or "the text"
         raise _unusable(path, f"{field}: {first['msg']}") from error
-    except (ValueError, OverflowError) as error:  # of a number that is longer than any
+    except (ValueError, OverflowError) as error:  # raised for numbers that are too long
         raise _unusable(path, str(error)) from error
 
 
 def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
-    """What the recipe of the file at `path` asks for. Raises RecipeError where its values do not go together."""
+    """The request of the recipe in the file at `path`. Raises RecipeError where its values do not go together."""
     try:
         return recipe.request(preset)
     except ValueError as error:
@@ -171,10 +178,10 @@ def _unusable(path: Path, why: str) -> RecipeError:
 
 
 def preset_of(recipe: Recipe, presets: Iterable[Path]) -> tuple[Path, bool]:
-    """The preset file that a recipe means, and whether it is the very same one: by content, else by name.
+    """The preset file of a recipe, found by content, else by name, and whether its content is the same.
 
     Raises:
-        RecipeError: there is neither.
+        RecipeError: there is none.
     """
     paths = list(presets)
     for path in paths:
@@ -182,7 +189,7 @@ def preset_of(recipe: Recipe, presets: Iterable[Path]) -> tuple[Path, bool]:
             if preset_digest(path) == recipe.preset_sha256:
                 return path, True
         except PresetError:
-            continue  # of a preset that cannot be read another place tells
+            continue  # the list of presets reports those that cannot be read
     for path in paths:
         if path.stem == recipe.preset:
             return path, False
@@ -192,5 +199,5 @@ def preset_of(recipe: Recipe, presets: Iterable[Path]) -> tuple[Path, bool]:
 
 
 def changed_preset_notice(recipe: Recipe) -> str:
-    """What is to be known where a preset was found by its name alone."""
+    """A warning for a preset that was found by its name alone."""
     return f"the preset {recipe.preset} is not the one that made this file (another version of it): the sound differs"

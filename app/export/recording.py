@@ -1,4 +1,4 @@
-"""A sound of any length on disk: memory holds a block of it at a time."""
+"""A sound of any length on disk, of which memory holds a block at a time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ BLOCK_FRAMES = 2**16
 
 
 class Sound(Protocol):
-    """Frames (frames, points) of which a slice can be had: an array, or a recording."""
+    """Samples (frames, points) that can be sliced by frames: an array, or a recording."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, frames: slice, /) -> NDArray[np.floating]: ...
 
 
 class Recording:
-    """Samples (frames, points) in single precision, as voices give them, in a temporary file that goes with it.
+    """Samples (frames, points), stored in single precision in a temporary file that is deleted with this object.
 
     Raises:
         OSError: the disk of temporary files is full.
@@ -34,7 +34,7 @@ class Recording:
         self._frames = 0
 
     def append(self, block: NDArray[np.float32]) -> None:
-        """More frames (n, points) at its end."""
+        """Appends frames (n, points)."""
         data = memoryview(np.ascontiguousarray(block, np.float32).tobytes())
         self._file.seek(self._frames * self._frame_bytes)
         while data:
@@ -42,7 +42,7 @@ class Recording:
         self._frames += len(block)
 
     def cut(self, frames: int) -> None:
-        """Leaves the first frames alone."""
+        """Drops all but the first `frames`."""
         self._frames = min(self._frames, frames)
 
     def __len__(self) -> int:
@@ -68,6 +68,6 @@ def _read(file: Any, wanted: int) -> bytes:
 
 
 def blocks(sound: Sound, frames: int = BLOCK_FRAMES) -> Iterator[tuple[int, NDArray[np.floating]]]:
-    """First frame and frames of each block of a sound."""
+    """The number of the first frame, and the samples (frames, points), of each block of a sound."""
     for first in range(0, len(sound), frames):
         yield first, sound[first : first + frames]

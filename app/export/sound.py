@@ -1,6 +1,6 @@
-"""The sound of a pluck at the string's listening points: model, truth, their difference, or both side by side.
+"""The sound of a pluck at the listening points: model, truth, their difference, or both side by side.
 
-What is heard in a file is made here, by the voices that a sound device plays, sample by sample: ±1 is full scale.
+It is rendered by the same voices that a sound device plays, so that a file holds what is heard; ±1 is full scale.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ VOICES: tuple[Voice, ...] = get_args(Voice)
 SOURCES: tuple[Source, ...] = get_args(Source)
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
-DECAYED_FOR_SURE_DB = 30.0  # below the wanted decay, by all of the string: no point on it is louder
-LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level is no matter of phase
+DECAYED_FOR_SURE_DB = 30.0  # rendering goes on until the whole string is so far below the wanted decay
+LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does not depend on phase
 
 Samples = NDArray[np.float64]
-Progress = Callable[[float], None]  # is told the share that is done, 0 … 1
+Progress = Callable[[float], None]  # called with the share that is done, 0 … 1
 Cancelled = Callable[[], bool]
 
 
@@ -39,17 +39,17 @@ class ExportCancelled(Exception):
 
 @dataclass(frozen=True)
 class SoundRequest:
-    """What is to be heard.
+    """What is to be rendered.
 
     Attributes:
-        listen: the listening point, 0 … 1 in lengths of the string.
+        listen: the listening point, as a fraction of the string's length.
         seconds: the duration; with `decay_db` the longest.
-        source: "difference" is model minus truth, "both" the model in the left channel and the truth in the right.
-        listen_right: the listening point of a right channel; None is mono.
-        pickup: "velocity" is the derivative of displacement; 30 m/s are full scale.
-        difference_gain_db: how much louder the difference is made.
-        decay_db: the sound ends where model and truth have fallen this far below their loudest, so that all files of
-            a pluck have one length. None: it lasts `seconds`.
+        source: "difference" is model minus truth, "both" has the model in the left channel, the truth in the right.
+        listen_right: the listening point of a right channel; None for mono.
+        pickup: 10 mm of "displacement" or 30 m/s of "velocity" are full scale.
+        difference_gain_db: gain of the difference.
+        decay_db: the sound ends where both model and truth have fallen this far below their maximum, so that all
+            files of a pluck have the same length. None: it lasts `seconds`.
 
     Raises:
         ValueError: a value is out of its range; the message names it and the range.
@@ -87,24 +87,24 @@ class SoundRequest:
 
 @dataclass(frozen=True)
 class Voices:
-    """Model and truth of one request, (frames, points) each, as far as they are needed.
+    """Model and truth of one request, (frames, points) each, of which those are rendered that are needed.
 
     Attributes:
-        ended: False where the decay was not over at the longest duration.
+        ended: False where the sound was to end by its decay but reached its longest duration first.
     """
 
     sounds: Mapping[Voice, Sound]
     ended: bool = True
 
     def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
-        """What a source is made of, all at once: (frames,), or (frames, 2) in stereo and for both."""
+        """All samples of a source: (frames,), or (frames, 2) in stereo and for "both"."""
         found = Mixed(self, source, difference_gain_db)[:]
         return found[:, 0] if found.shape[1] == 1 else found
 
 
 @dataclass(frozen=True)
 class Mixed:
-    """What a source is made of, (frames, channels), of which a slice can be had."""
+    """The samples of a source, (frames, channels), computed for each slice from its voices."""
 
     voices: Voices
     source: Source
@@ -127,7 +127,7 @@ class Mixed:
 
 
 def voices_of(source: Source) -> tuple[Voice, ...]:
-    """What is rendered for a source."""
+    """Which of model and truth must be rendered for a source."""
     return ("model",) if source == "model" else ("truth",) if source == "truth" else VOICES
 
 
@@ -144,8 +144,8 @@ def render_sound(
         rate_hz: 0 for the preset's own.
 
     Raises:
-        ExportCancelled: `cancelled` said so.
-        Runaway: the model's output stopped being a string's.
+        ExportCancelled: `cancelled` returned True.
+        Runaway: the model's output grew without bound or is not finite.
     """
     voices = render_voices(request, (request.source,), rate_hz, progress=progress, cancelled=cancelled)
     return voices.samples(request.source, request.difference_gain_db)
@@ -160,11 +160,14 @@ def render_voices(
     progress: Progress = lambda share: None,
     cancelled: Cancelled = lambda: False,
 ) -> Voices:
-    """Model and truth once, for any number of sources of one pluck (`request.source` is not looked at).
+    """Renders model and truth once for any number of sources of one pluck; `request.source` is ignored.
 
     Args:
         rate_hz: of the samples; 0 for the preset's own.
-        all_voices: both of them whatever the sources; a model that runs away is then left out if no source needs it.
+        all_voices: render both whatever the sources; a model that runs away is left out if no source needs it.
+
+    Raises:
+        As `render_sound`.
     """
     sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
     needed = {voice for source in sources for voice in voices_of(source)}
@@ -188,10 +191,10 @@ def render_voices(
 
 
 def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
-    """How many of the frames (frames, points) there are until the level stays `decay_db` below its loudest.
+    """How many frames of a sound pass until its level stays `decay_db` below its maximum.
 
-    The level is the mean square over windows of 50 ms and all points. All frames where it never falls so low; silence
-    is one window.
+    The level is the mean square over windows of 50 ms and all points. Returns all frames where it does not fall so
+    far, and one window for silence.
     """
     window = max(1, round(LEVEL_WINDOW_S * rate_hz))
     powers = []
@@ -206,7 +209,7 @@ def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
 
 
 def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progress, cancelled: Cancelled) -> Recording:
-    """(frames, points), by the very voice that a device would play."""
+    """The samples (frames, points) of the voice that a device would play."""
     preset, info = request.preset, request.preset.info
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
     ear = Ear(request.points, request.pickup)

@@ -1,11 +1,10 @@
-"""WAV bytes from samples: rate, level, fade, dither, rounding, tags. Nothing here touches a file.
+"""WAV from samples: level, fade, dither, rounding, tags, written to an open file.
 
-libsndfile stores what it is given; whatever changes a number is done here, in NumPy, where it can be tested.
+libsndfile only stores: all that changes a number is done here, in NumPy, where it can be tested.
 """
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -14,7 +13,6 @@ from typing import BinaryIO
 
 import numpy as np
 import soundfile
-import soxr
 from numpy.typing import NDArray
 
 from app.export.recording import Sound, blocks
@@ -22,8 +20,8 @@ from app.export.wav_chunks import Marker, finish
 from app.shared.vocabulary import BITS, Bits
 
 RATE_RANGE_HZ = (1_000, 384_000)
-LONGEST_TAG_BYTES = 2_000  # libsndfile reads back no INFO text of 2048 bytes or more
-NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves room for the peaks between samples
+LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 bytes or more
+NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
 
 _SUBTYPES: dict[Bits, str] = {"16": "PCM_16", "24": "PCM_24", "32f": "FLOAT"}
 _DITHER_SEED = 0  # the same sound makes the same file
@@ -35,9 +33,12 @@ class WavSettings:
 
     Attributes:
         bits: integers of 16 (with TPDF dither) or 24 bits, or 32-bit floating point, which never clips.
-        rate_hz: None keeps the samples' own rate. A higher one adds no bandwidth.
+        rate_hz: at which the sound is rendered; None: the preset's own rate.
         normalise: to -1 dBFS, by one gain for all channels and for the sounds that belong together.
-        fade_out_s: at the end, so that a decay that is cut does not click.
+        fade_out_s: the length of the fade at the end, so that a decay that is cut off does not click.
+
+    Raises:
+        ValueError: a value is out of its range; the message names it.
     """
 
     bits: Bits = "24"
@@ -64,45 +65,6 @@ class Level:
     gain_db: float
 
 
-@dataclass(frozen=True)
-class EncodedWav:
-    """A whole WAV file in memory."""
-
-    data: bytes
-    level: Level
-    frames: int
-    rate_hz: int
-
-
-def encode_wav(
-    samples: NDArray[np.floating],
-    rate_hz: int,
-    settings: WavSettings,
-    tags: dict[str, str],
-    beside: Sequence[NDArray[np.float64]] = (),
-    labels: Mapping[str, float] | None = None,
-) -> EncodedWav:
-    """A WAV file of samples (frames,) or (frames, channels) where ±1 is full scale.
-
-    Args:
-        tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
-        beside: other sounds of the same rate that share the gain when normalising.
-        labels: names of markers and their times in s; those past the end are left out.
-
-    Raises:
-        ValueError: a sample is not finite, there are none, or a tag is too long.
-    """
-    _check_tags(tags)
-    if len(samples) == 0:
-        raise ValueError("there are no samples to write; choose a longer duration")
-    new_rate_hz = settings.rate_hz or rate_hz
-    sound = resampled(samples.astype(np.float64), rate_hz, new_rate_hz)
-    others = [resampled(other, rate_hz, new_rate_hz) for other in beside]
-    buffer = io.BytesIO()
-    level = write_wav(buffer, sound, new_rate_hz, settings, tags, others, labels)
-    return EncodedWav(buffer.getvalue(), level, len(sound), new_rate_hz)
-
-
 def write_wav(
     file: BinaryIO,
     sound: Sound,
@@ -112,13 +74,20 @@ def write_wav(
     beside: Sequence[Sound] = (),
     labels: Mapping[str, float] | None = None,
 ) -> Level:
-    """As `encode_wav`, of a sound of the file's own rate, block by block: memory does not grow with its length.
+    """Writes a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
+
+    It is written block by block, so that memory does not grow with its length.
 
     Args:
         file: open for reading and writing, empty.
+        rate_hz: of the sound; `settings.rate_hz` is ignored.
+        tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
+        beside: other sounds that share the gain when normalising.
+        labels: names of markers and their times in s; those past the end are left out.
 
     Raises:
-        ValueError: see there.
+        ValueError: a sample is not finite, there are none, or a tag is too long.
+        OSError: the file cannot be written.
     """
     _check_tags(tags)
     if len(sound) == 0:
@@ -137,7 +106,7 @@ def write_wav(
         for first, block in blocks(sound):
             faded = _faded(block, first, len(sound), fade_frames)
             stored, cut = quantised(faded * gain, settings.bits, first, len(sound))
-            with suppress(soundfile.SoundFileError, AssertionError):  # of a disk that is full: told next
+            with suppress(soundfile.SoundFileError, AssertionError):  # of a full disk, whose OSError `check` raises
                 out.write(stored)
             noting.check()
             clipped += cut
@@ -147,7 +116,7 @@ def write_wav(
 
 
 class _Noting:
-    """A file as libsndfile is given it, which cannot pass an error on: the first one is kept to be raised later."""
+    """A file for libsndfile, which cannot pass on an OSError: the first one is kept and raised by `check`."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -172,7 +141,7 @@ def _places(labels: Mapping[str, float], rate_hz: int) -> list[tuple[str, int]]:
 
 
 def _faded(block: NDArray[np.floating], first: int, total: int, frames: int) -> NDArray[np.float64]:
-    """A block that begins at frame `first` of `total`, with its part of the fade over the last `frames`."""
+    """A block that begins at frame `first` of `total`, with its part of the fade-out over the last `frames`."""
     frames = min(frames, total)
     begin = max(0, total - frames - first)  # in the block
     faded: NDArray[np.float64] = block.astype(np.float64)
@@ -193,17 +162,8 @@ def _finite(block: NDArray[np.floating]) -> NDArray[np.floating]:
     return block
 
 
-def resampled(samples: NDArray[np.float64], rate_hz: int, new_rate_hz: int) -> NDArray[np.float64]:
-    """The same duration at another rate, band-limited; untouched where the rates are equal."""
-    if rate_hz == new_rate_hz:
-        return samples
-    frames = round(len(samples) * new_rate_hz / rate_hz)
-    sound = soxr.resample(samples, rate_hz, new_rate_hz, quality="VHQ")[:frames]
-    return np.concatenate([sound, np.zeros((frames - len(sound), *sound.shape[1:]))])
-
-
 def faded_out(samples: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
-    """The last `frames` brought to zero along half a cosine."""
+    """The sound with its last `frames` faded to zero along half a cosine."""
     return _faded(samples, 0, len(samples), frames)
 
 
@@ -212,11 +172,11 @@ def quantised(
 ) -> tuple[NDArray[np.generic], int]:
     """The numbers that the file stores, as soundfile takes them, and how many were clipped.
 
-    Triangular dither of ±1 step at 16 bits makes the rounding error a noise that does not follow the sound;
-    at 24 bits the step lies 144 dB down, below any converter's own noise.
+    At 16 bits triangular dither of ±1 step makes the rounding error a noise independent of the sound; at 24 bits the
+    step is 144 dB below full scale, below any converter's own noise.
 
     Args:
-        first, total: the samples are a block that begins at this frame of so many: the dither is that of the whole.
+        first, total: the samples are a block that begins at frame `first` of `total`, and get its part of the dither.
     """
     if bits == "32f":
         return samples.astype(np.float32), 0
@@ -235,7 +195,7 @@ def quantised(
 
 
 def _dither(shape: tuple[int, ...], first: int) -> NDArray[np.float64]:
-    """Numbers in 0 … 1 from the `first` on of one endless row."""
+    """Random numbers in 0 … 1, of one fixed sequence from its element `first` on."""
     return np.random.Generator(np.random.PCG64(_DITHER_SEED).advance(first)).random(shape)
 
 

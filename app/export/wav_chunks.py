@@ -1,4 +1,7 @@
-"""Chunks of a WAV file that libsndfile does not write through soundfile: markers, and PEAK without the time."""
+"""Chunks of a WAV file that soundfile cannot write: markers, and a PEAK chunk without the time of writing.
+
+RIFF/WAVE: "Multimedia Programming Interface and Data Specifications 1.0" (IBM and Microsoft, 1991).
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
 
-HEAD_BYTES = 2**16  # in which the chunks before the samples lie
+HEAD_BYTES = 2**16  # of the file, in which all chunks before the samples lie
 
 
 @dataclass(frozen=True)
@@ -19,15 +22,11 @@ class Marker:
     label: str
 
 
-def with_markers(data: bytes, markers: Sequence[Marker]) -> bytes:
-    """The WAV file with a "cue " chunk and the labels of its points (LIST adtl), as editors show them."""
-    file = io.BytesIO(data)
-    _append(file, markers)
-    return file.getvalue()
-
-
 def finish(file: BinaryIO, markers: Sequence[Marker]) -> None:
-    """A WAV file as libsndfile has left it, with markers and without the time of its making."""
+    """Adds markers to a WAV file written by libsndfile and zeroes the time in its PEAK chunk.
+
+    Without that time the same sound makes the same bytes.
+    """
     file.seek(0)
     head = file.read(HEAD_BYTES)
     for name, start, _ in chunks(head):
@@ -42,7 +41,7 @@ def _append(file: BinaryIO, markers: Sequence[Marker]) -> None:
     if not markers:
         return
     points = b"".join(
-        # number, place in the play order, chunk, start of the chunk, start of the block, sample
+        # identifier, position in the play order, chunk, start of the chunk, start of the block, frame
         struct.pack("<II4sIII", number, marker.frame, b"data", 0, 0, marker.frame)
         for number, marker in enumerate(markers, 1)
     )
@@ -58,26 +57,11 @@ def _append(file: BinaryIO, markers: Sequence[Marker]) -> None:
     file.write(struct.pack("<I", size - 8))
 
 
-def read_markers(data: bytes) -> list[Marker]:
-    """The markers of a WAV file, in the order of their numbers; damaged ones are left out."""
-    frames: dict[int, int] = {}
-    labels: dict[int, str] = {}
-    for name, start, size in chunks(data):
-        body = data[start : start + size]
-        if name == b"cue ":
-            for place in range(4, len(body) - 23, 24):
-                number, _, _, _, _, frame = struct.unpack_from("<II4sIII", body, place)
-                frames[number] = frame
-        elif name == b"LIST" and body[:4] == b"adtl":
-            for kind, first, length in chunks(body, 4):
-                if kind == b"labl" and length >= 4:
-                    (number,) = struct.unpack_from("<I", body, first)
-                    labels[number] = body[first + 4 : first + length].rstrip(b"\0").decode(errors="replace")
-    return [Marker(frames[number], labels.get(number, "")) for number in sorted(frames)]
-
-
 def chunks(data: bytes, position: int = 12) -> Iterator[tuple[bytes, int, int]]:
-    """Name, first byte and size (as far as it is there) of each chunk, first those after "RIFF", size, "WAVE"."""
+    """Name, offset of the body and its size (cut off at the data's end) of each chunk from `position` on.
+
+    By default after the 12 bytes "RIFF", size, "WAVE".
+    """
     while position + 8 <= len(data):
         name, size = struct.unpack_from("<4sI", data, position)
         yield name, position + 8, min(size, len(data) - position - 8)

@@ -25,17 +25,17 @@ _NAME: TypeAdapter[str] = TypeAdapter(Reference)
 
 
 def own_bodies() -> Path:
-    """The user's folder of bodies. It need not be there."""
+    """The user's folder of bodies, which may not exist."""
     return user_folder() / "bodies"
 
 
 def body_names() -> list[str]:
-    """All that a patch may name, the engine's first. Never raises; a file is read only where it is heard."""
+    """The names of all bodies, the engine's first. Never raises: files are read only when they are used."""
     return [*BODIES, *_own_files()]
 
 
 def own_impulse(name: str) -> Impulse:
-    """Of one of the user's bodies; the same value as long as its file stays.
+    """The impulse response of one of the user's bodies; the same object while its file is unchanged.
 
     Raises:
         ImpulseError: there is none of this name, or its file cannot be used.
@@ -51,16 +51,19 @@ def own_impulse(name: str) -> Impulse:
 
 
 def body_digest(name: str) -> str:
-    """The SHA-256 of a body of the user's own; "" for any other."""
+    """The SHA-256 of the file of one of the user's bodies, in hex; "" for any other."""
     path = _own_files().get(name)
+    if path is None:
+        return ""
     try:
-        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError:  # it is told where it is heard
+        state = path.stat()
+        return _digest(path, state.st_mtime_ns, state.st_size)
+    except OSError:  # reported where the body is used
         return ""
 
 
 def install_body(file: Path) -> str:
-    """Copies a sound file that is an impulse response into the user's folder; the name of the body that it is then.
+    """Copies an impulse response into the user's folder, and returns the name of the body.
 
     The same file is not copied twice; a name that is taken gets a number.
 
@@ -76,7 +79,7 @@ def install_body(file: Path) -> str:
     except OSError as error:
         raise ImpulseError(f"{file}: cannot be read ({error.strerror}); check the name") from error
     for name, path in known.items():
-        with suppress(OSError):  # one that cannot be read is another
+        with suppress(OSError):  # one that cannot be read counts as another
             if path.stat().st_size == len(data) and path.read_bytes() == data:
                 return name
     try:
@@ -92,7 +95,7 @@ def install_body(file: Path) -> str:
 
 
 def _own_files() -> dict[str, Path]:
-    """By name; of two files of one name, and beside one of the engine's, the first."""
+    """Name -> file. Of two files of one name the first; none of the name of an engine's body."""
     found: dict[str, Path] = {}
     try:
         paths = sorted(path for path in own_bodies().iterdir() if path.suffix.lower() in ENDINGS)
@@ -106,6 +109,11 @@ def _own_files() -> dict[str, Path]:
         if path.stem not in BODIES and path.is_file():
             found.setdefault(path.stem, path)
     return found
+
+
+@lru_cache(maxsize=16)
+def _digest(path: Path, time_ns: int, size: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @lru_cache(maxsize=16)

@@ -19,18 +19,24 @@ _POINTS = 2**16
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What a body does to a sound: its impulse response (frames,) at RESPONSE_HZ, and the square of its gain."""
+    """What a body does to a sound.
+
+    Attributes:
+        impulse: its response (frames,) at RESPONSE_HZ, of the first channel.
+        power: the square of its gain at `frequencies_hz`, (frequencies,) both; the mean of the channels.
+    """
 
     impulse: NDArray[np.float64]
     frequencies_hz: NDArray[np.float64]
     power: NDArray[np.float64]
 
     def power_at(self, frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The square of the gain, of the shape of `frequencies_hz`."""
         return np.interp(frequencies_hz, self.frequencies_hz, self.power)
 
 
 def effects_of(patch: Patch) -> Effects | None:
-    """None where it has neither. A body that is not here is left out: `body_problem` tells of it."""
+    """Body and room of a patch; None: it has neither. A body that cannot be used is left out: see `body_problem`."""
     body = _body(patch)[0]
     room = Room(patch.room.mix, patch.room.t60_s) if patch.room.mix > 0 else None
     return None if body is None and room is None else Effects(body, room)
@@ -42,14 +48,14 @@ def body_problem(patch: Patch) -> str:
 
 
 def channels_of(patch: Patch) -> int:
-    """Two where it has two listening points, a room, or a body that was recorded so."""
+    """How many channels a patch sounds in: 2 with two listening points, a room, or a body of two channels, else 1."""
     body = _body(patch)[0]
     wide = body is not None and body.impulse is not None and body.impulse.samples.shape[1] == 2
     return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 or wide else 1
 
 
 def body_response(patch: Patch) -> Response | None:
-    """Of its body alone, whose resonances favour some keys; None: it has none."""
+    """The response of a patch's body, whose resonances favour some keys; None: it has no body."""
     body = _body(patch)[0]
     return None if body is None else _response(body)
 

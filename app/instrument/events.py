@@ -1,4 +1,4 @@
-"""What a player does. Values, without any device."""
+"""What a player does, as values. Keys are MIDI keys, 0 … 127."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PEDAL_DOWN = 64  # from this value on
 
 @dataclass(frozen=True)
 class NoteOn:
-    """A key goes down; velocity 1 … 127."""
+    """A key is struck; velocity 1 … 127 (0 is a release)."""
 
     key: int
     velocity: int
@@ -29,7 +29,7 @@ class NoteOff:
 
 @dataclass(frozen=True)
 class Bend:
-    """The pitch wheel, -1 … 1 of the patch's range."""
+    """The pitch wheel moves to -1 … 1, in ranges of the patch."""
 
     value: float
     channel: int = 0
@@ -63,7 +63,7 @@ Event = NoteOn | NoteOff | Bend | Controller | PatchTurned
 
 @dataclass(frozen=True)
 class TimedEvent:
-    """An event and when it is, in s from the beginning."""
+    """An event and its time from the beginning."""
 
     time_s: float
     event: Event

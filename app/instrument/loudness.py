@@ -18,9 +18,9 @@ from engine.resonators.base import Resonator
 from engine.voices import Ear
 
 PART_S = 0.4  # of the note: a loudness meter's block
-WANTED_DB = -30.0  # of a note at REFERENCE_VELOCITY: ten hard ones struck at once stay below full scale
-HIGHEST_PEAK_DB = -15.0  # of such a note of any key: six hard ones at once reach full scale at worst
-PEAK_BLOCKS = 54  # of as many frames: 60 ms
+WANTED_DB = -30.0  # level of a note at REFERENCE_VELOCITY: ten hard ones struck at once stay below full scale
+HIGHEST_PEAK_DB = -15.0  # peak of such a note of any key: six hard ones at once reach full scale at worst
+PEAK_BLOCKS = 54  # blocks of 54 frames: 60 ms
 REFERENCE_VELOCITY = 100
 GAIN_RANGE_DB = (-36.0, 36.0)
 # BS.1770: the shelf and the high-pass as analogue filters of second order
@@ -29,7 +29,7 @@ _PASS_HZ, _PASS_Q = 38.135, 0.5003
 
 
 def k_weight(frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The square of K-weighting's gain."""
+    """The square of the gain of K-weighting, of the shape of `frequencies_hz`."""
     s = 1j * frequencies_hz
     gain = 10 ** (_SHELF_DB / 20)
     middle = 10 ** (_SHELF_DB / 40)
@@ -41,10 +41,10 @@ def k_weight(frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
-    """Of a quiet pluck's first 0.4 s, K-weighted, in dB of full scale; -inf for silence.
+    """The K-weighted level of a quiet pluck's first 0.4 s, in dB re full scale; -inf for silence.
 
     Args:
-        response: of what the string is heard through.
+        response: of the body that the string is heard through.
     """
     amplitudes, sigma, omega = _heard(resonator, pluck, ear)
     falls = 2 * sigma * PART_S
@@ -65,7 +65,7 @@ def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | N
 
 
 def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
-    """The highest sample of a quiet pluck's first 60 ms, in dB of full scale; -inf for silence."""
+    """The highest sample of a quiet pluck's first 60 ms, in dB re full scale; -inf for silence."""
     amplitudes, sigma, omega = _heard(resonator, pluck, ear)
     eigenvalues = (1j * omega - sigma) / RESPONSE_HZ
     blocks = np.arange(PEAK_BLOCKS)
@@ -86,7 +86,7 @@ def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | N
 def _heard(
     resonator: Resonator, pluck: Pluck, ear: Ear
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Amplitudes of the partials as they are heard, (modes, points), of full scale; σ and ω."""
+    """The amplitudes of the partials as heard, (modes, points), re full scale; σ and ω in 1/s, (modes,)."""
     q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
     weights = (resonator.shapes @ ear.weights(resonator.points)).numpy() / FULL_SCALE_M
     sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()

@@ -1,4 +1,4 @@
-"""MIDI files: read as events, and written of what was played. The format is mido's business."""
+"""MIDI files, through mido: read as events, and written from events."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class MidiFileError(ValueError):
 
 
 def event_of(message: Any) -> Event | None:
-    """A message of mido's; None for what no string answers."""
+    """The event of a message of mido's; None for kinds that no patch plays."""
     if message.type == "note_on":
         if message.velocity == 0:
             return NoteOff(message.note, message.channel)
@@ -42,7 +42,7 @@ def event_of(message: Any) -> Event | None:
 
 
 def read_midi(path: Path) -> list[TimedEvent]:
-    """All tracks together, at their tempo.
+    """The events of all tracks, in the order of their times in s.
 
     Raises:
         MidiFileError: it is missing, damaged, too large or too long, or holds no note.
@@ -71,7 +71,7 @@ def read_midi(path: Path) -> list[TimedEvent]:
                 found.append(TimedEvent(time_s, event))
     except MidiFileError:
         raise
-    except Exception as error:  # whatever damage makes of mido
+    except Exception as error:  # mido raises many kinds for damaged files
         raise MidiFileError(
             f"{path}: is no MIDI file that can be read ({type(error).__name__}: {error}); save it again as .mid"
         ) from error
@@ -81,7 +81,7 @@ def read_midi(path: Path) -> list[TimedEvent]:
 
 
 def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
-    """A MIDI file of what was played, of one track, 1/1920 s and finer."""
+    """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out."""
     import mido
 
     track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
@@ -99,7 +99,7 @@ def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
 
 
 def messages_of(event: Event) -> Iterable[Any]:
-    """Of mido's; none for what MIDI has no words for."""
+    """The mido messages of an event; none where MIDI has no message for it."""
     import mido
 
     if isinstance(event, PatchTurned):

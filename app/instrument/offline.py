@@ -1,4 +1,4 @@
-"""Events to samples, faster than they sound: the same player, voices and limiter as are heard, without a device."""
+"""Events to samples, without a device: the same player, voices and limiter as in the window."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from engine.voices import Mixer
 
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
-SILENT_DB = -90.0  # of full scale: beyond the last event it ends where a block's peak is below
-MOST_RINGING = 96  # the oldest of more make room
+SILENT_DB = -90.0  # re full scale: after the last event it ends where the peak of a block is lower
+MOST_RINGING = 96  # where more strings ring, the oldest fade out
 STOLEN_S = 0.03
 
 
 class _Stage:
-    """A player before a mixer that nobody listens to."""
+    """A player and a mixer without a device."""
 
     def __init__(self, patch: Patch, preset: Preset, rate_hz: int, source: str, limited: bool) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
@@ -70,23 +70,23 @@ def render_events(
     limited: bool = True,
     advanced: Callable[[float], None] = lambda seconds: None,
 ) -> Iterator[NDArray[np.float32]]:
-    """What a patch gives for events, in blocks (frames, channels), ±1 being full scale; the same for ever.
+    """The sound of a patch that plays events, in blocks (frames, channels), ±1 being full scale. Deterministic.
 
     An event counts from the next quantum of 64 frames on.
 
     Args:
-        seconds: how long it is; None until all has died away, a minute after the last event at most.
+        seconds: its length; None: until all has died away, a minute after the last event at most.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
-        advanced: is told how much sound there is, in s; may raise, to end it.
+        advanced: is called with the seconds rendered so far; may raise, to end it.
 
     Raises:
-        ValueError: a key has no possible string, or `source` is none.
+        ValueError: a key has no possible string, or `source` is neither "model" nor "truth".
     """
     if source not in ("model", "truth"):
         raise ValueError(f"source must be model or truth, not {source!r}")
     stage = _Stage(patch, preset, rate_hz, source, limited)
     channels = channels_of(patch)
-    skipped = AHEAD if limited else 0  # what the limiter holds back at the beginning
+    skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)
 
     def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
@@ -128,17 +128,21 @@ def render_note(
     seconds: float,
     rate_hz: int,
     source: str = "model",
+    advanced: Callable[[float], None] = lambda seconds: None,
 ) -> NDArray[np.float32]:
-    """One key that is held for so long, (frames, channels), without a limiter.
+    """One key that is held for `held_s`, (frames, channels), `seconds` long, without a limiter.
+
+    Args:
+        advanced: as in `render_events`.
 
     Raises:
-        ValueError: the key has no string, or an impossible one.
+        ValueError: the key has no string, or an impossible one, or the sound is not finite.
     """
     events: list[tuple[float, Event]] = [(0.0, NoteOn(key, velocity))]
     if held_s < seconds:
         events.append((held_s, NoteOff(key)))
     timed = [TimedEvent(time_s, event) for time_s, event in events]
-    blocks = list(render_events(patch, preset, timed, rate_hz, source, seconds, limited=False))
+    blocks = list(render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, advanced=advanced))
     sound = np.concatenate(blocks)
     if not math.isfinite(float(np.abs(sound).max())):
         raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")

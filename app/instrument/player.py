@@ -1,8 +1,8 @@
-"""A patch under a player's hands: events become voices, and change those that ring.
+"""A patch that is played: events become voices, and change those that ring.
 
-What rings is known by its place: a key, or in guitar mode a channel, whose string is one. A place that is struck
-again goes on with the motion that it has; a key that is let go damps its string, unless the pedal or the patch lets
-it ring. Whatever hands do to a string changes the modes of its voices, the model's and the truth's alike.
+Strings are known by their places: a key, or in guitar mode a channel, which is one string. A place that is struck
+again goes on with the motion that it has; a key that is released damps its string, unless the pedal or the patch lets
+it ring. Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from engine.voices import Ear, Program, Voice
 from engine.voices.programs import solver_program, tension_program
 
 SOURCES = ("model", "truth")
-MPE_BEND_SEMITONES = 48.0  # of a member channel
+MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
 MPE_MASTER = 0
-MPE_POSITIONS = (0.05, 0.5)  # of the pluck, from the lowest to the highest slide before the key
-DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the way to other modes
+MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
+DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03
 KEPT_KEYS = 256
-GOALS = 8  # that are tried for a wheel all the way up
+GOALS = 8  # values that are tried for a wheel all the way up
 # What a wheel all the way up makes of a field: a factor of its own value, or a value
 WHEEL_FACTORS = {"knobs": 4.0, "damping": 10.0, "pluck.hardest_mm": 2.0, "body.size": 2.0, "room.t60_s": 3.0}
 WHEEL_VALUES = {
@@ -47,10 +47,10 @@ WHEEL_VALUES = {
 
 @dataclass(frozen=True)
 class Key:
-    """What a key sounds with: remembered, so that a strike costs no physics.
+    """What a key sounds with. It is kept, so that a strike computes no physics.
 
     Attributes:
-        gain: that makes it as loud as the others.
+        gain: the factor that makes it as loud as the other keys.
         programs: by source.
     """
 
@@ -62,13 +62,16 @@ class Key:
 
 @dataclass(eq=False)
 class Struck:
-    """A string that was struck, as a player left it.
+    """A string that was struck, in its present state.
 
     Attributes:
         place: which string of the instrument it is.
-        parameters: of the string, with what hands do to it.
+        gain: the factor of its voices.
+        voices: by source.
+        parameters: of the string, with bends, slides, dampers and knobs.
         held: whether the key is down.
-        kept: it was let go while the pedal was down.
+        kept: whether it was released while the pedal was down.
+        damped: whether the damper is on it.
     """
 
     place: int
@@ -85,9 +88,11 @@ class Struck:
 
     @property
     def over(self) -> bool:
+        """Whether all its voices have ended."""
         return all(voice.over for voice in self.voices.values())
 
     def retune(self, parameters: StringParameters, seconds: float) -> None:
+        """Lets the voices glide to the modes of other parameters."""
         self.parameters = parameters
         own = self.key.resonator
         modes = own.modes
@@ -122,9 +127,10 @@ class Player:
     """Plays one patch. Every public method may be called from any thread.
 
     Args:
-        preset: of many strings, which plays the patch.
-        deliver: is given what was struck, with voices that are not handed over yet; called in the event's thread.
-        sources: of which there are voices.
+        preset: a preset of many strings.
+        rate_hz: of the voices.
+        deliver: is called with what was struck, whose voices no mixer has yet; in the thread of the event.
+        sources: which of "model" and "truth" get voices.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -148,7 +154,7 @@ class Player:
         self._lock = threading.RLock()
         self._hands = _Hands()
         self._ringing: dict[int, Struck] = {}
-        self._all: list[Struck] = []  # those that were struck again among them, until they are over
+        self._all: list[Struck] = []  # with those whose place was struck again, until they are over
         self._listens: Ear | None = None
         self._take(patch)
 
@@ -168,7 +174,7 @@ class Player:
         return self._preset
 
     def set_patch(self, patch: Patch) -> None:
-        """Another patch, or the same with a knob turned: strings that ring take what is new without a gap.
+        """Plays another patch, or the same with a knob turned; strings that ring glide to it.
 
         Raises:
             ValueError: the tuning is impossible; nothing has changed then.
@@ -179,7 +185,7 @@ class Player:
                 self._retune(struck, KNOB_S)
 
     def listen(self, ear: Ear) -> None:
-        """From elsewhere than the patch says, and loud as there; what rings is not moved."""
+        """Sets where strings are heard, instead of the patch's points; what rings stays as it is."""
         with self._lock:
             if ear != self._ear:
                 self._listens = ear
@@ -190,7 +196,7 @@ class Player:
         return self._rate_hz
 
     def set_rate(self, rate_hz: int) -> None:
-        """Another rate of the device: what was struck before ends there."""
+        """Sets the rate of voices; strings that ring are forgotten, for their voices have another one."""
         with self._lock:
             if rate_hz != self._rate_hz:
                 self._rate_hz = rate_hz
@@ -199,18 +205,18 @@ class Player:
                 self._take(self._patch)
 
     def prepare(self, keys: Sequence[int] | None = None) -> None:
-        """Computes what keys sound with, so that a strike need not."""
+        """Computes what keys sound with, so that a strike need not. None: all keys of the patch."""
         low, high = self._patch.range
         for key in keys if keys is not None else range(low, high + 1):
             try:
                 self._key(key)
             except ValueError:
-                continue  # told when it is struck
+                continue  # raised again when it is struck
 
-    # What players do
+    # Events
 
     def handle(self, event: Event) -> Struck | None:
-        """Does what an event says, and gives what was struck.
+        """Plays an event; what it struck, or None.
 
         Raises:
             ValueError: a key has no possible string.
@@ -232,7 +238,7 @@ class Player:
         return None
 
     def stop(self, seconds: float = STOP_S) -> None:
-        """All strings fade out."""
+        """Lets all strings fade out, and forgets them."""
         with self._lock:
             for struck in self._all:
                 for voice in struck.voices.values():
@@ -241,7 +247,7 @@ class Player:
             self._all.clear()
 
     def sounding(self) -> list[Struck]:
-        """What rings now, one for each place."""
+        """The strings that ring, one for each place."""
         with self._lock:
             return list(self._sounding())
 
@@ -311,7 +317,7 @@ class Player:
                 self._damp(struck)
 
     def _damp(self, struck: Struck) -> None:
-        """Where nothing holds it."""
+        """Puts the damper on a string that nothing holds."""
         if struck.held or struck.kept or struck.damped or self._patch.damping.let_ring:
             return
         struck.damped = True
@@ -357,7 +363,7 @@ class Player:
         return struck.event.channel == channel or (self._patch.mode == "mpe" and channel == MPE_MASTER)
 
     def _ratio(self, struck: Struck) -> float:
-        """By which the pitch wheels raise it."""
+        """The factor by which pitch wheels raise its frequency."""
         own = self._hands.of(struck.event.channel).bend
         if self._patch.mode != "mpe" or struck.event.channel == MPE_MASTER:
             return float(2 ** (own * self._patch.bend_semitones / 12))
@@ -390,7 +396,7 @@ class Player:
         return self._patch
 
     def _with_hands(self, struck: Struck) -> StringParameters:
-        """The string of its key, with knobs, wheels and dampers as they are."""
+        """The string of its key, with the present knobs, wheels and damper."""
         patch = self._wheeled("knobs")
         string = struck.key.string.parameters
         try:

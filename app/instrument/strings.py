@@ -1,4 +1,4 @@
-"""Which string a key is, and what hands do to it.
+"""The string of each key, and how a bend, a slide or a damper changes it.
 
 Pitch is that of the first partial of a quiet pluck, √(ω₁² - σ₁²)/2π. Fretting changes the length alone, a bend the
 tension alone; both are solved for the pitch in closed form, so that it is exact.
@@ -13,19 +13,19 @@ from app.patches.patch import Fretted, Knobs, OpenString, Patch
 from app.patches.tuning import Tuning
 from engine.resonators.string import StringParameters
 
-HIGHEST_HZ = 20_000.0  # modes above are not heard
-MOST_MODES = 99  # that the shipped model's grid holds
+HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
+MOST_MODES = 99  # the shipped model's grid holds no more
 
 
 @dataclass(frozen=True)
 class KeyString:
-    """The string that a key plays, at rest and open to no hand.
+    """The string that a key plays, before bends, slides and dampers.
 
     Attributes:
-        pitch_hz: of its quiet first partial.
-        modes: that it sounds with.
-        shortened: its length as a share of the whole string's. It is pulled as much less, so that the tension rises
-            as much as the whole string's would.
+        pitch_hz: frequency of the first partial of a quiet pluck.
+        modes: how many it sounds with.
+        shortened: its length as a share of the whole string's. Amplitudes are reduced by it, so that the tension
+            rises as much as on the whole string.
     """
 
     key: int
@@ -44,7 +44,7 @@ class Strings:
         self._tuning = Tuning(patch.tuning)
 
     def of_key(self, key: int) -> KeyString | None:
-        """None for a key beyond the patch's range, or one that its tuning leaves out.
+        """The string of a key; None for a key beyond the patch's range, or one that its tuning leaves out.
 
         Raises:
             ValueError: no string has that pitch; the message names the key and what is impossible.
@@ -64,7 +64,7 @@ class Strings:
         return KeyString(key, parameters, pitch_hz, modes, parameters.length_m / own.length_m)
 
     def _own(self, key: int) -> StringParameters:
-        """The string that bears the key, with the patch's knobs."""
+        """The whole string on which a key is played, with the patch's knobs."""
         strings = self._patch.strings
         if isinstance(strings, Fretted):
             return turned(strings.string.parameters, self._patch.knobs)
@@ -79,7 +79,7 @@ class Strings:
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
-    """With a patch's multipliers. Damping per length stays with the mass, so that its rates do not follow it."""
+    """The string with a patch's multipliers. Damping follows the mass, which so leaves decay rates as they are."""
     area = knobs.gauge**2
     mass = area * knobs.density
     return replace(
@@ -95,19 +95,19 @@ def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
 
 
 def pitch_hz_of(string: StringParameters) -> float:
-    """Of its quiet first partial; 0 where that does not swing."""
+    """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
     return math.sqrt(max(0.0, string.undamped_frequency(1) ** 2 - string.decay_rate(1) ** 2)) / (2 * math.pi)
 
 
 def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
-    """With the length that gives the pitch.
+    """The string with the length that gives the pitch.
 
     Raises:
         ValueError: that length is out of bounds.
     """
     mass, bending = string.mass_per_length_kg_m, string.youngs_modulus_pa * string.second_moment_m4
     sigma = string.decay_rate(1)
-    for _ in range(4):  # σ₁ follows the length, and matters little
+    for _ in range(4):  # σ₁ depends on the length, a little
         load = mass * ((2 * math.pi * pitch_hz) ** 2 + sigma**2)
         # EIη⁴ + T₀η² = ρAω², without the difference of near numbers
         squared = 2 * load / (string.tension_n + math.sqrt(string.tension_n**2 + 4 * bending * load))
@@ -116,7 +116,7 @@ def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
 
 
 def bent(string: StringParameters, ratio: float) -> StringParameters:
-    """With the tension that raises the pitch by a ratio.
+    """The string with the tension that raises its pitch by a ratio.
 
     Raises:
         ValueError: there is none: stiffness alone is higher, or it is out of bounds.
@@ -133,11 +133,11 @@ def bent(string: StringParameters, ratio: float) -> StringParameters:
 
 
 def slid(string: StringParameters, ratio: float) -> StringParameters:
-    """With the length that raises the pitch by a ratio, as a slide or a finger on the string. Raises ValueError."""
+    """The string with the length that raises its pitch by a ratio, as by a slide. Raises ValueError as `fretted`."""
     return string if ratio == 1 else fretted(string, ratio * pitch_hz_of(string))
 
 
 def damped(string: StringParameters, t60_s: float) -> StringParameters:
-    """With a damper on it: every partial falls by 60 dB more in so many seconds. Raises ValueError."""
+    """The string with a damper: each partial decays by 60 dB more in `t60_s`. Raises ValueError: out of bounds."""
     added = 2 * string.mass_per_length_kg_m * math.log(1000) / t60_s
     return replace(string, damping_d1_kg_m_s=string.damping_d1_kg_m_s + added)

@@ -1,4 +1,4 @@
-"""Which patches there are: the shipped ones and the user's own, each a small JSON file; reading, saving, renaming.
+"""The patches: shipped ones and the user's own, each a small JSON file; listing, reading, saving, renaming.
 
 A patch is known by its file's name without `.json`. That name is made from the patch's own, and is never a path.
 """
@@ -19,7 +19,7 @@ from engine.schema import SchemaError, parse_json
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
 SUFFIX = ".json"
-DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # of Windows
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # on Windows
 
 
 class PatchError(ValueError):
@@ -31,14 +31,14 @@ class PatchError(ValueError):
 
 @dataclass(frozen=True)
 class PatchEntry:
-    """A patch that can be chosen, by its file."""
+    """A patch and its file."""
 
     path: Path
     patch: Patch
 
     @property
     def name(self) -> str:
-        """What it is known by."""
+        """The name of its file without `.json`."""
         return self.path.stem
 
     @property
@@ -48,22 +48,22 @@ class PatchEntry:
 
 
 def own_patches() -> Path:
-    """The user's folder of patches, in that of presets. It need not be there."""
+    """The user's folder of patches, in that of presets; it may not exist."""
     return user_folder() / "patches"
 
 
 def read_patch(path: Path) -> Patch:
-    """One file, checked whole.
+    """The patch of a file, checked.
 
     Raises:
         PatchError: it is missing, too large, damaged, impossible, or of a newer version.
     """
     try:
-        if not path.is_file():  # a pipe would be waited for
+        if not path.is_file():  # reading a pipe would block
             raise PatchError(f"{path}: no file; check the name")
         with path.open("rb") as file:
             raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: no path at all
+    except (OSError, ValueError) as error:  # ValueError: a path with a null character
         if isinstance(error, PatchError):
             raise
         told = getattr(error, "strerror", None) or error
@@ -83,9 +83,9 @@ def read_patch(path: Path) -> Patch:
 
 
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
-    """The usable patches by category and name, and a line for each file that cannot be used. Never raises.
+    """The usable patches, sorted by category and name, and a line for each file that cannot be used. Never raises.
 
-    By default those of the shipped and of the user's folder; of two of one name, the one of the first folder.
+    `folders`: by default the shipped and the user's. Of two files of one name, that of the first folder is used.
     """
     entries: dict[str, PatchEntry] = {}
     problems = []
@@ -103,7 +103,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
                 entries[path.stem] = PatchEntry(path, patch)
             except PatchError as error:
                 problems.append(str(error))
-            except Exception as error:  # whatever one file brings about, the others are listed
+            except Exception as error:  # so that the other files are listed
                 problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
     return sorted(entries.values(), key=_order), problems
 
@@ -127,7 +127,7 @@ def find_patch(name_or_path: str) -> PatchEntry:
 
 
 def save_patch(patch: Patch, *, replace: bool = False) -> PatchEntry:
-    """Writes it into the user's folder, whole or not at all, and makes the folder.
+    """Writes it into the user's folder, which is made if need be; whole or not at all.
 
     Args:
         replace: whether a patch of the user's with this name may be overwritten; a shipped one never is.
@@ -154,8 +154,8 @@ def rename_patch(entry: PatchEntry, name: str) -> PatchEntry:
     """The user's own patch under another name; its former file is removed after the new one is whole.
 
     Raises:
-        PatchError: it is a shipped one, the name is that of another patch, or can be no name.
-        WriteError: the folder cannot be written.
+        PatchError: it is a shipped one, or the name is impossible or that of another patch.
+        WriteError: the folder cannot be written, or the former file not be deleted.
     """
     if not entry.own:
         raise PatchError(f"{entry.patch.name}: is shipped with the program; save it under another name instead")

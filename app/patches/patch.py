@@ -1,13 +1,13 @@
 """A patch: everything that an instrument is, as one checked and immutable value.
 
 Lengths, areas and tensions are those of physics, in SI units; places on the string are in its lengths, from 0 to 1.
-Whatever comes from a file is bounded here. Which pitch a key has, and where patches lie, is told in `tuning` and
-`library`.
+All values are checked against bounds here. The pitch of keys is in `tuning`, the files of patches in `library`.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -67,14 +67,21 @@ WHEEL: tuple[str, ...] = (
 
 LONGEST_NAME = 60  # characters
 LONGEST_DESCRIPTION = 400
-LONGEST_SCALE = 2**16  # characters of a .scl or .kbm
+LONGEST_SCALE = 2**16  # characters of a .scl or .kbm file
 MOST_STRINGS = 128
 MOST_MACROS = 8
 MOST_TARGETS = 8
-FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on one of the three systems
+FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on Linux, macOS or Windows
 HIGHEST_KEY = 127
 VELOCITIES = (1, 127)
 LEVEL_RANGE_DB = (-60.0, 24.0)
+MULTIPLIER_RANGE = (0.05, 20.0)
+GAUGE_RANGE = (0.25, 4.0)
+AMPLITUDE_RANGE_MM = (0.001, LARGEST_AMPLITUDE_MM)
+CURVE_RANGE = (-1.0, 1.0)
+RELEASE_RANGE_S = (0.01, 60.0)  # of the damping's T60
+A4_RANGE_HZ = (220.0, 880.0)
+TRANSPOSE_RANGE = (-48, 48)
 
 
 def _plain(text: str) -> str:
@@ -84,7 +91,7 @@ def _plain(text: str) -> str:
 
 
 def _safe(name: str) -> str:
-    """A name that can be a file's on every system, and never a path."""
+    """A name that is a valid file name on every system, and no path."""
     name = _plain(name)
     if name.startswith(".") or name.endswith(".") or any(c in FORBIDDEN_IN_NAMES for c in name):
         raise ValueError(f"must not begin or end with a full stop, or hold one of {FORBIDDEN_IN_NAMES}; rename it")
@@ -98,7 +105,7 @@ def _lines(text: str) -> str:
 
 
 def explained(error: ValueError) -> str:
-    """What is wrong with the first field that was refused: its path, what it must be, and what was found."""
+    """The first field that was refused, in words: its path, what it must be, and what was found."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_context=False)[0]
@@ -119,10 +126,10 @@ Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(_pla
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
 Key = Annotated[int, _number(0, HIGHEST_KEY)]
 Share = Annotated[float, _number(0, 1)]
-Multiplier = Annotated[float, _number(0.05, 20)]
+Multiplier = Annotated[float, _number(*MULTIPLIER_RANGE)]
 Position = Annotated[float, _number(*POSITION_RANGE)]
 Width = Annotated[float, _number(*WIDTH_RANGE)]
-Millimetres = Annotated[float, _number(0.001, LARGEST_AMPLITUDE_MM)]
+Millimetres = Annotated[float, _number(*AMPLITUDE_RANGE_MM)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
@@ -131,7 +138,7 @@ class _Value(BaseModel):
 
 
 class PhysicalString(_Value):
-    """The eight parameters of `StringParameters`, known before the engine is loaded."""
+    """The eight parameters of `StringParameters`; this class does not need the engine to be loaded."""
 
     length_m: Annotated[float, _number(*bounds.STRING["length_m"])]
     area_m2: Annotated[float, _number(*bounds.STRING["area_m2"])]
@@ -144,28 +151,33 @@ class PhysicalString(_Value):
 
     @property
     def parameters(self) -> StringParameters:
-        """As the engine takes them."""
+        """The same for the engine, which this loads."""
         from engine.resonators.string import StringParameters  # brings torch
 
         return StringParameters(**self.model_dump())
 
+    @property
+    def first_hz(self) -> float:
+        """The frequency of its first mode, undamped."""
+        return self.parameters.undamped_frequency(1) / math.tau
+
 
 class Fretted(_Value):
-    """Every key is this string with another length."""
+    """One string, shortened for each key to the length of its pitch."""
 
     kind: Literal["fretted"] = "fretted"
     string: PhysicalString
 
 
 class OpenString(_Value):
-    """One string of a set, and the key that it sounds when nothing shortens it."""
+    """One string of a set, and the MIDI key of its whole length."""
 
     note: Key
     string: PhysicalString
 
 
 class StringSet(_Value):
-    """Strings by rising open note. A key shortens the highest at or below it; below all, the lowest is slackened."""
+    """Strings by rising open note. A key shortens the highest at or below it; below all, it slackens the lowest."""
 
     kind: Literal["set"] = "set"
     strings: Annotated[tuple[OpenString, ...], Field(min_length=1, max_length=MOST_STRINGS)]
@@ -179,13 +191,13 @@ class StringSet(_Value):
 
 
 class Knobs(_Value):
-    """Multipliers of the strings' own values; 1 leaves them. The tension rise of plucks follows from them.
+    """Multipliers of the strings' own values; 1 leaves them as they are.
 
     Attributes:
-        stiffness: of the bending stiffness alone (the second moment of area): how inharmonic it is.
-        decay: of d₁, damping of all modes alike; above 1 falls sooner.
-        brightness_decay: of d₃, damping that grows with frequency; above 1 is darker.
-        modulus: of Young's modulus: bending stiffness, and how much a hard pluck glides.
+        stiffness: of the second moment of area alone, and so of the bending stiffness: inharmonicity.
+        decay: of d₁, damping of all modes alike; above 1 all decay faster.
+        brightness_decay: of d₃, damping that grows with frequency; above 1 the sound darkens sooner.
+        modulus: of Young's modulus: bending stiffness, and how much a hard pluck glides in pitch.
         density: of the mass per volume.
         gauge: of the radius: the area grows with its square, the second moment with its fourth power.
     """
@@ -195,11 +207,11 @@ class Knobs(_Value):
     brightness_decay: Multiplier = 1.0
     modulus: Multiplier = 1.0
     density: Multiplier = 1.0
-    gauge: Annotated[float, _number(0.25, 4)] = 1.0
+    gauge: Annotated[float, _number(*GAUGE_RANGE)] = 1.0
 
 
 class PluckChoices(_Value):
-    """How a key pulls its string. Widths are as in `engine.pluck.Pluck`; a triangle has none.
+    """How a key plucks its string. Widths are as in `engine.pluck.Pluck`; a triangle has none.
 
     Attributes:
         width, width_hard: of the softest and of the hardest pluck.
@@ -213,7 +225,7 @@ class PluckChoices(_Value):
     width_hard: Width = 0.06
     softest_mm: Millimetres = 0.1
     hardest_mm: Millimetres = 3.0
-    curve: Annotated[float, _number(-1, 1)] = 0.0
+    curve: Annotated[float, _number(*CURVE_RANGE)] = 0.0
 
     @model_validator(mode="after")
     def _softest_is_softer(self) -> Self:
@@ -222,7 +234,7 @@ class PluckChoices(_Value):
         return self
 
     def pluck(self, velocity: float) -> Pluck:
-        """Of a velocity in 1 … 127, which need not be whole; others count as the nearest."""
+        """The pluck of a velocity in 1 … 127, which need not be an integer; others count as the nearest."""
         low, high = VELOCITIES
         share = min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-self.curve)
         return Pluck(
@@ -241,9 +253,9 @@ class Pickup(_Value):
 
 
 class Damping(_Value):
-    """What happens when a key is let go: nothing (`let_ring`), or all partials fall by 60 dB in `release_t60_s`."""
+    """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`."""
 
-    release_t60_s: Annotated[float, _number(0.01, 60)] = 0.3
+    release_t60_s: Annotated[float, _number(*RELEASE_RANGE_S)] = 0.3
     let_ring: Flag = False
 
 
@@ -251,16 +263,16 @@ class TuningChoice(_Value):
     """Which pitch each key has; see `app.patches.tuning`.
 
     Attributes:
-        a4_hz: of key 69; a keyboard mapping has a reference pitch of its own.
-        scale: the text of a .scl file, "" for twelve equal steps. It begins at key 60 without a mapping.
+        a4_hz: pitch of key 69; a keyboard mapping has a reference pitch of its own.
+        scale: the text of a .scl file, "" for twelve equal steps. Without a mapping it begins at key 60.
         keymap: the text of a .kbm file, "" for none.
-        transpose: keys that everything sounds higher.
+        transpose: by how many keys everything sounds higher.
     """
 
-    a4_hz: Annotated[float, _number(220, 880)] = 440.0
+    a4_hz: Annotated[float, _number(*A4_RANGE_HZ)] = 440.0
     scale: ScalaText = ""
     keymap: ScalaText = ""
-    transpose: Annotated[int, _number(-48, 48)] = 0
+    transpose: Annotated[int, _number(*TRANSPOSE_RANGE)] = 0
 
     @model_validator(mode="after")
     def _gives_pitches(self) -> Self:
@@ -272,7 +284,7 @@ class TuningChoice(_Value):
 
 
 class Body(_Value):
-    """What the strings stand on: the name of an impulse response ("": none), its share, its size (1: as it is)."""
+    """The body of the instrument: the name of an impulse response ("": none), its mix, its size (1: as it is)."""
 
     name: Reference = ""
     mix: Share = 0.5
@@ -280,14 +292,14 @@ class Body(_Value):
 
 
 class Room(_Value):
-    """How much is heard of the room, and its reverberation time."""
+    """The room: its mix (0: none), and its reverberation time."""
 
     mix: Share = 0.0
     t60_s: Annotated[float, _number(*T60_S)] = 1.2
 
 
 class Target(_Value):
-    """A field that a macro turns, by its path, and its values at 0 and 1."""
+    """A field that a macro changes, by its path, and its values at 0 and 1."""
 
     field: str
     low: Annotated[float, _number(-1e6, 1e6)]
@@ -295,7 +307,7 @@ class Target(_Value):
 
 
 class Macro(_Value):
-    """One knob that turns several fields; `value` is where it stands."""
+    """One knob that changes several fields; `value` is its position."""
 
     name: Annotated[str, Field(min_length=1, max_length=24), AfterValidator(_plain)]
     value: Share = 0.5
@@ -303,16 +315,16 @@ class Macro(_Value):
 
 
 class Patch(_Value):
-    """See the module and the parts.
+    """The whole instrument.
 
     Attributes:
         preset: the model that plays it, by the name of a preset of many strings; never a path.
         range: the lowest and the highest key that sound.
-        mode: all keys on as many strings as needed; a MIDI channel a string, each of them monophonic; or MPE.
+        mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe".
         bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
         mod_wheel: one of WHEEL, or "none".
-        level_db: of everything that is heard of it.
-        macros: the fields hold as they are written; turning a macro writes its targets (`turned`).
+        level_db: gain of its sound.
+        macros: their values do nothing until a macro is turned (`turned`), which sets the fields of its targets.
     """
 
     version: Literal[1] = 1
@@ -361,7 +373,7 @@ class Patch(_Value):
         return self
 
     def value(self, field: str) -> float:
-        """Of one of ASSIGNABLE. Raises ValueError where it is none, or the patch has no such pick-up point."""
+        """The value of one of ASSIGNABLE. Raises ValueError: an unknown field, or a pick-up point that is missing."""
         self._check_assignable("field", field)
         found: Any = self
         for part in field.split("."):
@@ -369,11 +381,11 @@ class Patch(_Value):
         return float(found)
 
     def with_value(self, field: str, value: float) -> Patch:
-        """With one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of its bounds."""
+        """The patch with one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of bounds."""
         return self.with_values({field: value})
 
     def with_values(self, values: dict[str, float]) -> Patch:
-        """With several of ASSIGNABLE changed, one after the other. Raises ValueError as `with_value` does."""
+        """The patch with several of ASSIGNABLE changed, in order. Raises ValueError as `with_value` does."""
         patch = self
         for field, value in values.items():
             self._check_assignable("field", field)
@@ -382,7 +394,7 @@ class Patch(_Value):
         return patch
 
     def turned(self, macro: int, value: float) -> Patch:
-        """With a macro turned to `value` in 0 … 1, and its targets written."""
+        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set."""
         share = min(1.0, max(0.0, value))
         chosen = self.macros[macro]
         moved = chosen.model_copy(update={"value": share})

@@ -21,12 +21,12 @@ A4_KEY = 69
 SCALA_FILES = (".scl", ".kbm")
 LARGEST_FILE_BYTES = 2**16
 MOST_NOTES = 1_000  # of a scale
-LARGEST_MAPPED = 20_000.0  # any number of a keyboard mapping: it is counted up to, or tones are made for it
-NOTES = (-128, 255)  # every key with any transposition and bend
+LARGEST_MAPPED = 20_000.0  # of any number in a keyboard mapping: the library loops up to it
+NOTES = (-128, 255)  # all keys, with any transposition and bend
 
 
 class Tuning:
-    """The pitch of each key. Equal choices make equal tunings."""
+    """The pitch of each key."""
 
     def __init__(self, choice: TuningChoice) -> None:
         """Raises ValueError: the scale or the mapping is damaged, or gives no pitch; the message names the field."""
@@ -37,10 +37,10 @@ class Tuning:
             self._table = _table(choice)
 
     def hz(self, note: float) -> float:
-        """The pitch of a key, or between two keys, in equal parts of the interval between them.
+        """The pitch of a key; between two keys interpolated in log frequency.
 
-        A key that the mapping leaves out has one too, between those of its neighbours, for a slide to pass; whether
-        a key is to sound is told by `mapped`.
+        A key that the mapping leaves out has a pitch between those of its neighbours, for slides; whether a key is to
+        sound, `mapped` says.
         """
         note += self._transpose
         if self._table is None:
@@ -61,7 +61,7 @@ def read_scala(path: Path) -> str:
     from app.patches.patch import TuningChoice, explained
 
     try:
-        if not path.is_file():  # a pipe would be waited for
+        if not path.is_file():  # reading a pipe would block
             raise ValueError(one_line(f"{path}: no file; check the name"))
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE_BYTES + 1)
@@ -85,7 +85,7 @@ def read_scala(path: Path) -> str:
 def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
     import tuning_library
 
-    # what is not ASCII stands in comments and descriptions, which mean nothing
+    # only comments and descriptions may hold other than ASCII, and they have no effect
     scale, keymap = (text.encode("ascii", "replace").decode() for text in (choice.scale, choice.keymap))
     field = "scale"
     try:
@@ -115,7 +115,7 @@ def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_numbers(keymap: str) -> None:
-    """Raises ValueError where a line of a keyboard mapping would be counted up to for ever."""
+    """Raises ValueError where a number of a keyboard mapping would keep the library in a loop."""
     for line in keymap.splitlines():
         words = line.split()
         if not words or words[0].startswith("!") or words[0] == "x":

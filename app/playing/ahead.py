@@ -1,7 +1,7 @@
 """Models that are no compiled voice: their samples are rendered ahead of the playhead, by one thread.
 
-Where a model is slower than it sounds it begins only when what is left will be ready in time. It never makes holes in
-others: whoever reads samples that are not there stands still by itself.
+A model that renders slower than it sounds begins only when the rest will be ready in time. Where a voice has no
+samples it pauses by itself; the others go on.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from engine.voices import Voice
 from engine.voices.offline import AHEAD_FIRST, AHEAD_FRAMES
 
 LEAST_S = 0.06  # rendered before it begins
-CARE = 0.75  # of its speed that is counted on: the computer has other things to do as well
+CARE = 0.75  # the part of the measured speed that is counted on, for the load may rise
 SILENT = 1e-5  # of full scale
 KEPT = 32  # plucks that need not be rendered again
 
@@ -33,10 +33,15 @@ class AheadVoice:
     """A voice with the source that renders it.
 
     Attributes:
-        begin: hands the note over; called once, when enough is rendered.
-        given_up: whether nobody wants to hear it any more.
-        from_s: where it will begin.
-        ends_s: where the model ran away.
+        initial_m: (grid_points,).
+        weights: (grid_points, channels) of the listening points.
+        key: what the samples depend on; they are kept by it.
+        begin: hands the note over; called once, in any thread, when enough is rendered.
+        failed: is called with what went wrong.
+        given_up: whether it is not wanted any more.
+        from_s: where in its motion it will begin.
+        ends_s: when the model ran away; None: it did not.
+        done: the number of frames rendered.
     """
 
     voice: Voice
@@ -68,14 +73,14 @@ class AheadVoice:
 
     @property
     def wanted_s(self) -> float:
-        """So much must be there before it begins."""
+        """How much must be rendered before it begins."""
         total_s = self.done / self.source.rate_hz + self.voice.room / self.source.rate_hz
         least_s = min(self.from_s + LEAST_S, total_s)
         return max(least_s, total_s - (total_s - self.from_s) * CARE * self.speed) if self.speed else least_s
 
     @property
     def waits_s(self) -> float:
-        """How long until then, as far as is known."""
+        """How long that will still take; 0 where it has begun, or the speed is not known yet."""
         if self.begun or not self.speed:
             return 0.0
         return max(0.0, (self.wanted_s - self.rendered_s) / self.speed)
@@ -90,6 +95,7 @@ class AheadVoice:
         return self.rendered_s - (self.voice.seconds if self.begun else -1.0)
 
     def advance(self) -> None:
+        """Renders the next block; `finished` after the last one."""
         began_s = time.monotonic()
         if self._state is None:
             self._state = self.source.start(self.initial_m[None])
@@ -113,13 +119,14 @@ class AheadVoice:
             self.finished = True
 
     def take_known(self, samples: NDArray[np.float32]) -> None:
-        """All of it, from an earlier pluck."""
+        """Takes all samples, which are known from an earlier pluck."""
         self._take(samples)
         self.voice.end_here()
         self.finished = True
 
     @property
     def samples(self) -> NDArray[np.float32]:
+        """What was rendered so far, (frames, channels)."""
         return np.concatenate(self._frames)
 
     def _take(self, samples: NDArray[np.float32]) -> None:
@@ -128,7 +135,7 @@ class AheadVoice:
 
 
 class Ahead:
-    """The thread. `close` ends it."""
+    """The thread, which starts with the first voice; `close` ends it. All may be called from any thread."""
 
     def __init__(self) -> None:
         self._mailbox = threading.Condition()
@@ -138,7 +145,7 @@ class Ahead:
         self._thread: threading.Thread | None = None
 
     def render(self, voice: AheadVoice) -> None:
-        """Begins, or, where this very pluck is known, has it at once."""
+        """Starts to render a voice; where the same pluck is known, it begins at once."""
         with self._mailbox:
             known = self._known.get(voice.key)
             if known is None:
@@ -153,7 +160,7 @@ class Ahead:
         voice.begin()
 
     def close(self) -> None:
-        """May be called again."""
+        """Ends the thread, waiting 10 s at most; may be called again."""
         with self._mailbox:
             self._closing = True
             self._mailbox.notify()

@@ -23,12 +23,12 @@ def mix_of(choices: Choices) -> Mix:
 
 
 def subject_of(choices: Choices, preset: Path) -> Subject:
-    """What is plucked."""
+    """The string that is plucked: the preset's own, or the one that is chosen for a preset of many."""
     return preset if choices.string is None else StringOf(preset, choices.string.parameters)
 
 
 def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
-    """What a preset says of the string that is plucked; of its own where that cannot be, which is told elsewhere."""
+    """The preset's info for the string that is plucked; for its own where it cannot play that one."""
     if choices.string is not None and entry.info.family is not None:
         with contextlib.suppress(ValueError):
             return info_of_string(entry.info, choices.string.parameters)
@@ -36,7 +36,7 @@ def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
 
 
 def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
-    """What is plucked, with voices for both slots."""
+    """The chosen pluck, with voices for both slots."""
     others = _others(choices, library)
     sources: list[str] = []
     for held in (choices.source_heard, choices.a, choices.b):
@@ -47,7 +47,7 @@ def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:
 
 
 def render_request(choices: Choices, preset: Path, library: Library) -> RenderRequest:
-    """What the worker is asked for, other presets in the slots among it."""
+    """The chosen pluck for the render worker, with the other presets that slots hold."""
     others = tuple(dict.fromkeys(_others(choices, library).values()))
     subject = subject_of(choices, preset)
     return RenderRequest(subject, choices.pluck, choices.seconds, heard_ear(choices), choices.speed, others)

@@ -1,4 +1,4 @@
-"""The computer's keyboard as an instrument: keys are pitches as on a piano, or a row of them is ten places.
+"""The computer's keyboard as an instrument: keys are pitches as on a piano, or one row plucks at ten places.
 
 Keys are known by where they are: the row begins right of Caps lock, whatever is printed on it. No widget here.
 """
@@ -21,9 +21,9 @@ ANY_AMPLITUDE_MM = (0.5, 10.0)
 SOFTEST_MM = 0.05
 LARGEST_VELOCITY = 127
 VELOCITY_STEP = 16
-DIGITS = 4  # after the point: what is played stands in file names and recipes
+DIGITS = 4  # after the point, for file names and recipes have them
 
-# Native codes of the ten keys from A on, and the letters where a platform tells no code.
+# Native codes of the ten keys from A on, and their letters for platforms without codes.
 _ROW_CODES = {
     "linux": tuple(range(38, 48)),  # of X11, and of Wayland through Qt
     "win32": tuple(range(0x1E, 0x28)),
@@ -40,14 +40,14 @@ _PIANO_CODES = {
 _PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
     _UPPER_LETTERS[n]: s for n, s in _BLACK.items()
 }
-LOWEST_C = 48  # the key of A on the keyboard, at octave 0
+LOWEST_C = 48  # the MIDI key that A plays at octave 0
 OCTAVE_STEPS = {"Z": -1, "X": 1}
 LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Where and how hard an instrument of keys plucks: from its lowest to its highest key and velocity."""
+    """The positions of the lowest and the highest key's plucks, and the amplitudes of velocities 1 and 127."""
 
     position: tuple[float, float] = ANYWHERE
     amplitude_mm: tuple[float, float] = ANY_AMPLITUDE_MM
@@ -76,7 +76,7 @@ class Reach:
         return _rounded(low * (high / low) ** share, low, high)
 
     def velocity_of(self, amplitude_mm: float) -> int:
-        """The nearest velocity of an amplitude."""
+        """The velocity, 1 … 127, whose amplitude is nearest."""
         low, high = self.amplitude_mm
         share = math.log(max(amplitude_mm, low) / low) / math.log(high / low) if high > low else 1.0
         return round(1 + min(share, 1.0) * (LARGEST_VELOCITY - 1))
@@ -84,7 +84,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class KeyPress:
-    """A key as a platform tells it: the letter or digit on it, and its native code (0: not told)."""
+    """A key: the letter or digit on it, and its native code (0: the platform gives none)."""
 
     letter: str
     code: int = 0
@@ -92,14 +92,14 @@ class KeyPress:
 
 @dataclass(frozen=True)
 class Played:
-    """What a key means: new values of `Choices`, and whether the string is plucked then."""
+    """What a key means: new values of `Choices`, and whether the string is then plucked."""
 
     changes: dict[str, float]
     plucks: bool
 
 
 def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
-    """Semitones above the piano's C, or None for a key beside it."""
+    """Semitones above the piano's C; None for a key that is not of the piano."""
     codes = _PIANO_CODES.get(platform)
     if codes and press.code:
         return codes.get(press.code)
@@ -107,7 +107,7 @@ def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
 
 
 def letters_of(octave: int) -> dict[int, str]:
-    """What is printed on the computer's keys, by the keys that they play."""
+    """MIDI key -> what is printed on the computer's key that plays it."""
     return {LOWEST_C + 12 * octave + semitone: letter for letter, semitone in _PIANO_LETTERS.items()}
 
 
@@ -123,7 +123,7 @@ def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
 
 
 def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
-    """0 … 9 along the row, or None for a key beside it."""
+    """0 … 9 along the row; None for a key that is not of it."""
     codes = _ROW_CODES.get(platform)
     if codes and press.code:
         return codes.index(press.code) if press.code in codes else None
@@ -132,7 +132,7 @@ def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
 
 
 def play(press: KeyPress, reach: Reach, amplitude_mm: float, platform: str = sys.platform) -> Played | None:
-    """The meaning of a key while the string is pulled by `amplitude_mm`; None for a key that is not an instrument's.
+    """The meaning of a key, `amplitude_mm` being the present amplitude; None for a key without one.
 
     The row plucks; 1 … 9 are velocities from softest to loudest; C and V are softer and harder.
     """

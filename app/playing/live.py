@@ -1,4 +1,4 @@
-"""A patch that is played in the window: events of keys and MIDI become notes, each in its gesture's thread."""
+"""A patch that is played in the window: events of keys and MIDI become notes, each in its own thread."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from engine.presets import PresetError
 from engine.resonators.string import StringParameters
 from engine.voices import Ear
 
-SEEN_DB = 70.0  # below full scale a string is seen at rest
+SEEN_DB = 70.0  # below full scale: softer strings do not light their keys
 LONGEST_RECORDING = 100_000  # events
 
 
@@ -29,8 +29,8 @@ class Live:
 
     Args:
         find: the path of a preset by its name; None where there is none.
-        report: hears of what cannot be played: a message and its details.
-        set_effects: the body and the room of what is heard.
+        report: is called with a message and its details where something cannot be played; in any thread.
+        set_effects: sets body and room of all that is heard; called in a background thread.
     """
 
     def __init__(
@@ -54,10 +54,10 @@ class Live:
         self._wished: object = None
         self._effects: Effects | None = None  # as set
         self._dry = False
-        self._told_body = ""  # what is wrong with it, which is told once
+        self._told_body = ""  # the fault of the body that was reported last
         self._preparing: object = None
         self._loud: tuple[StringParameters, float] | None = None  # the string that was played last, and its gain
-        self.seconds = 4.0  # that a picture of a note lasts
+        self.seconds = 4.0  # how long the motion of a note is shown
 
     @property
     def ready(self) -> bool:
@@ -65,7 +65,10 @@ class Live:
         return self._player is not None
 
     def set_patch(self, patch: Patch | None, ear: Ear) -> None:
-        """What keys play from now on, and where it is heard; strings that ring take it over."""
+        """What keys play from now on, and where it is heard. Strings that ring follow, if the preset is the same.
+
+        Another preset is loaded in the background; until then keys are silent. None: no patch.
+        """
         with self._lock:
             self._ear = ear
             player = self._player
@@ -85,12 +88,12 @@ class Live:
                 self._prepare(player)
                 return
             self._player = None
-        self._notes.in_background(lambda: self._begin(patch))  # first: a key shall sound at once
+        self._notes.in_background(lambda: self._begin(patch))  # before the effects: keys should sound soon
         with self._lock:
             self._wish_effects(patch)
 
     def listen(self, ear: Ear) -> None:
-        """Keys are heard from there."""
+        """Where keys are heard from now on."""
         with self._lock:
             self._ear, player = ear, self._player
         if player is not None:
@@ -98,7 +101,7 @@ class Live:
             self._prepare(player)
 
     def handle(self, event: Event) -> tuple[Struck, Note] | None:
-        """Plays an event at once; what was struck, if anything."""
+        """Plays an event at once; what it struck, and the note. None where it struck nothing."""
         struck_s = self._notes.now_s()
         with self._lock:
             player = self._player
@@ -123,7 +126,7 @@ class Live:
                 self._player.stop()
 
     def sounding(self) -> dict[int, float]:
-        """Keys whose strings ring, and how loud, 0 … 1."""
+        """Key -> how loud its string rings: 0 at SEEN_DB below full scale, 1 at full scale."""
         player = self._player
         if player is None:
             return {}
@@ -135,19 +138,19 @@ class Live:
         return found
 
     def gain_of(self, string: StringParameters) -> float:
-        """With which a string that was played sounds: a pluck by hand is as loud as its key. 1 for another."""
+        """The factor of the string that a key played last, so that a pluck by hand is as loud; 1 for any other."""
         loud = self._loud
         return loud[1] if loud is not None and loud[0] == string else 1.0
 
     def hear_dry(self, dry: bool) -> None:
-        """Without body and room, as long as models are compared with the truth."""
+        """Whether body and room are left out, as while models are compared with the truth."""
         with self._lock:
             self._dry = dry
             if self._player is not None:
                 self._wish_effects(self._player.heard_through)
 
     def _wish_effects(self, patch: Patch | None) -> None:
-        """In the background: to make an impulse response takes milliseconds. The latest wish counts."""
+        """Sets body and room in the background: an impulse response takes milliseconds. The latest call counts."""
         wish = self._wished = object()
         dry = self._dry
 
@@ -166,7 +169,7 @@ class Live:
         self._notes.in_background(work)
 
     def _prepare(self, player: Player) -> None:
-        """Computes keys before they are struck; another wish ends it."""
+        """Computes keys in the background, before they are struck; the latest call counts."""
         wish = self._preparing = object()
 
         def work() -> None:
@@ -185,14 +188,14 @@ class Live:
         return self._recorded is not None
 
     def begin_recording(self) -> None:
-        """Of what is played from now on; what was recorded before is forgotten."""
+        """Records events from now on; an earlier recording is discarded."""
         with self._lock:
             self._recorded, self._recording_began_s = [], time.monotonic()
             if self._player is not None:
                 self._note_down(PatchTurned(self._player.patch))
 
     def end_recording(self) -> list[TimedEvent]:
-        """What was played, from its first event on; empty where no key was."""
+        """The events, with times in s from the first note on; empty where there was no note."""
         with self._lock:
             events, self._recorded = self._recorded or [], None
         first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)

@@ -1,4 +1,4 @@
-"""What MIDI messages mean for the string: notes pluck, controllers turn what they were taught. No port, no widget."""
+"""What MIDI messages mean for one string: notes pluck it, controllers set the fields that they are assigned to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NoteMode = Literal["pitch", "position", "preset"]
 
 @dataclass(frozen=True)
 class Turned:
-    """What a controller can turn: the label of a field of `Choices` and its range."""
+    """What a controller can be assigned to: the label of a field of `Choices`, and its range in the field's unit."""
 
     label: str
     low: float
@@ -28,6 +28,7 @@ class Turned:
     logarithmic: bool = False
 
     def value(self, controller_value: int) -> float:
+        """The field's value for a controller at 0 … 127."""
         share = min(max(controller_value, 0), LARGEST_VALUE) / LARGEST_VALUE
         if self.logarithmic:
             return min(self.low * (self.high / self.low) ** share, self.high)
@@ -49,12 +50,12 @@ ControllerNumber = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
 
 
 class MidiChoices(BaseModel):
-    """What is remembered of MIDI.
+    """The MIDI settings, to be saved.
 
     Attributes:
         port: the input's name; "": none.
-        notes: whether a note is a pitch of the patch, says where the string is plucked, or which preset is.
-        controllers: the number of the controller that turns a field; a field that was taught none is absent.
+        notes: whether a note plays a pitch of the patch, sets the pluck position, or selects the preset.
+        controllers: field -> number of the controller that is assigned to it; other fields are absent.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -64,25 +65,29 @@ class MidiChoices(BaseModel):
     controllers: dict[TurnedField, ControllerNumber] = {}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """With `controller` turning `field`, and nothing else any more."""
+        """These choices with `controller` assigned to `field`, and to no other."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 
     def forgotten(self, field: str) -> MidiChoices:
+        """These choices with no controller assigned to `field`."""
         others = {f: c for f, c in self.controllers.items() if f != field}
         return self.model_copy(update={"controllers": others})
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """New values of `Choices`, and whether the string is plucked then."""
+    """New values of `Choices`, and whether the string is then plucked."""
 
     changes: dict[str, Any]
     plucks: bool = False
 
 
 def meaning_of(event: Event, choices: MidiChoices, reach: Reach, presets: list[str]) -> Meaning:
-    """What an event asks of the one string; a controller that was taught nothing, and a release, ask for nothing."""
+    """What an event means; for a controller that is not assigned, and for a release, nothing.
+
+    `presets`: the names that notes select, in their order.
+    """
     if isinstance(event, Controller):
         fields = [field for field, controller in choices.controllers.items() if controller == event.number]
         return Meaning({field: TURNED[field].value(event.value) for field in fields})

@@ -1,4 +1,4 @@
-"""The MIDI input: its names and its messages, through mido, which is loaded only when it is wanted."""
+"""The MIDI input, through mido, which is loaded only when it is needed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def load_backend() -> Backend:
 
 
 class MidiInput:
-    """At most one open input. `on_message` is called in mido's thread."""
+    """At most one open input. `on_message` is called in mido's thread, all else by one thread."""
 
     def __init__(self, on_message: Callable[[Event], None], load: Callable[[], Backend] = load_backend) -> None:
         self._on_message = on_message
@@ -72,7 +72,7 @@ class MidiInput:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:
-        """Listens to the input of that name, and no longer to another.
+        """Opens the input of that name, and closes any other.
 
         Raises:
             MidiUnavailable: no backend, no such input, or another program has it.
@@ -90,7 +90,7 @@ class MidiInput:
         self.name = found
 
     def close(self) -> None:
-        """May be called again."""
+        """Closes the input, if one is open; may be called again."""
         port, self._port, self.name = self._port, None, ""
         if port is not None:
             port.close()
@@ -107,7 +107,7 @@ class MidiInput:
 
 
 def same_device(one: str, other: str) -> bool:
-    """Whether two names differ by the numbers alone that ALSA gives anew at each connection ("Keys:Keys 20:0")."""
+    """Whether two names are the same but for ALSA's numbers, which change with each connection ("Keys:Keys 20:0")."""
     return _without_numbers(one) == _without_numbers(other)
 
 

@@ -1,7 +1,7 @@
-"""Who rings: notes are struck, switched between sources, listened to from elsewhere, and end.
+"""The notes that ring: struck, switched between sources, heard from other points, and ended.
 
-A gesture strikes a note in its own thread: its voices are made and handed to the mixer at once, before anybody draws
-anything. The voices of one note begin with the same frame, so that a switch between them stays in time.
+A gesture strikes a note in its own thread: its voices are made and handed to the mixer at once, before anything is
+drawn. The voices of one note begin with the same frame, so that a switch between them stays in time.
 """
 
 from __future__ import annotations
@@ -29,27 +29,30 @@ from engine.voices import Ear, Mixer, Voice, render_voice
 
 MOST_NOTES = 40  # that ring at once; the oldest makes room
 STOLEN_S = 0.03  # the fade of one that makes room
-STOP_S = 0.012
-REPLACED_S = 0.02
-BUSY = 0.75  # of the device's time: beyond, the oldest notes end, so that the others stay whole
-MATCHED_S = 1.0  # so much from the pluck on is compared to match levels
+STOP_S = 0.012  # the fade of `stop`
+REPLACED_S = 0.02  # the fade of notes that another replaces
+BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
+MATCHED_S = 1.0  # from the pluck on: the part whose levels are compared
 LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
 KEPT_MATCHES = 256
-MOST_CARRIED = 4  # notes that ring on where the device changes its rate
+MOST_CARRIED = 4  # notes that ring on when the device changes its rate
 
 Report = Callable[[str, str], None]  # a message and its details
 
 
 class Note:
-    """A pluck that was struck. Its voices know how far it is.
+    """A pluck that was struck.
 
     Attributes:
         from_s: where in its motion it begins.
-        begin_frame: of the mixer, before which it waits.
-        match: by source, the gain that brings its level to the truth's; None until it is known.
-        pending: it is not handed over yet.
-        mixer: whom it was handed to.
-        cut: it will not be heard any more: its mixer has gone, or it could not be played.
+        begin_frame: the frame of the mixer at which it begins; 0: at once.
+        voices: by source.
+        ahead: those of its voices that are rendered ahead.
+        match: by source, the factor that brings it to the level of the truth; None until it is known.
+        pending: it was not handed to a mixer yet.
+        released: it was told to fade out.
+        mixer: to which it was handed.
+        cut: it is not heard any more: its mixer was replaced, or it could not be played.
     """
 
     def __init__(self, stroke: Stroke, from_s: float = 0.0, begin_frame: int = 0) -> None:
@@ -63,39 +66,40 @@ class Note:
         self.mixer: Mixer | None = None
         self.cut = False
         self.timed = False  # its latency has been noted
-        self.adopted = False  # its voices are another's, who changes them
+        self.adopted = False  # its voices were made by a caller of `adopt`, who changes them
 
     @property
     def over(self) -> bool:
+        """Whether it has ended: nothing of it will be heard any more."""
         if self.cut or self.pending:
             return self.cut or self.released
         return all(voice.over for voice in self.voices.values())
 
     @property
     def seconds(self) -> float:
-        """How long it has been ringing, as far as the device was given it."""
+        """The time in its motion up to which the device has its samples."""
         if self.pending:
             return self.from_s
         return max((voice.seconds for voice in self.voices.values()), default=0.0)
 
     @property
     def began(self) -> bool:
-        """Whether the device was given any of it, or would have been."""
+        """Whether the device has any of its samples, or it was cut after it was handed over."""
         return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
 
     @property
     def waits_s(self) -> float:
-        """How long it will still be rendered before it sounds."""
+        """For how many seconds it will still be rendered before it sounds; 0: it does not wait, or not known."""
         waits = self.pending and not self.over
         return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
 
     @property
     def began_frame(self) -> int:
-        """Of the mixer; 0 before it began."""
+        """The frame of the mixer at which it began; 0 before that."""
         return max((voice.began_frame for voice in self.voices.values()), default=0)
 
     def frame_at(self, seconds: float) -> int:
-        """The frame of its mixer at which it will have been ringing for so long; only after it began."""
+        """The frame of its mixer at which its motion reaches a time; only once it has begun."""
         assert self.mixer is not None
         rate_hz = self.mixer.rate_hz
         skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
@@ -103,21 +107,22 @@ class Note:
         return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
     def release_at(self, frame: int) -> None:
-        """Fades out from a frame of the mixer on; 0: it rings on."""
+        """Lets it fade out from a frame of the mixer on; 0: not any more."""
         for voice in self.voices.values():
             voice.release_at(frame)
 
     def release(self, seconds: float) -> None:
+        """Lets it fade out within so many seconds, from now on."""
         self.released = True
         for voice in self.voices.values():
             voice.release(seconds)
 
 
 class Notes:
-    """All public methods but `poll` may be called from any thread.
+    """All public methods but `poll` and `close`, which are the window's, may be called from any thread.
 
     Args:
-        report: hears of what cannot be played, in any thread.
+        report: is called with a message and its details where something cannot be played; in any thread.
     """
 
     def __init__(self, sound: Sound, sources: Sources, report: Report) -> None:
@@ -137,12 +142,15 @@ class Notes:
     # Gestures
 
     def strike(self, stroke: Stroke, from_s: float = 0.0, alone: bool = False, begin_frame: int = 0) -> Note:
-        """Lets a string go, beside those that ring. Returns at once; it sounds with the next quantum of the device.
+        """Plucks a string, while other notes ring on. Returns at once.
+
+        It sounds with the next quantum of the device, unless presets must be loaded or a model is rendered ahead.
+
 
         Args:
-            from_s: begins so much later in its motion.
-            alone: those that ring fade out.
-            begin_frame: waits for this frame of the mixer.
+            from_s: where in its motion it begins.
+            alone: whether the other notes fade out.
+            begin_frame: the frame of the mixer at which it begins; 0: at once.
         """
         struck_s = 0.0 if from_s or begin_frame else self._sound.now_s()  # only gestures are timed
         note = Note(stroke, from_s, begin_frame)
@@ -158,9 +166,12 @@ class Notes:
         return note
 
     def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float) -> Note:
-        """A note whose voices somebody else made, at the rate of the present mixer; it sounds with the next quantum.
+        """A note of given voices, which have the rate of the present mixer; it sounds with the next quantum.
 
-        It ends where the device changes its rate. Its levels are those of `stroke.gain`.
+        It ends when the device changes its rate. All its sources have the gain of the stroke: they are not matched.
+
+        Args:
+            struck_s: when the gesture was, by `now_s`.
         """
         note = Note(stroke)
         note.adopted, note.voices, note.match = True, dict(voices), dict.fromkeys(voices, 1.0)
@@ -178,11 +189,11 @@ class Notes:
 
     @property
     def rate_hz(self) -> int:
-        """Of the voices that are played now."""
+        """The present rate of the device."""
         return self._sound.rate_hz
 
     def in_background(self, work: Callable[[], None]) -> None:
-        """Does it after what waits already; its faults are told."""
+        """Does `work` in the helper's thread, after what waits there; its errors are reported."""
         self._submit(self._guarded(work))
 
     def have(self, stroke: Stroke) -> bool:
@@ -198,7 +209,7 @@ class Notes:
                 self._submit(self._guarded(lambda subject=subject: self._sources.prepare(subject, rate_hz)))  # type: ignore[misc]
 
     def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
-        """Computes in the background what voices of these plucks set out from; the latest wish counts."""
+        """Computes in the background where voices of these plucks start; the latest call counts."""
         rate_hz = self._sound.rate_hz
         wish = self._wished_plucks = object()
 
@@ -211,13 +222,13 @@ class Notes:
         self._submit(self._guarded(work))
 
     def stop(self, seconds: float = STOP_S) -> None:
-        """All fade out; what waits is not heard."""
+        """Lets all notes fade out; those that wait will not sound."""
         with self._lock:
             for note in self._notes:
                 note.release(seconds)
 
     def set_mix(self, mix: Mix) -> None:
-        """What is heard of all notes, from now on: a cross-fade where they ring."""
+        """Sets what is heard of all notes; those that ring are cross-faded."""
         with self._lock:
             self._mix = mix
             notes = list(self._notes)
@@ -228,12 +239,12 @@ class Notes:
                 self._wish_match(note)
 
     def listen(self, ear: Ear) -> None:
-        """From where, from now on: a fade where they ring; another pick-up counts from the next pluck."""
+        """Sets where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
         with self._lock:
             self._ear = ear
 
     def render(self, stroke: Stroke, rate_hz: int, seconds: float) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """Each source of a pluck as it is heard, (frames, channels), in the background; for no loudspeaker."""
+        """The sound of each source, (frames, channels), rendered in the background and not played."""
 
         def work() -> Mapping[str, NDArray[np.float32]]:
             found = {}
@@ -252,20 +263,17 @@ class Notes:
 
     @property
     def ringing(self) -> int:
-        """Notes that were struck, waiting ones among them, and not told to end."""
+        """The number of notes that were neither released nor have ended; those that wait are counted."""
         with self._lock:
             return sum(not note.over and not note.released for note in self._notes)
 
     @property
     def latencies_s(self) -> tuple[float, ...]:
-        """From gestures to the callbacks that gave their first samples to the device, the latest last."""
+        """Times from gestures to the callbacks that gave their first samples to the device, the latest last."""
         return tuple(self._latencies_s)
 
-    def match_of(self, stroke: Stroke) -> Mapping[str, float] | None:
-        return self._matches.get(stroke.matching_key)
-
     def poll(self) -> None:
-        """Now and then: forgets what is over, moves listening points, keeps the load bounded."""
+        """Forgets notes that ended, moves listening points, bounds the load. The window calls it at each frame."""
         with self._lock:
             self._carry()
             self._notes = [note for note in self._notes if not note.over]
@@ -284,7 +292,7 @@ class Notes:
                 self._make_room(max(1, self.ringing - 2))
 
     def close(self) -> None:
-        """May be called again."""
+        """Ends the threads; may be called again."""
         self._closed = True
         self._helper.shutdown(wait=True, cancel_futures=True)
         self._ahead.close()
@@ -292,7 +300,7 @@ class Notes:
     # How it is done
 
     def _guarded(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
-        """Faults are told, and end the note."""
+        """`work` with its errors reported; they cut the note."""
 
         def guarded() -> None:
             try:
@@ -312,7 +320,7 @@ class Notes:
             self._helper.submit(work)
 
     def _carry(self) -> None:
-        """Where the device has changed its rate, the latest notes ring on in its new mixer."""
+        """When the device has changed its rate, the latest notes ring on in its new mixer."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
         ringing = [note for note in left if note.seconds and not (note.released or note.adopted)][-MOST_CARRIED:]
@@ -325,7 +333,7 @@ class Notes:
                 note.cut = True
 
     def _begin(self, note: Note, struck_s: float) -> None:
-        """Makes the voices and hands them over, again where the device has changed its rate meanwhile."""
+        """Makes the voices and hands them over; again where the device changes its rate meanwhile."""
         for _ in range(3):
             mixer = self._sound.mixer
             self._make_voices(note, mixer.rate_hz, struck_s)
@@ -358,7 +366,7 @@ class Notes:
             except (PresetError, ValueError):
                 if source not in stroke.others:
                     raise
-                continue  # what stands beside it is at rest; who draws it tells why
+                continue  # another preset that cannot be used; the render worker reports why
             if model is None:
                 voices[source] = Voice(program, initial_m, stroke.ear, 0.0, begin=begin)
                 continue
@@ -379,11 +387,11 @@ class Notes:
         note.ahead, note.voices = ahead, voices
 
     def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
-        """One of its models is; in any thread."""
+        """Hands the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(each.begun for each in ahead):
                 return
-            note.handed_over = True  # two that are ready at the same time would both do it
+            note.handed_over = True  # or two that are ready at the same time would both do it
         self._skip(note)
         if not self._hand_over(note, self._sound.mixer):
             note.handed_over, note.begin_frame = False, 0
@@ -394,7 +402,7 @@ class Notes:
         self._report(f"This pluck cannot be rendered: {error}", "")
 
     def _hand_over(self, note: Note, mixer: Mixer) -> bool:
-        """False where the mixer is another one now, with another rate."""
+        """Whether it could; False where the device has another mixer by now."""
         with self._lock:
             if note.over:
                 return True
@@ -413,7 +421,7 @@ class Notes:
         return True
 
     def _make_room(self, most: int) -> None:
-        """The oldest end where more ring."""
+        """Releases the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
         for note in ringing[: max(0, len(ringing) - most)]:
             note.release(STOLEN_S)
@@ -458,7 +466,7 @@ class Notes:
                     self._apply_mix(each)
 
     def _level(self, note: Note, source: str, seconds: float) -> float:
-        """Root mean square of the first seconds; 0, so that it is left as it is, where it is not known."""
+        """Root mean square of the first `seconds`; 0 where it is not known, so that the source stays as it is."""
         stroke = note.stroke
         subject, kind = stroke.subject(source), "truth" if source == "truth" else "model"
         rate_hz = min(self._sound.rate_hz, 48_000)

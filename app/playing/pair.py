@@ -13,7 +13,11 @@ STOP_S = 0.012
 
 
 class Pair:
-    """Samples of the mixer's own rate, by name, (frames, channels) of one length. All is called by one thread."""
+    """Both sounds play on, and one of them is heard. For one thread.
+
+    Args:
+        samples: name -> (frames, channels) at the mixer's rate, all of one length.
+    """
 
     def __init__(self, mixer: Mixer, samples: Mapping[str, NDArray[np.float32]]) -> None:
         self.mixer, self._samples = mixer, samples
@@ -21,13 +25,13 @@ class Pair:
         self._heard = ""
 
     def select(self, name: str) -> None:
-        """Which one is heard, from now on: a cross-fade where they sound."""
+        """Sets which one is heard; where they sound, it is a cross-fade."""
         self._heard = name
         for each, voice in self._voices.items():
             voice.set_gain(float(each == name))
 
     def play(self, anew: bool = False) -> None:
-        """Begins where nothing sounds, or `anew`; otherwise both go on."""
+        """Starts both where nothing sounds, or `anew`; otherwise they go on."""
         if self._voices and not anew:
             return
         self.stop()

@@ -1,4 +1,4 @@
-"""A MIDI file played into the window: its events at their times, from a thread of its own."""
+"""Plays a MIDI file: its events at their times, from a thread of its own."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ JOIN_S = 2.0
 
 
 class Playback:
-    """Plays one list of events after the other.
+    """Plays one list of events at a time.
 
     Args:
         handle: plays an event; called in the playback's thread.
-        ended: is told when the last event has been played, or it was stopped; in the playback's thread.
+        ended: is called when the last event was played, or it was stopped; in the playback's thread.
     """
 
     def __init__(self, handle: Callable[[Event], object], ended: Callable[[], None] = lambda: None) -> None:
@@ -31,7 +31,7 @@ class Playback:
         return thread is not None and thread.is_alive()
 
     def play(self, events: Sequence[TimedEvent]) -> None:
-        """From their beginning; what is being played ends."""
+        """Plays these events from their beginning; stops what is being played."""
         self.stop()
         self._stopping = threading.Event()
         work = (sorted(events, key=lambda each: each.time_s), self._stopping)
@@ -39,7 +39,7 @@ class Playback:
         self._thread.start()
 
     def stop(self) -> None:
-        """Lets go of every key; may be called again."""
+        """Stops, and releases every key; may be called again."""
         self._stopping.set()
         thread, self._thread = self._thread, None
         if thread is not None and thread is not threading.current_thread():

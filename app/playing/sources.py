@@ -1,4 +1,4 @@
-"""Presets in memory, with what their voices and pictures are made of."""
+"""Presets in memory, with the programs of their voices and where plucks start."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ Array = NDArray[np.float64]
 
 
 class Sources:
-    """Any thread. What is not there yet is loaded by whoever asks first; nobody else waits for that."""
+    """For any thread. The first caller loads what is missing; callers who need nothing of it do not wait."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()  # of what is there, for a moment
-        self._loading = threading.RLock()  # one after the other
+        self._lock = threading.Lock()  # of the dictionaries, for a moment
+        self._loading = threading.RLock()  # one load after the other
         self._presets: OrderedDict[Subject, Loaded] = OrderedDict()
         self._begins: OrderedDict[tuple[Subject, str, int, Pluck], tuple[Tensor, tuple[Array, Array]]] = OrderedDict()
         self._programs: dict[tuple[Subject, str, int], Program] = {}
 
     def has(self, subject: Subject, rate_hz: int) -> bool:
-        """Whether a strike of it would not have to wait."""
+        """Whether it is loaded with both programs at this rate, so that a strike would not wait."""
         with self._lock:
             return subject in self._presets and all((subject, kind, rate_hz) in self._programs for kind in KINDS)
 
     def load(self, subject: Subject) -> Loaded:
-        """Raises PresetError."""
+        """The preset, or a string of it, from memory or from its file. Raises PresetError."""
         if (found := self._known(subject)) is not None:
             return found
         with self._loading:
@@ -60,7 +60,7 @@ class Sources:
         return of_string(self.load(subject.path).preset, subject.string)
 
     def program(self, subject: Subject, kind: str, rate_hz: int) -> Program:
-        """Of a preset's "model" or "truth" at a device's rate. Raises PresetError."""
+        """The program of a voice; `kind`: "model" or "truth", `rate_hz`: of the device. Raises PresetError."""
         key = (subject, kind, rate_hz)
         if (found := self._programs.get(key)) is not None:
             return found
@@ -76,7 +76,10 @@ class Sources:
             return found
 
     def begin(self, subject: Subject, kind: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
-        """A pluck's displacement (grid_points,) in m, and what a voice of the program sets out from; remembered."""
+        """A pluck's displacement (grid_points,) in m, and the start of a voice of the program. Both are kept.
+
+        Raises PresetError.
+        """
         key = (subject, kind, rate_hz, pluck)
         with self._lock:
             found = self._begins.pop(key, None)
@@ -96,7 +99,7 @@ class Sources:
             self.program(subject, kind, rate_hz)
 
     def _known(self, subject: Subject) -> Loaded | None:
-        """And used now."""
+        """The loaded preset, marked as used last; None: not loaded."""
         with self._lock:
             found = self._presets.get(subject)
             if found is not None:

@@ -1,4 +1,4 @@
-"""What is plucked, and how loud each of its sources is heard: values."""
+"""What is plucked, and with which gain each of its sources is heard: values."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ class Stroke:
     """A pluck of a preset's string.
 
     Attributes:
+        preset: a preset, or a string of a preset of many.
+        ear: where and how it is heard.
         seconds: how long a model that is rendered ahead lasts at most; all others ring until they are silent.
-        sources: voices that are wanted: "model", "truth", and others' names.
-        gain: of all its sources, beside what is chosen for each.
-        others: paths of other presets by source name, `OTHER` and their name.
+        sources: the sources that get a voice: "model", "truth", and keys of `others`.
+        others: source -> path of another preset; such a source is "preset:NAME".
+        gain: a factor for all its sources, beside that of the mix.
     """
 
     preset: Subject
@@ -33,7 +35,7 @@ class Stroke:
     gain: float = 1.0
 
     def subject(self, source: str) -> Subject:
-        """What a source is the sound of."""
+        """The preset or string whose sound a source is."""
         return self.others.get(source, self.preset)
 
     @property
@@ -47,9 +49,9 @@ class Mix:
     """What is heard of notes.
 
     Attributes:
-        heard: a source's name, or `DIFFERENCE`.
-        matched: each source sounds with the gain that brings its level to the truth's, once that is known.
-        difference_gain_db: of the difference.
+        heard: a source, or `DIFFERENCE`.
+        matched: whether each source is brought to the level of the truth, once its gain is known.
+        difference_gain_db: the gain of the difference.
     """
 
     heard: str = "model"
@@ -57,11 +59,14 @@ class Mix:
     difference_gain_db: float = 0.0
 
     def of(self, sources: Iterable[str]) -> Mix:
-        """Where what is heard is none of these, the model is."""
+        """This mix, with the model heard where `heard` is none of these sources."""
         return self if self.heard in (DIFFERENCE, *sources) else replace(self, heard="model")
 
     def gain(self, source: str, match: Mapping[str, float] | None) -> float:
-        """With which a voice sounds; 0: it is only kept ready."""
+        """The factor of a source's voice; 0: it is not heard.
+
+        `match`: by source, the factor that brings it to the level of the truth; None: not known yet.
+        """
         if self.heard == DIFFERENCE:
             gain = float(10 ** (self.difference_gain_db / 20))
             return {"model": gain, "truth": -gain}.get(source, 0.0)
@@ -70,7 +75,7 @@ class Mix:
         return match.get(source, 1.0) if self.matched and match else 1.0
 
     def gain_db(self, source: str, match: Mapping[str, float] | None) -> float | None:
-        """With which a slot's content is heard, in dB; None while that is not known."""
+        """The gain with which a slot's content is heard, in dB; None while it is not known."""
         if source == DIFFERENCE:
             return self.difference_gain_db
         if not self.matched:

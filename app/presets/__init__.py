@@ -1,1 +1,1 @@
-"""Which presets there are, and their facts in words."""
+"""The presets that can be chosen: finding, installing and filtering them, and their facts in words."""

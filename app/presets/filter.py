@@ -19,9 +19,10 @@ class PresetFilter:
     """What is searched for; empty or 0 matches anything.
 
     Attributes:
-        words: parts of words, in any order, separated by blanks or commas; all of them must match.
-        order: by distance of the sound from the truth, by name, or by validation error; unknown values come last.
+        words: parts of words, in any order, separated by blanks or commas; all of them must occur.
         string: as `PresetInfo.string_kind`.
+        model: as `PresetInfo.model`.
+        order: by distance of the sound from the truth, by name, or by validation error; unknown values come last.
     """
 
     words: str = ""
@@ -45,6 +46,7 @@ class PresetFilter:
         return known is None, known or 0.0
 
     def matches(self, entry: PresetEntry, favourites: Collection[str]) -> bool:
+        """Whether `entry` is listed. `favourites`: names of presets."""
         info = entry.info
         if self.favourites_only and entry.name not in favourites:
             return False
@@ -60,7 +62,7 @@ class PresetFilter:
 
 
 def searched_text(entry: PresetEntry) -> str:
-    """The text of a preset that a search compares with, in lower case."""
+    """The text of a preset that is searched for words, in lower case."""
     info = entry.info
     parts = (
         info.title,

@@ -1,4 +1,4 @@
-"""Where presets lie: the shipped folder and the user's own, known without loading anything heavy."""
+"""Where presets lie: the shipped folder and the user's own. Importing this does not load torch."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ FOLDER_VARIABLE = "LEARNED_STRINGS_PRESETS"
 
 
 def user_folder() -> Path:
-    """LEARNED_STRINGS_PRESETS, else the platform's place for a user's data. It need not be there."""
+    """The path in LEARNED_STRINGS_PRESETS, else `presets` in the platform's folder for a user's data.
+
+    The folder need not exist.
+    """
     given = os.environ.get(FOLDER_VARIABLE)
     return Path(given) if given else user_data_path("learned-strings", appauthor=False) / "presets"
 
 
 def usable_files() -> list[Path]:
-    """The files that names mean, by name: of two of one name, the shipped one."""
+    """The file of each preset, sorted by name; of two with the same name, the shipped one."""
     from engine.presets import finding
 
     folders = (user_folder(), finding.SHIPPED)

@@ -1,7 +1,8 @@
 """How true a preset sounds, in a musician's words.
 
-What is named can be heard: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the next
-(Moore, "An Introduction to the Psychology of Hearing"). Levels have 2 dB: seconds of decay lie between the two.
+Only what can be heard is named: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the
+next (Moore, "An Introduction to the Psychology of Hearing"). For changes of level the threshold is 2 dB, because they
+are heard over seconds of decay and not from one tone to the next.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from training.heard_file import Heard
 NOTICED_CENTS = 3.0
 NOTICED_CHANGE_DB = 2.0
 NOTICED_DISTANCE_DB = 1.0
+NOTICED_HUM_DB = -80.0  # of full scale: 40 dB below a soft pluck; a quiet room hides what is softer
 UNMEASURED = "not measured"
 
 
 def heard_word(heard: Heard | None) -> str:
-    """For a list: "true", the worst that is wrong, or how far it is off."""
+    """For a list: "true", the worst fault, or the distance of the spectra in dB."""
     if heard is None:
         return UNMEASURED
     if found := faults(heard):
@@ -26,7 +28,7 @@ def heard_word(heard: Heard | None) -> str:
 
 
 def heard_sentence(heard: Heard | None, name: str) -> str:
-    """For a card: all that a listener finds, and how far model and truth are apart."""
+    """For a preset's card: all faults, and the distance of the spectra in dB. `name`: the preset's."""
     if heard is None:
         return f"{UNMEASURED}; to measure it: learned-strings evaluate {name} --heard --write"
     apart = f"spectra {heard.distance_db:.2g} dB apart over {heard.seconds:.2g} s"
@@ -36,7 +38,7 @@ def heard_sentence(heard: Heard | None, name: str) -> str:
 
 
 def faults(heard: Heard) -> list[str]:
-    """What would mislead a musician, by name: first what exceeds its threshold most."""
+    """Every fault above its threshold, in words; first the one that exceeds its threshold by the largest factor."""
     found = []
     if heard.runs_away_s is not None:
         found.append((math.inf, f"runs away after {heard.runs_away_s:.1f} s"))
@@ -48,6 +50,9 @@ def faults(heard: Heard) -> list[str]:
         found.append((heard.split_cents / NOTICED_CENTS, f"two pitches, {heard.split_cents:.0f} cents apart"))
     if heard.pitch_cents is not None and abs(heard.pitch_cents) >= NOTICED_CENTS:
         found.append((abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {_signed(heard.pitch_cents)} cents"))
+    if heard.hum_db is not None and heard.hum_db >= NOTICED_HUM_DB:
+        loudness = 10 ** ((heard.hum_db - NOTICED_HUM_DB) / 20)
+        found.append((loudness, f"hums on at {_signed(heard.hum_db)} dB"))
     return [text for _, text in sorted(found, key=lambda fault: -fault[0])]
 
 

@@ -1,4 +1,4 @@
-"""A preset file from anywhere becomes one of the user's own."""
+"""Copies a preset file into the user's own folder, after all checks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SUFFIX = ".safetensors"
 
 
 class InstallError(Exception):
-    """A file that did not become a preset. The message names it, what is wrong and the remedy."""
+    """A file could not be installed. The message names it, what is wrong and the remedy."""
 
 
 @dataclass(frozen=True)
 class Installed:
-    """Where a preset is now; `was_there`: it already was, byte by byte."""
+    """Where the preset is. `was_there`: nothing was copied, as a preset with the same bytes was there already."""
 
     name: str
     path: Path
@@ -28,13 +28,13 @@ class Installed:
 
 
 def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Installed:
-    """Copies a preset that was checked into `folder`, which is made where it is not there.
+    """Checks a preset file and copies it into `folder`, which is made if needed.
 
     Args:
-        present: the files of all presets there are; a name that is taken gets a number.
+        present: the files of all presets; where one of them has the same name, a number is appended.
 
     Raises:
-        InstallError: the file is no usable preset, or the copy cannot be written; nothing is left.
+        InstallError: the file is no usable preset, or the copy cannot be written; no part of it is left then.
     """
     try:
         ModelSource(load_preset(file))  # all checks, and that a pluck can start it

@@ -32,7 +32,12 @@ STUDIO = "studio_"  # begins the names of presets at full bandwidth
 
 @dataclass(frozen=True)
 class PresetEntry:
-    """A preset that can be chosen, known by its metadata alone, and `heard`: how true it sounds, if that is known."""
+    """A preset that can be chosen, of which only the metadata has been read.
+
+    Attributes:
+        parameters: how many the model has.
+        heard: how its sound differs from the truth's; None where it has not been measured.
+    """
 
     name: str
     path: Path
@@ -48,24 +53,24 @@ class PresetEntry:
 
     @property
     def studio(self) -> bool:
-        """Whether it is listed before the research presets: at full bandwidth, for playing."""
+        """Whether it is a studio preset (full bandwidth, for playing), which are listed before research presets."""
         return self.name.startswith(STUDIO)
 
     @property
     def title(self) -> str:
-        """As it is listed: a copy in the user's folder is told from the shipped one."""
+        """As listed, in one line; the user's own are marked, so that a copy differs from the shipped one."""
         title = one_line(self.info.title, LONGEST_TITLE)
         return f"{title} (yours)" if self.own else title
 
 
 class Library:
-    """The presets, found by name: studio presets first, by name among each other. `changed`: they are others now."""
+    """The presets that can be chosen, as `list_presets` orders them. `changed` is emitted when `entries` is new."""
 
     changed = Signal()
 
     def __init__(self, entries: list[PresetEntry]) -> None:
         self.entries = entries
-        self._problems: list[str] = []  # that have been told
+        self._problems: list[str] = []  # as last returned by `list_presets`
 
     @property
     def names(self) -> list[str]:
@@ -75,7 +80,7 @@ class Library:
         return next((entry for entry in self.entries if entry.name == name), None)
 
     def first(self) -> PresetEntry | None:
-        """What a first start shows: the string of every string, or else the best of the highest rate."""
+        """The preset of the first start: `FIRST`, else the one of the least error among those of the highest rate."""
         if (chosen := self.find(FIRST)) is not None:
             return chosen
         highest_hz = max((entry.info.rate_hz for entry in self.entries), default=0)
@@ -83,9 +88,9 @@ class Library:
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
 
     def refresh(self) -> list[str]:
-        """Reads the folders again; whoever holds this library has the new entries.
+        """Reads the folders again and replaces `entries` where they have changed.
 
-        Returns what is not usable, without what was told the last time.
+        Returns a line for each file that cannot be used, without those of the last time.
         """
         entries, problems = list_presets()
         if entries != self.entries:
@@ -98,7 +103,8 @@ class Library:
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     """The usable presets, studio ones first, then by name; and a line for each file that cannot be used.
 
-    By default those of the shipped and of the user's folder; of two of one name, the one of the first folder.
+    Args:
+        folders: by default the shipped one and the user's; of two presets of one name, that of the earlier folder.
     """
     entries: dict[str, PresetEntry] = {}
     folders = folders or (SHIPPED, user_folder())
@@ -116,9 +122,9 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                 entries[path.stem] = replace(entry, heard=heard.get(preset_digest(path))) if heard else entry
             except PresetError as error:
                 problems.append(str(error))
-            except OSError as error:  # taken away meanwhile
+            except OSError as error:  # such as a file that was deleted meanwhile
                 problems.append(f"{path}: cannot be read ({error.strerror})")
-            except Exception as error:  # whatever one file brings about, the others are listed
+            except Exception as error:  # no fault of one file may keep the others from being listed
                 problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
     models = Counter(title for title, _ in {(entry.title, entry.info.model) for entry in entries.values()})
     for name, entry in entries.items():
@@ -130,14 +136,17 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
 
 @functools.lru_cache(maxsize=512)
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
-    """Remembered for as long as the file is the same one: the browser looks each time that it opens."""
+    """Cached by time and size of the file, because the browser lists all presets whenever it opens."""
     info = read_info(path)
     listed = replace(info, title=display_title(path.stem, info))
     return PresetEntry(path.stem, path, listed, described_parameters(path, info), size_bytes)
 
 
 def display_title(name: str, info: PresetInfo) -> str:
-    """Of a preset that fills a cell of the paper's tables, the cell's title, however old the file; else its own."""
+    """The title of the cell of the paper's tables that a preset belongs to, by name and content; else its own title.
+
+    A file from before a title was changed has the old one in it.
+    """
     try:
         cell = Cell.parse(name)
     except SchemaError:

@@ -21,12 +21,12 @@ _MODELS = {
 
 
 def model_word(model: str) -> str:
-    """The model's name as it is shown; one that has none here keeps its own."""
+    """The name by which a model is shown; its key in `MODELS` where it has no name here."""
     return _MODELS.get(model, (model, ""))[0]
 
 
 def model_meaning(model: str) -> str:
-    """What such a model does, in one phrase; empty where nothing is known."""
+    """What such a model does, in one phrase; "" where none is written here."""
     return _MODELS.get(model, ("", ""))[1]
 
 
@@ -59,10 +59,10 @@ def time_word(seconds: float) -> str:
 
 
 def error_word(info: PresetInfo) -> str:
-    """The relative mean absolute error on data it has not seen, in percent."""
+    """The relative mean absolute error on validation data, in percent; "–" where it is not known."""
     return "–" if info.rel_mae is None else percent(info.rel_mae)
 
 
 def percent(share: float) -> str:
-    """Two digits of a small share, which matter, and no more of a large one."""
+    """A share in percent, with two digits below 10 % and none behind the point from there on."""
     return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"

@@ -1,4 +1,4 @@
-"""From a pluck to what is seen and drawn of it: the take, and the worker thread that renders it."""
+"""From a pluck to the pictures and signals that the window shows: the take, and the worker thread that renders it."""
 
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.take import SOURCES, Take

@@ -1,4 +1,4 @@
-"""One pluck in the worker's hands: the motions and signals of its sources, made block by block."""
+"""One pluck that the worker renders: the motions and signals of its sources, block by block."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ from engine.sources import ModelSource
 from engine.voices import Ear
 
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
-BLOCK_FRAMES = 2048  # pictures; each block is twice as long as the last, up to this: another pluck waits for no more
+BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
 class Job:
     """Renders a request; `advance` does the next block of it.
 
     Args:
-        load: a preset's model and truth.
+        load: returns a preset's model and truth; raises PresetError.
+        listener: called in the thread that calls `advance`.
         helper: another thread, so that two sources are rendered at the same time.
 
     Attributes:
-        take: what it makes; None before the first block.
+        take: the result, which grows; None before the first block.
     """
 
     def __init__(
@@ -43,23 +44,24 @@ class Job:
         self._lines: dict[str, Line] = {}
         self.take: Take | None = None
         self._strobe: Strobe | None = None
-        self._coming: Listened | None = None  # what is heard elsewhere, until all of it is there
+        self._coming: Listened | None = None  # signals at new listening points, until they are complete
         self._errors = ErrorSums(0)
         self._measured = 1  # pictures; the first is no prediction
-        self._finished = False  # and told
+        self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
     def ask_again(self, request: RenderRequest) -> None:
-        """The same motion, beside other presets, heard elsewhere, or slower."""
+        """Takes a request for the same motion that differs in listening points, slow motion or other presets."""
         self.request = request
 
     @property
     def age_s(self) -> float:
-        """Since it was asked for."""
+        """Seconds since the request."""
         return time.monotonic() - self._begun_s
 
     @property
     def rendered_s(self) -> float:
+        """Seconds of the motion that are rendered."""
         return 0.0 if self.take is None else self.take.ready_frames / self.take.picture_hz
 
     @property
@@ -76,10 +78,11 @@ class Job:
         )
 
     def advance(self) -> None:
-        """Does a block.
+        """Renders a block of each source.
 
         Raises:
             PresetError: the preset cannot be used.
+            ValueError: its model cannot start from a displaced string at rest alone.
         """
         begins = self.take is None
         take = self.take = self.take or self._begin()
@@ -109,7 +112,7 @@ class Job:
         return take
 
     def _find_others(self, take: Take) -> None:
-        """Begins the models of other presets that are asked for now and have not been yet."""
+        """Begins the models of other presets that are newly requested."""
         for path in self.request.others:
             name = OTHER + path.stem
             if name in self._lines:
@@ -130,7 +133,7 @@ class Job:
             take.others[name] = motion
 
     def _show(self, take: Take) -> None:
-        """Begins the flashes anew, where the slow motion is another; those on their way are finished first."""
+        """Begins new flashes where the slow motion has changed; flashes that are under way are finished first."""
         behind = any(self._lines[name].behind for name in self._wanted() if name in self._lines)
         if self._strobe != (strobe := self._wanted_strobe(take)) and not behind:
             self._strobe = strobe
@@ -138,9 +141,10 @@ class Job:
                 line.show(strobe)
 
     def _listen(self, take: Take) -> None:
-        """Listens elsewhere, where that is asked for.
+        """Begins new signals where the listening points have changed.
 
-        What is whole stays until the other is: a point that is dragged is drawn as often as all of it is rendered.
+        Complete signals stay until the new ones are complete, so that plots follow a point that is dragged as often
+        as it can be rendered.
         """
         ear = self.request.ear
         if self._coming is not None and self._is_whole(self._coming):
@@ -161,7 +165,7 @@ class Job:
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
     def _advance_lines(self, take: Take) -> None:
-        """Renders a block of both sources, and of others up to there; the first here, the helper does the others."""
+        """Renders a block of model and truth, and others up to its end; the model here, the rest in the helper."""
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
         most = BLOCK_FRAMES * truth.stride
@@ -188,5 +192,5 @@ class Job:
 
 
 def _stride(model: ModelSource) -> int:
-    """Samples between pictures: of a model that must step through every frame each is kept, at no more work."""
+    """Samples between pictures; 1 for a model that must step through every frame, which are then all kept."""
     return picture_stride(model.rate_hz) if model.any_frame else 1

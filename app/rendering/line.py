@@ -1,4 +1,4 @@
-"""One source of a take on its way: its pictures, its flashes and its signal, each rendered onwards by blocks."""
+"""One source of a take while it is rendered: its pictures, its flashes and its signal, block by block."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ class Line:
     """Renders a source into its motion and its signal.
 
     Args:
-        source: None is a string at rest.
-        program: of its voice, at the preset's rate.
+        source: None for a string at rest.
+        program: of its voice, at the preset's rate; None where `source` is.
+        motion: filled with the pictures.
+        seconds: of the take.
         stride: samples between two pictures.
 
     Attributes:
@@ -47,8 +49,8 @@ class Line:
         self._initial = _initial_m(pluck, info.grid_points, info.modes)
         self._pictures = _Frames(source, self._initial)
         self._flashes: Flashes | None = None
-        self._shown: _Frames | None = None  # what shows them, where they are behind the pictures
-        self._listening: Listening | None = None  # until its signal is whole
+        self._shown: _Frames | None = None  # renders flashes that were requested after the pictures
+        self._listening: Listening | None = None  # until its signal is complete
 
     @property
     def done(self) -> int:
@@ -60,31 +62,31 @@ class Line:
 
     @property
     def behind(self) -> bool:
-        """Whether flashes that were asked for later than the pictures are on their way."""
+        """Whether flashes that were requested after the pictures are still being rendered."""
         return self._shown is not None
 
     @property
     def ends_s(self) -> float | None:
-        """The time of the last believable picture, where the source ran away; it is at rest from there on."""
+        """The time of the last valid frame where the source ran away, and is at rest since; None: it did not."""
         ends = self._pictures.ends
         return None if ends is None else ends / self.rate_hz
 
     def until(self, time_s: float) -> int:
-        """How many more samples there are before a time."""
+        """How many samples are left to be rendered before a time."""
         return max(0, min(self.frames, int(np.ceil(time_s * self.rate_hz))) - self.done)
 
     def show(self, strobe: Strobe) -> None:
-        """Shows the flashes of another strobe, when all that there can be are there."""
+        """Begins the flashes of another strobe; they replace the present ones when they have caught up."""
         flashes = self._flashes = Flashes(strobe, self.rate_hz, self.frames, self._initial.shape[1])
         if self.stride > 1 and self.done:
             self._shown = _Frames(self._source, self._initial)
             return
-        numbers = flashes.needed(0, self.done)  # all frames are kept
+        numbers = flashes.needed(0, self.done)  # the motion has every frame, or none yet
         flashes.take(self.done, numbers, self.motion.read()[numbers])
         self.motion.flashes = flashes
 
     def listen(self, ear: Ear) -> Signal:
-        """Listens from elsewhere."""
+        """Begins a new signal for these listening points, and returns it; the present one is not continued."""
         signal = Signal(self.rate_hz, len(ear.points), self._seconds)
         if self._source is None or self._program is None:
             signal.end_in_silence()
@@ -95,7 +97,7 @@ class Line:
         return signal
 
     def advance(self, samples: int) -> None:
-        """Renders pictures and flashes of the next samples, what flashes are behind, and a block of the signal."""
+        """Renders pictures and flashes of the next samples, flashes that are behind, and a block of the signal."""
         first, stop, flashes = self.done, self.done + samples, self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
@@ -122,11 +124,11 @@ class Line:
 
 
 class _Frames:
-    """Some frames of a source one after the other, at rest from where it runs away.
+    """Renders wanted frames of a source in ascending order; the string is at rest from where it runs away.
 
     Attributes:
-        done: frames so far, whether they were wanted or not.
-        ends: the last believable one before those among which it ran away.
+        done: frames that are passed, wanted or not.
+        ends: the last frame before the call in which it ran away; None: it has not.
     """
 
     def __init__(self, source: StringSource | None, initial_m: Tensor) -> None:
@@ -136,7 +138,7 @@ class _Frames:
         self.ends: int | None = None
 
     def take(self, numbers: NDArray[np.int64], stop: int) -> NDArray[np.float32]:
-        """Those of the frames `done` … stop - 1 with these ascending numbers, (frames, grid_points) in m."""
+        """Frames of these ascending numbers in `done` … stop - 1, (frames, grid_points) in m; passes up to `stop`."""
         out = torch.zeros(len(numbers), self._initial.shape[1])
         following = int(len(numbers) > 0 and numbers[0] == 0)
         if self._source is not None:
@@ -147,13 +149,13 @@ class _Frames:
             try:
                 found, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
                 out[following:] = found[0].float()
-            except Runaway:  # at rest from here on: it must never reach a loudspeaker
+            except Runaway:  # at rest from here on: such values must never reach a loudspeaker
                 self._state, self.ends = None, max(self.done - 1, 0)
         self.done = stop
         return out.numpy()
 
 
-@lru_cache(maxsize=8)  # every source of a take begins with the same
+@lru_cache(maxsize=8)  # the same for every source of a take
 def _initial_m(pluck: Pluck, grid_points: int, modes: int) -> Tensor:
-    """The string as it is let go, (1, grid_points)."""
+    """The string at its release, (1, grid_points) in m."""
     return project(pluck.displacement(grid_points), modes)[None]

@@ -1,7 +1,7 @@
-"""What is heard of a source at the present listening points, sample by sample: its voice, read into a signal.
+"""The signal of a source at the listening points, sample by sample, read from its voice.
 
-A compiled voice sounds by itself. Where the model is no compiled voice its samples are rendered for it: at the
-listening points alone where any frame can be had, and read off the motion where every frame of it is kept.
+A compiled voice renders itself. Any other is given its samples: rendered at the listening points alone where the
+model can compute any frame, and read from the motion where that has every frame.
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ from engine.pluck import FULL_SCALE_M
 from engine.sources import Runaway, SourceState, StringSource
 from engine.voices import Ear, OfflineVoice, Program
 
-FIRST_FRAMES = 2_048  # of a compiled voice; each block is twice as long as the last, up to the next
-BLOCK_FRAMES = 32_768
-RENDERED_FRAMES = 2_048
-BEHIND = 4 * QUANTUM  # a voice whose samples are rendered reads so far ahead at most
-MIRRORED = 2 * REACH + 2 * QUANTUM  # samples behind the end, for the slope there
+FIRST_FRAMES = 2_048  # of a compiled voice; blocks double from this length
+BLOCK_FRAMES = 32_768  # up to this one
+RENDERED_FRAMES = 2_048  # a block of any other voice
+BEHIND = 4 * QUANTUM  # frames at most by which a voice that is given its samples reads ahead
+MIRRORED = 2 * REACH + 2 * QUANTUM  # samples added after the end, which the differentiator of a velocity reads
 
 
 class Listening:
     """Reads the voice of a source into `signal`.
 
     Args:
-        motion: with every frame of the source, where it cannot be rendered at its listening points alone.
+        program: of the voice.
+        initial_m: the string at its release, (1, grid_points).
+        motion: with every frame of the source, where it cannot be rendered at the listening points alone; else None.
     """
 
     def __init__(
@@ -45,12 +47,12 @@ class Listening:
         self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
         self._offline.voice.begin_at_once()
         self._weights = ear.weights(initial_m.shape[1])
-        self._given = 0  # samples, to a voice that needs them
-        self._last = np.zeros((0, len(ear.points)), np.float32)  # of them
+        self._given = 0  # samples that the voice was given
+        self._last = np.zeros((0, len(ear.points)), np.float32)  # the last of them
         self._state: SourceState | None = None
 
     def advance(self) -> None:
-        """A block of it, or what there is."""
+        """Appends a block to the signal, or less where less is available; silence where the source runs away."""
         signal = self.signal
         readable = signal.ready_frames + min(max(FIRST_FRAMES, signal.ready_frames), BLOCK_FRAMES)
         try:
@@ -64,7 +66,7 @@ class Listening:
             signal.end_in_silence()
 
     def _more(self) -> NDArray[np.float32]:
-        """The next samples in m, (frames, points)."""
+        """The next samples to give to the voice, in m, (frames, points)."""
         stop = min(self._given + RENDERED_FRAMES, self.signal.frames)
         if self._motion is not None:
             return np.asarray(self._motion.read(self._given, stop) @ self._weights.float().numpy())
@@ -82,7 +84,7 @@ class Listening:
             voice.append(samples_m / np.float32(FULL_SCALE_M))
             self._given += len(samples_m)
             self._last = np.concatenate([self._last, samples_m])[-MIRRORED - 1 :]
-            if self._given == self.signal.frames:  # turned about its end the signal keeps its slope there
+            if self._given == self.signal.frames:  # a point reflection about its end keeps the signal's slope there
                 turned = 2 * self._last[-1:] - self._last[-2::-1]
                 voice.append(turned / np.float32(FULL_SCALE_M))
                 voice.end_here()

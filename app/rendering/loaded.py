@@ -1,4 +1,4 @@
-"""A preset in the render worker's memory, with the sources that it gives: they keep nothing, so plucks share them."""
+"""A preset in the render worker's memory, with its sources, which have no state, so that all plucks share them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from engine.presets import Preset
 from engine.sources import ModelSource, TruthSource
 from engine.voices import Program, model_program, truth_program
 
-COARSER = 4  # sub-steps of the truth that is drawn against its default's: 1e-6 off
+COARSER = 4  # the voice of the truth takes a quarter of the default sub-steps: an error of 1e-6, for drawing alone
 
 
 class Loaded:
-    """Sources are made when they are first wanted, and the programs of their voices at the preset's own rate."""
+    """Model and truth, and the programs of their voices at the preset's own rate, each made when first used."""
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset
 
     @cached_property
     def model(self) -> ModelSource:
-        """Raises ValueError where the model cannot start from rest."""
+        """Raises ValueError where the model cannot start from a displaced string at rest alone."""
         return ModelSource(self.preset)
 
     @cached_property

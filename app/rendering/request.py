@@ -1,4 +1,4 @@
-"""What the render worker is asked for, and whom it tells."""
+"""What the render worker is asked to do, and the listener that it reports to."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ class RenderRequest:
     """The pictures and signals of a pluck.
 
     Attributes:
-        ear: where and how it is heard.
-        speed: of slow motion, 1 being real time.
-        others: further presets whose models are rendered for the same pluck, each the source `OTHER` + its name.
+        preset: the file, with another string for one of many.
+        seconds: the duration.
+        ear: listening points, pick-up and soloed mode.
+        speed: of slow motion; 1 is real time.
+        others: further presets whose models are rendered for the same pluck, each as the source `OTHER` + its name.
     """
 
     preset: Subject
@@ -31,7 +33,7 @@ class RenderRequest:
     others: tuple[Path, ...] = ()
 
     def same_motion(self, other: RenderRequest | None) -> bool:
-        """Whether only what is beside it, where it is heard, or the slow motion differs."""
+        """Whether model and truth move alike: only listening points, slow motion or other presets may differ."""
         return other is not None and (self.preset, self.pluck, self.seconds) == (
             other.preset,
             other.pluck,
@@ -40,15 +42,16 @@ class RenderRequest:
 
 
 class RenderListener(Protocol):
-    """Hears of the worker's results, in the worker's thread."""
+    """Called with the worker's results, in the worker's thread."""
 
     def take_started(self, take: Take) -> None:
         """A new pluck has its first block."""
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
-        """All of it is there, and measured."""
+        """Its pictures and signals are complete; `errors` are the model's over the pictures."""
 
     def other_failed(self, preset: str, message: str) -> None:
         """Another preset's model cannot be rendered beside this one; as a source it is at rest."""
 
-    def render_failed(self, message: str, detail: str) -> None: ...
+    def render_failed(self, message: str, detail: str) -> None:
+        """Nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""

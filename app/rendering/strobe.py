@@ -1,8 +1,8 @@
-"""Slow motion: the moments that a stroboscope shows of a motion, and the string at them.
+"""Slow motion as under a stroboscope: the times of its flashes, and the string at them.
 
-The sound is never slowed, and there is one playhead. A stroboscope keeps both: each flash shows the string near the
-playhead, at a phase of its period that moves on slowly. Its moments are known beforehand, so that the string at them
-is rendered with the motion: exactly, for a string moves too far between two pictures to tell where it was between.
+Sound and picture share one playhead, and the sound is not slowed. Each flash shows the string within a period of the
+playhead, at a phase that advances slowly. The times are known beforehand, so that the string at them is rendered with
+the motion: between two pictures it moves too far for interpolation.
 """
 
 from __future__ import annotations
@@ -13,16 +13,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-FLASH_HZ = 120  # twice a screen's rate, so that it matters little which one a picture comes upon
+FLASH_HZ = 120  # twice a screen's rate, so that it matters little which flash falls on a picture
 
 
 @dataclass(frozen=True)
 class Strobe:
-    """The flashes of a motion: one each 1/`FLASH_HZ` of the playhead's way.
+    """The flashes of a motion, `FLASH_HZ` for each second of the playhead.
 
     Attributes:
-        speed: periods that the phase moves on in one of the string's; from 1 on each flash shows the playhead itself.
-        fundamental_hz: of the string at rest.
+        speed: by how many periods the shown phase advances in one period of the string; from 1 on each flash shows
+            the string at the playhead itself.
+        fundamental_hz: of the string at small amplitudes.
         seconds: of the motion.
     """
 
@@ -32,7 +33,7 @@ class Strobe:
 
     @cached_property
     def times_s(self) -> NDArray[np.float64]:
-        """What each flash shows, (flashes,): within one period of its place."""
+        """The time of the motion that each flash shows, (flashes,): within one period of the playhead's."""
         places = np.arange(int(self.seconds * FLASH_HZ) + 1) / FLASH_HZ
         if self.speed < 1:
             periods = places * self.fundamental_hz
@@ -40,12 +41,12 @@ class Strobe:
         return np.minimum(places, self.seconds)
 
     def flash(self, position_s: float) -> int:
-        """The last one up to the playhead."""
+        """Index of the last flash up to the playhead."""
         return min(max(int(position_s * FLASH_HZ), 0), len(self.times_s) - 1)
 
 
 class Flashes:
-    """The string at a strobe's flashes, between two frames by linear interpolation. Grows as a motion does.
+    """The string at a strobe's flashes, by linear interpolation between two samples. Grows as a motion does.
 
     Attributes:
         ready: flashes so far.
@@ -68,11 +69,14 @@ class Flashes:
         return self._shapes_m.nbytes
 
     def needed(self, first: int, stop: int) -> NDArray[np.int64]:
-        """The frames first … stop - 1 that flashes show, ascending."""
+        """Which of the frames first … stop - 1 are needed for flashes, ascending."""
         return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]
 
     def take(self, stop: int, numbers: NDArray[np.int64], frames_m: NDArray[np.float32]) -> None:
-        """Frames of these ascending numbers, (frames, grid_points), among them all that are needed before `stop`."""
+        """Adds frames with these ascending numbers, (frames, grid_points).
+
+        All frames needed before `stop` must be among these or have been added before.
+        """
         for wanted, shares in self._parts:
             places = np.searchsorted(numbers, wanted)
             here = np.flatnonzero(places < len(numbers))
@@ -82,5 +86,5 @@ class Flashes:
         self.ready = int(late.argmax()) if late.any() else len(late)
 
     def shape_m(self, index: int) -> NDArray[np.float32] | None:
-        """The string (grid_points,) at a flash; None before it is there."""
+        """The string (grid_points,) at a flash; None where it is not ready."""
         return self._shapes_m[index] if index < self.ready else None

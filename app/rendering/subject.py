@@ -1,4 +1,4 @@
-"""What is plucked: a preset as it is, or a preset of many strings as one of them."""
+"""What is plucked: a preset as it is, or a preset of many strings as a given one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from engine.resonators.string import StringParameters
 
 @dataclass(frozen=True)
 class StringOf:
-    """A preset of many strings, as this one."""
+    """A preset of many strings, played as this one."""
 
     path: Path
     string: StringParameters
@@ -22,17 +22,21 @@ Subject = Path | StringOf
 
 
 def load_subject(subject: Subject) -> Preset:
-    """Raises PresetError: the file cannot be used, or its model cannot be this string."""
+    """Loads and checks the preset.
+
+    Raises:
+        PresetError: the file cannot be used, or it is not of many strings, or this string is not possible.
+    """
     if isinstance(subject, StringOf):
         return of_string(load_preset(subject.path), subject.string)
     return load_preset(subject)
 
 
 def path_of(subject: Subject) -> Path:
-    """Of the preset."""
+    """The preset's file."""
     return subject.path if isinstance(subject, StringOf) else subject
 
 
 def string_of(subject: Subject) -> StringParameters | None:
-    """None: the preset's own."""
+    """The string that is given; None: the preset's own."""
     return subject.string if isinstance(subject, StringOf) else None

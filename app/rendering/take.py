@@ -1,8 +1,8 @@
-"""A take: one pluck as it is seen and as it is drawn, growing while it is rendered.
+"""A take: one pluck as pictures and signals, which grow while it is rendered.
 
-Of each source there is a *motion*, the string as a series of pictures, and a *signal*, what is heard of it at the
-present listening points, sample by sample. One thread appends and any thread reads: values are written first, then
-the count of what is ready is raised; what lies below it never changes.
+Each source has a *motion*, the string as a series of pictures, and a *signal*, what is heard of it at the present
+listening points, sample by sample. One thread appends and any thread reads: values are written first, then the count
+of what is ready is raised, and values below it never change.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from engine.sources import StringSource
 from engine.voices import Ear
 
 SOURCES = ("model", "truth")
-PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures a period of a B at 247 Hz
-_TINY = 1e-6  # of a frame
+PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz
+_TINY = 1e-6  # of a frame: tolerance for rounding
 
 
 def picture_stride(rate_hz: int) -> int:
@@ -33,9 +33,10 @@ class Motion:
     """Displacement of one source on its grid, (frames, grid_points) in m, growing at its end.
 
     Attributes:
-        rate_hz: pictures a second; the first is the initial displacement.
+        rate_hz: pictures per second; the first is the initial displacement.
         frames: pictures when complete.
-        flashes: the string at the moments that slow motion shows; None: there are none.
+        ready_frames: pictures so far.
+        flashes: the string at the times that slow motion shows; None: there are none.
     """
 
     def __init__(self, rate_hz: float, grid_points: int, seconds: float) -> None:
@@ -51,7 +52,7 @@ class Motion:
 
     @property
     def bytes(self) -> int:
-        """Of memory, when it is complete."""
+        """Memory in bytes."""
         return self._m.nbytes + (self.flashes.bytes if self.flashes is not None else 0)
 
     def append(self, frames_m: NDArray[np.float32]) -> None:
@@ -60,12 +61,12 @@ class Motion:
         self.ready_frames = stop
 
     def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
-        """What is ready of frames start … stop."""
+        """The pictures start … stop - 1 that are ready."""
         ready = self.ready_frames
         return self._m[min(start, ready) : ready if stop is None else min(stop, ready)]
 
     def shape_m(self, position_s: float) -> NDArray[np.float32]:
-        """The string (grid_points,) that the strobe shows; where its flash is not there yet, the nearest picture."""
+        """The string (grid_points,) that the strobe shows; the nearest picture where its flash is not ready."""
         shown = self.flash_m(position_s)
         if shown is None:
             nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
@@ -73,18 +74,23 @@ class Motion:
         return shown
 
     def strobe_at(self, position_s: float) -> Strobe | None:
-        """Whose flash `shape_m` is; None: a picture."""
+        """The strobe whose flash `shape_m` returns; None where that is a picture."""
         flashes = self.flashes
         return None if flashes is None or self.flash_m(position_s) is None else flashes.strobe
 
     def flash_m(self, position_s: float) -> NDArray[np.float32] | None:
-        """As `shape_m`; None where its flash is not there yet."""
+        """As `shape_m`, but None where the flash is not ready."""
         flashes = self.flashes
         return None if flashes is None else flashes.shape_m(flashes.strobe.flash(position_s))
 
 
 class Signal:
-    """What is heard of one source, (frames, points) in m or m/s at the source's own rate, growing at its end."""
+    """What is heard of one source, (frames, points) in m or m/s at the source's own rate, growing at its end.
+
+    Attributes:
+        frames: samples of each point when complete.
+        ready_frames: so far.
+    """
 
     def __init__(self, rate_hz: int, points: int, seconds: float) -> None:
         self.rate_hz = rate_hz
@@ -98,7 +104,7 @@ class Signal:
 
     @property
     def bytes(self) -> int:
-        """Of memory, when it is complete."""
+        """Memory in bytes."""
         return self._samples.nbytes
 
     def append(self, samples: NDArray[np.float32]) -> None:
@@ -107,25 +113,26 @@ class Signal:
         self.ready_frames = stop
 
     def end_in_silence(self) -> None:
+        """Completes the signal with zeros."""
         self._samples[self.ready_frames :] = 0.0
         self.ready_frames = self.frames
 
     def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
-        """What is ready of frames start … stop."""
+        """The frames start … stop - 1 that are ready."""
         ready = self.ready_frames
         return self._samples[min(start, ready) : ready if stop is None else min(stop, ready)]
 
 
 @dataclass(frozen=True, eq=False)
 class Listened:
-    """The signals of a take's sources at one pair of listening points."""
+    """The signals of a take's sources for one choice of listening points and pick-up."""
 
     ear: Ear
     signals: dict[str, Signal] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
-        """Of model and truth."""
+        """Whether the signals of model and truth are."""
         return all(name in self.signals and self.signals[name].complete for name in SOURCES)
 
 
@@ -133,13 +140,15 @@ class Take:
     """Motions and signals of model and truth for a pluck, and of other presets' models beside them.
 
     Attributes:
+        seconds: the duration.
+        frames: pictures of model and truth when complete.
         stride: samples between two pictures of model and truth.
-        model: what renders the model, where more of it is wanted; it keeps nothing.
-        model_ends_s: when the model's output ran away, the time of its last believable picture; it is at rest then.
+        model: renders more of the model where it is needed; has no state.
+        model_ends_s: the time of the last valid frame where the model's output ran away; it is at rest from then on.
         others: motions of other presets' models for the same pluck, by source, each at its own rate and on its
             own grid.
-        listened: what is heard of them all; replaced as a whole when the listening points are others.
-        fundamental_hz: of the string at rest.
+        listened: the signals of all of them; replaced as a whole when the listening points change.
+        fundamental_hz: of the string at small amplitudes.
     """
 
     def __init__(
@@ -167,22 +176,22 @@ class Take:
 
     @property
     def picture_hz(self) -> float:
-        """Pictures of model and truth a second."""
+        """Pictures of model and truth per second."""
         return self.info.rate_hz / self.stride
 
     @property
     def ready_frames(self) -> int:
-        """Pictures of both so far."""
+        """Pictures that are ready of both model and truth."""
         return min(motion.ready_frames for motion in self._motions.values())
 
     @property
     def complete(self) -> bool:
-        """Whether all pictures are there."""
+        """Whether all pictures of model and truth are ready."""
         return self.ready_frames == self.frames
 
     @property
     def progress(self) -> tuple[object, ...]:
-        """What there is of it: another value when there is more, or another signal."""
+        """A value that changes whenever more of it is ready, or signals or flashes are replaced."""
         motions, signals = [*self._motions.values(), *self.others.values()], list(self.listened.signals.values())
         flashes = [motion.flashes for motion in motions if motion.flashes is not None]
         return (
@@ -193,15 +202,15 @@ class Take:
         )
 
     def bytes(self, source: str) -> int:
-        """Memory that a source takes when it is complete."""
+        """Memory that a source takes, in bytes."""
         return self.motion(source).bytes + self.listened.signals[source].bytes
 
     def motion(self, source: str) -> Motion:
-        """The growing motion of a source, of "model", "truth" or one of `others`."""
+        """The growing motion of a source: "model", "truth" or one of `others`."""
         return self._motions[source] if source in self._motions else self.others[source]
 
     def append(self, model_m: NDArray[np.float32], truth_m: NDArray[np.float32]) -> None:
-        """Adds pictures (frames, grid_points) of both sources."""
+        """Adds pictures (frames, grid_points) in m of both sources."""
         self._motions["model"].append(model_m)
         self._motions["truth"].append(truth_m)
 

@@ -1,6 +1,6 @@
-"""The render worker: the one thread that renders what is seen and drawn. It does the latest request alone.
+"""The render worker: the thread that renders pictures and signals, always of the latest request alone.
 
-A request that differs only in the presets beside it, in where it is heard or in the slow motion keeps its pictures.
+A request that differs only in listening points, slow motion or other presets keeps the pictures of the present one.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, step_back
 from engine.presets import PresetError
 
-TIDY_AFTER_S = 1.0  # without anything to render
-IN_STEP_S = 0.5  # for so long a motion keeps step with its sound
-LEAD_S = 0.08  # so far ahead
+TIDY_AFTER_S = 1.0  # without anything to render, until free memory is given back
+IN_STEP_S = 0.5  # for how long after its pluck a motion may be held in step with its sound
+LEAD_S = 0.08  # how far ahead of the sound it is rendered meanwhile
 LOOK_AGAIN_S = 0.01
 
 
@@ -28,9 +28,9 @@ class RenderWorker:
     """A thread with a mailbox that holds the latest request.
 
     Args:
-        load: a preset's model and truth; called in the worker's thread.
-        hurried: whether plucks are heard just now: then a new motion keeps step with its sound for a while, so that
-            plucks in quick succession leave time for all else.
+        load: returns a preset's model and truth; called in the worker's thread.
+        hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while,
+            so that plucks in quick succession leave processor time for everything else.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class RenderWorker:
         self._thread.start()
 
     def submit(self, request: RenderRequest) -> None:
-        """Replaces what waits, and abandons another motion that is rendered. Returns at once; any thread."""
+        """Replaces a request that waits and abandons another motion being rendered. Any thread; returns at once."""
         with self._mailbox:
             self._request = request
             self._mailbox.notify()
@@ -63,14 +63,14 @@ class RenderWorker:
     def _run(self) -> None:
         step_back(Rank.RENDERING)
         job: Job | None = None
-        untidy = False  # something was rendered since free memory was given back
+        untidy = False  # whether anything was rendered since free memory was given back
         while True:
             with self._mailbox:
                 waits = job is None or job.idle
                 if job is not None and not waits and self._request is None and self._in_step(job):
                     self._mailbox.wait(LOOK_AGAIN_S)
                 while waits and self._request is None and not self._closing:
-                    # giving pages back locks the heap, which the sound server's client uses too
+                    # not while keys are played: it locks the heap, which the sound server's client uses too
                     if not self._mailbox.wait(TIDY_AFTER_S if untidy else None) and untidy and not self._hurried():
                         return_free_pages()
                         untidy = False
@@ -91,10 +91,10 @@ class RenderWorker:
             except PresetError as error:
                 job = None
                 self._listener.render_failed(str(error), "")
-            except Exception as error:  # told to the user; the worker lives on
+            except Exception as error:  # reported to the user; the worker goes on
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
 
     def _in_step(self, job: Job) -> bool:
-        """Whether a motion that is heard is far enough ahead for now."""
+        """Whether the motion is far enough ahead of its sound for now."""
         return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()

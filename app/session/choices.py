@@ -1,6 +1,6 @@
 """The session: what the user has chosen, without any widget.
 
-All choices are one immutable, validated value; the session replaces it and tells which fields really changed.
+All choices are one immutable, validated value; the session replaces it and signals which fields have changed.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from app.patches.patch import Patch, PhysicalString
-from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Pickup
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
 Slot = Literal["a", "b"]  # two sources to compare; each holds "model", "truth", "difference" or "preset:NAME"
@@ -24,14 +24,18 @@ SPEED_RANGE = (0.001, 1.0)  # 1 is real time; a thousandth shows one period of a
 
 
 class Choices(BaseModel):
-    """Everything that is restored at the next start. Positions are in lengths of the string.
+    """Everything that is restored at the next start.
 
     Attributes:
-        string: which a preset of many is plucked as; None: its own.
+        preset: the name of its file without the suffix; "": none.
+        position, width, listen, listen_right: as fractions of the string's length.
+        amplitude_mm: of the pluck, in mm.
+        seconds: how long the pluck is rendered.
+        string: the string that a preset of many strings is plucked as; None: the preset's own.
         patch: what keys play; None: they pluck the preset's own string.
         keys_play: whether keys are pitches of the patch, or places on the string.
-        octave: by which the computer's keys are moved.
-        velocity: with which they strike.
+        octave: by how many octaves the computer's keys are transposed.
+        velocity: with which the computer's keys are struck, as in MIDI.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,9 +47,9 @@ class Choices(BaseModel):
     width: float = Field(0.06, ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])
     listen: float = Field(DEFAULT_LISTEN, ge=0, le=1)
     seconds: float = Field(4.0, ge=SECONDS_RANGE[0], le=SECONDS_RANGE[1])
-    listen_right: float = Field(1 - DEFAULT_LISTEN, ge=0, le=1)  # where `listen` is then the left
+    listen_right: float = Field(1 - DEFAULT_LISTEN, ge=0, le=1)  # used in stereo, where `listen` is the left one
     stereo: bool = False
-    pickup: Literal["displacement", "velocity"] = "displacement"
+    pickup: Pickup = "displacement"
     solo: int = Field(0, ge=0, le=HIGHEST_MODE)  # above 0: this mode is heard alone
     a: str = Field("model", pattern=SLOT_PATTERN)
     b: str = Field("truth", pattern=SLOT_PATTERN)
@@ -55,9 +59,9 @@ class Choices(BaseModel):
     loop: bool = False
     volume_db: float = Field(4.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
     speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
-    left_view: str = "spectrum"  # keys of panels
+    left_view: str = "spectrum"  # names of panels
     right_view: str = "waveform"
-    motion: bool = True  # of the string's picture
+    motion: bool = True  # whether the string's picture shows its motion, and the envelope of it
     envelope: bool = True
     string: PhysicalString | None = None
     patch: Patch | None = None
@@ -68,7 +72,7 @@ class Choices(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _take_old_heard(cls, data: Any) -> Any:
-        """Settings from before there were slots name the source itself."""
+        """Reads settings of versions without slots, in which `heard` named the source itself."""
         if isinstance(data, dict) and data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
             return {**data, "a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
         return data
@@ -83,9 +87,10 @@ class Choices(BaseModel):
 
 
 class Session:
-    """The present choices. `changed` carries the set of field names that have new values.
+    """The present choices.
 
-    `played` does so before it, where a note brings them and nobody chooses them one by one.
+    Signals carry the set of the names of the fields that have new values. `changed` is emitted after every change,
+    `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
     """
 
     changed = Signal(frozenset)
@@ -99,7 +104,7 @@ class Session:
         return self._choices
 
     def update(self, **changes: Any) -> None:
-        """Takes new values, all or none. Keys play what was chosen last: a preset's one string, or the patch.
+        """Takes new values, all or none. A preset sets `keys_play` too, unless given: "pitch" if it is the patch's.
 
         Raises:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
@@ -112,13 +117,13 @@ class Session:
             self.changed.emit(names)
 
     def play(self, **changes: Any) -> None:
-        """`update` by a note: what it changes is no step of undo."""
+        """Takes the values that a note brings: as `update`, but no step of undo, and `keys_play` stays."""
         if names := self._take(changes):
             self.played.emit(names)
             self.changed.emit(names)
 
     def _take(self, changes: dict[str, Any]) -> frozenset[str]:
-        """The fields that have new values then. Another preset is plucked as its own string, unless told."""
+        """Returns the fields that have new values. Another preset resets `string`, unless that is given."""
         if changes.get("preset", self._choices.preset) != self._choices.preset:
             changes = {"string": None, **changes}
         try:
@@ -130,7 +135,7 @@ class Session:
         return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
-        """Takes the nearest allowed pluck: for gestures, which know no limits."""
+        """Takes the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
         self.update(
             position=_clamp(position, POSITION_RANGE),
             amplitude_mm=_clamp(amplitude_mm, (0, LARGEST_AMPLITUDE_MM)),
@@ -141,11 +146,11 @@ class Session:
 
     @property
     def source_heard(self) -> str:
-        """What the slot that is heard holds."""
+        """The source in the slot that is heard."""
         return self._choices.source_heard
 
     def switch_source(self) -> None:
-        """From slot a to slot b and back."""
+        """Switches what is heard from slot A to slot B, or back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
 
 

@@ -1,4 +1,4 @@
-"""Where the string is listened to, as chosen."""
+"""The chosen listening points and pick-up, as the engine takes them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from engine.voices import Ear
 
 
 def heard_ear(choices: Choices) -> Ear:
-    """How a string is listened to; the first point is the one that is drawn, in stereo the left."""
+    """Listening points, pick-up and soloed mode of `choices`; the first point, in stereo the left, is drawn."""
     points = (choices.listen, choices.listen_right) if choices.stereo else (choices.listen,)
     return Ear(points, choices.pickup, choices.solo)

@@ -1,8 +1,8 @@
-"""Undo and redo: earlier values of what shapes the sound, around the session, which stays the one truth.
+"""Undo and redo of the choices that shape the sound.
 
 A step is one gesture: all that changes between `hold` and `let_go` (a drag), or changes of the same fields that
-follow each other within half a second (keys, wheel notches, a controller). It takes back what it changed and nothing
-else: notes that are played (`Session.play`) are no steps, and the place of the last one stays.
+follow each other within half a second (keys, wheel notches, a controller). Undo restores the fields that the step
+changed and no others. Notes that are played (`Session.play`) are no steps: what they changed stays as it is.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from app.session.choices import Choices, Session
 from app.session.step_words import step_words, turned_fields
 
-# Not what is only looked at or listened to: views, speed, volume, loop, model or truth.
+# Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
 PLUCK = ("preset", "string", "patch", "position", "amplitude_mm", "shape", "width", "seconds")
 EARS = ("listen", "listen_right", "stereo", "pickup")
 RECORDED = frozenset({*PLUCK, *EARS})
@@ -26,7 +26,7 @@ Values = dict[str, Any]  # of recorded fields
 
 
 class History:
-    """Listens to a session from now on. `now_s` is a clock, for tests."""
+    """Records the changes of a session from now on. `now_s`: a clock, replaced in tests."""
 
     def __init__(self, session: Session, now_s: Callable[[], float] = time.monotonic) -> None:
         self._session = session
@@ -50,36 +50,37 @@ class History:
 
     @property
     def undo_words(self) -> str:
-        """What `undo` would take back, in plain words; "" where there is nothing."""
+        """What `undo` would take back, in words; "" where there is nothing."""
         step = self._next(self._undo)
         return "" if step is None else step_words(step, {name: self._present[name] for name in step})
 
     @property
     def redo_words(self) -> str:
-        """What `redo` would do again."""
+        """What `redo` would do again, in words; "" where there is nothing."""
         step = self._next(self._redo)
         return "" if step is None else step_words({name: self._present[name] for name in step}, step)
 
     def _next(self, steps: Sequence[Values]) -> Values | None:
-        """A drag that came back to its start is no step."""
+        """The last step that would change something: a drag that came back to its start does not."""
         here = self._present
         return next((step for step in reversed(steps) if any(here[name] != step[name] for name in step)), None)
 
     def hold(self) -> None:
-        """A gesture begins: all that it changes is one step."""
+        """A gesture begins: all changes until `let_go` are one step."""
         self._held = True
         self._open_fields = None
 
     def let_go(self) -> None:
-        """It has ended."""
+        """The gesture has ended: the next change begins a step of its own."""
         self._held = False
         self._open_fields = None
 
     def undo(self) -> None:
-        """Back by one step; nothing where there is none."""
+        """Takes the last step back; does nothing where there is none."""
         self._restore(self._undo, self._redo)
 
     def redo(self) -> None:
+        """Does the step that was last undone again; does nothing where there is none."""
         self._restore(self._redo, self._undo)
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:

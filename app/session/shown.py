@@ -1,4 +1,4 @@
-"""What the views of a sound show: the sources in the slots A and B, as they are picked up, and in which words."""
+"""The sources in the slots A and B as the plots of a sound show them, and the words of their legends and axes."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from engine.pluck import FULL_SCALE_M_S
 from engine.sources import FULL_SCALE_M
 
 LEGEND_FIELDS = {"heard", "a", "b", "difference_gain_db", "solo", "stereo"}  # of `Choices`: what legends depend on
-_PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+_PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name
 
 
 @dataclass(frozen=True)
 class ShownSource:
-    """What a slot holds.
+    """A source that is drawn.
 
     Attributes:
         source: as in `Choices.a`.
-        slots: the letters of those that hold it; empty for what no slot holds.
-        title: in the field's words; of another preset its own title.
-        gain_db: the stated gain with which it is heard and drawn; matching of levels is not drawn.
-        heard: whether it is what sounds now.
+        slots: the letters of the slots that hold it; empty where none does.
+        title: its name for people; of another preset its title.
+        heard: whether it is the one that sounds now.
+        gain_db: the stated gain of the difference, with which it is heard and drawn. The gain that matches levels is
+            not drawn and not in it.
     """
 
     source: str
@@ -36,12 +37,13 @@ class ShownSource:
 
     @property
     def remark(self) -> str:
-        """What a legend says behind the title."""
+        """What a legend says behind the title: the gain, and whether it is heard."""
         gain = f" {self.gain_db:+.0f} dB" if self.gain_db else ""
         return f"{gain}{' · heard' if self.heard else ''}"
 
     @property
     def gain(self) -> float:
+        """`gain_db` as a factor of the signal."""
         return float(10 ** (self.gain_db / 20))
 
 
@@ -49,7 +51,7 @@ DEFAULT_SOURCES = (ShownSource("model", "A", "model", heard=True), ShownSource("
 
 
 def shown_sources(choices: Choices, library: Library) -> tuple[ShownSource, ...]:
-    """Slot A's and slot B's; one where both hold the same."""
+    """The source in slot A and the one in slot B; one alone where both hold the same."""
     return tuple(_sources(choices, library))
 
 
@@ -61,18 +63,18 @@ def _sources(choices: Choices, library: Library) -> Iterator[ShownSource]:
 
 
 def part_words(choices: Choices) -> str:
-    """What of the sound is drawn: the mode where one is heard alone, and which ear; nothing where it is all."""
+    """Which part of the sound is drawn: the soloed mode, and in stereo the left side; "" where it is all of it."""
     parts = (f"mode {choices.solo}" if choices.solo else "", "left" if choices.stereo else "")
     return ", ".join(part for part in parts if part)
 
 
 def full_scale_words(choices: Choices) -> str:
-    """What 0 dB is."""
+    """Which displacement, or velocity, 0 dB stands for."""
     return f"{FULL_SCALE_M_S:g} m/s" if choices.pickup == "velocity" else f"{1000 * FULL_SCALE_M:g} mm"
 
 
 def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
-    """Factor and name of a unit in which `peak`, in m or m/s, has few digits; displacement is never told in m."""
+    """Factor and name of a unit in which `peak`, in m or m/s, has few digits; mm and smaller for a displacement."""
     unit = "m/s" if pickup == "velocity" else "m"
     prefixes = _PREFIXES if pickup == "velocity" else _PREFIXES[1:]
     factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])

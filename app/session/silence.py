@@ -1,4 +1,4 @@
-"""Why nothing is heard, in words: every choice that makes a pluck silent explains itself."""
+"""Why a pluck is silent, in words for the user; every function returns "" where it found no reason."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from app.session.slots import other_preset
 from engine.presets import outside_training
 from engine.resonators.sine_transform import to_modes
 
-FAINT_DB = -70.0  # below full scale nobody hears a thing
-AT_ONCE_S = 0.01  # a model that runs away before this was never a string
+FAINT_DB = -70.0  # peak, relative to full scale, below which a difference is called too soft to hear
+AT_ONCE_S = 0.01  # a model that runs away earlier is said to fail at once
 
 
 def why_silent(choices: Choices, library: Library) -> str:
-    """The reason that is plain before anything is rendered, or nothing."""
+    """A reason that is known before anything is rendered: from amplitude, volume, presets, points and modes."""
     if choices.amplitude_mm == 0:
         return "silent: the amplitude is 0"
     if choices.volume_db <= VOLUME_RANGE_DB[0]:
@@ -30,7 +30,7 @@ def why_silent(choices: Choices, library: Library) -> str:
 
 
 def why_ran_away(take: Take) -> str:
-    """From when on a take's model is silent because its output was no string's, and what helps; or nothing."""
+    """When the model of a take was silenced because its output grew without bound, and the remedy."""
     if take.model_ends_s is None:
         return ""
     title, outside = take.info.title, "; ".join(outside_training(take.info, take.pluck))
@@ -47,7 +47,7 @@ def why_ran_away(take: Take) -> str:
 
 
 def why_difference_silent(choices: Choices, take: Take) -> str:
-    """The reason that model and truth of a take have no audible difference, or nothing: also while it is unknown."""
+    """Why the difference of model and truth of a take cannot be heard; "" also until its signals are complete."""
     ear, listened = heard_ear(choices), take.listened
     if listened.ear != ear or not listened.complete:
         return ""

@@ -1,4 +1,4 @@
-"""What a step of undo changed, in plain words: the field of the pluck, or of the patch, or which patch was chosen."""
+"""What a step of undo changed, in words: fields of the pluck, fields of the patch, or which patch was chosen."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHOICES = {  # fields of `Choices`
     "pickup": "pick-up",
     "string": "string",
 }
-PATCH = {  # fields of a patch, by their path; of those that are not here the path's last word is told
+PATCH = {  # fields of a patch, by their path; a field that is not here is named by the last part of its path
     "name": "name of the patch",
     "preset": "model",
     "knobs.brightness_decay": "dulling",
@@ -54,7 +54,11 @@ PATCH = {  # fields of a patch, by their path; of those that are not here the pa
 
 
 def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    """Of the values of the same fields of `Choices` before and after a step; "" where nothing changed."""
+    """Names what changed; "" where nothing did.
+
+    Args:
+        before, after: the same fields of `Choices` with their values before and after the step.
+    """
     changed = [name for name in after if before[name] != after[name]]
     if "patch" in changed:
         return _of_patch(before["patch"], after["patch"])
@@ -64,7 +68,7 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
 
 
 def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
-    """Which fields a change turned: `names` of `Choices`, and within a patch that stays the same one its own."""
+    """The changed fields: `names` of `Choices` and, if the patch has kept its name, its own as "patch.PATH"."""
     found = set(names)
     old, new = before.get("patch"), after.get("patch")
     if "patch" in found and old is not None and new is not None and old.name == new.name:
@@ -92,7 +96,7 @@ def field_words(field: str) -> str:
 
 
 def _changed(before: BaseModel, after: BaseModel, path: str = "") -> Iterator[str]:
-    """The paths of fields that differ, parts of the same kind looked into but for strings."""
+    """The paths of fields that differ; a part that is a model itself is compared field by field, except strings."""
     for name in type(after).model_fields:
         old, new = getattr(before, name), getattr(after, name)
         if old == new:

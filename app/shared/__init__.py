@@ -1,1 +1,1 @@
-"""What every room may use."""
+"""Small helpers for every package of `app`: version, log, memory, thread priority, whole files, vocabulary."""

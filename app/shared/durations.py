@@ -1,10 +1,10 @@
-"""How long something takes, in words."""
+"""A duration in words."""
 
 from __future__ import annotations
 
 
 def duration(seconds: float) -> str:
-    """A time in words: "8.2 s", "3 min 20 s", "2 h 5 min"."""
+    """Such as "8.2 s", "3 min 20 s", "2 h 5 min"."""
     if seconds < 60:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)

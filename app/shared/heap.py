@@ -1,4 +1,4 @@
-"""How the process keeps its memory: nothing here changes what the app does, only how steadily it does it."""
+"""Garbage collection and glibc's heap: settings that change no result, only pauses and the memory taken."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _M_MMAP_THRESHOLD = -3  # of glibc's mallopt
 
 
 def collect_between_events() -> GarbageCollector:
-    """From now on garbage is looked for by this thread alone, the window's, as long as the result is kept.
+    """Collects garbage in the calling thread, the window's, every `COLLECT_EVERY_S`, as long as the result is kept.
 
-    Python would look in whatever thread has just made some, and delete parts of closed views there: Qt ends the
-    process for it. What is loaded by now stays, and garbage is not looked for in it again: a look at all of torch
-    holds the interpreter for a quarter of a second, many times what a callback can wait.
+    Python itself collects in whichever thread happens to allocate, and would delete parts of closed views there, for
+    which Qt ends the process. Objects that exist by now are left out of every later collection: to look through all
+    of torch holds the interpreter for a quarter of a second, and keys and painting with it.
     """
     from pyqtgraph.util.garbage_collector import GarbageCollector  # with all of pyqtgraph
 
@@ -30,16 +30,16 @@ def collect_between_events() -> GarbageCollector:
 
 
 def collect_anywhere() -> None:
-    """As Python does by itself."""
+    """Takes `collect_between_events` back: Python collects in any thread, as it does by default."""
     gc.unfreeze()
     gc.enable()
 
 
 def return_large_blocks() -> None:
-    """Blocks of a MiB and more go back to the system when they are freed.
+    """Makes glibc give blocks of `LARGE_BYTES` and more back to the system when they are freed.
 
-    glibc learns from the first large ones that are freed to keep them; takes of many sizes that come and go then
-    leave holes, a hundred MiB and more of them.
+    By default it raises this threshold once large blocks are freed, and keeps later ones. Takes of many sizes would
+    then fragment the heap, by a hundred MiB and more.
     """
     if sys.platform == "linux":
         with contextlib.suppress(OSError, AttributeError):  # another C library
@@ -47,9 +47,9 @@ def return_large_blocks() -> None:
 
 
 def return_free_pages() -> None:
-    """What was freed in small pieces goes back to the system too, as far as whole pages are free: a few milliseconds.
+    """Makes glibc give every wholly free page back to the system, which takes a few milliseconds.
 
-    Each thread frees into a heap of its own, which glibc keeps at its largest.
+    It does not do so by itself: the heap that it keeps for each thread stays at its largest size.
     """
     if sys.platform == "linux":
         with contextlib.suppress(OSError, AttributeError):

@@ -1,6 +1,6 @@
-"""The log: a file of a few megabytes at most, with every fault that nobody expected, for a report.
+"""The log: a file of a few megabytes at most with every unexpected exception, for a report of a fault.
 
-What ends a process from within (a fault in compiled code) writes where each thread was into a file beside it.
+A crash (a fault in compiled code) writes the stack of each thread to a file beside it.
 """
 
 from __future__ import annotations
@@ -23,24 +23,27 @@ from platformdirs import user_log_path
 from app.shared.version import PROGRAM, program_version
 
 LARGEST_BYTES = 2**20
-OLDER_KEPT = 2
-MOST_KINDS = 200  # of faults in a run
+OLDER_KEPT = 2  # earlier log files
+MOST_KINDS = 200  # different exceptions that are written in one run
 FILE_VARIABLE = "LEARNED_STRINGS_LOG"
 
 _log = logging.getLogger("learned_strings")
 
 
 def log_file() -> Path:
-    """LEARNED_STRINGS_LOG, else the platform's place for a user's logs."""
+    """The path in LEARNED_STRINGS_LOG, else `learned-strings.log` in the platform's folder for a user's logs."""
     given = os.environ.get(FILE_VARIABLE)
     return Path(given) if given else user_log_path("learned-strings", appauthor=False) / "learned-strings.log"
 
 
 @contextmanager
 def faults_logged(told: Callable[[str], None]) -> Iterator[None]:
-    """Within, what no code expects is written to the log, in whatever thread it happens, and given to `told`.
+    """Within, uncaught exceptions of any thread are written to the log, each different one once.
 
-    A log that cannot be written is done without.
+    A log that cannot be opened is done without.
+
+    Args:
+        told: called with the text of each of them, in the thread where it was raised.
     """
     handler = _open(log_file())
     before = sys.excepthook, threading.excepthook
@@ -48,17 +51,15 @@ def faults_logged(told: Callable[[str], None]) -> Iterator[None]:
 
     def note(kind: type[BaseException], error: BaseException | None, trace: TracebackType | None, where: str) -> None:
         text = f"{where}\n{''.join(traceback.format_exception(kind, error, trace))}"
-        if text not in known and len(known) < MOST_KINDS:  # one that comes with every picture is written once
+        if text not in known and len(known) < MOST_KINDS:  # one that is raised at every frame would fill the log
             known.add(text)
             _log.error("%s", text)
             told(text)
 
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        if not issubclass(kind, Exception):  # an interrupt is no fault
-            before[0](kind, error, trace)
-            return
         before[0](kind, error, trace)
-        note(kind, error, trace, f"in the thread {threading.current_thread().name}")
+        if issubclass(kind, Exception):  # an interrupt is no fault
+            note(kind, error, trace, f"in the thread {threading.current_thread().name}")
 
     def of_thread(arguments: threading.ExceptHookArgs) -> None:
         if issubclass(arguments.exc_type, SystemExit):
@@ -79,7 +80,7 @@ def faults_logged(told: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def crashes_written() -> Iterator[None]:
-    """Within, what ends the process writes where its threads were into the file `.crash` beside the log."""
+    """Within, a crash writes the stack of each thread to a file beside the log, with the suffix `.crash`."""
     path = log_file().with_suffix(".crash")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -96,7 +97,11 @@ def crashes_written() -> Iterator[None]:
 
 
 def log_fault(error: BaseException, where: str) -> str:
-    """Notes a fault that was caught, and returns its text."""
+    """Writes an exception that was caught to the log, and returns what was written.
+
+    Args:
+        where: a line before it: what was being done.
+    """
     text = f"{where}\n{''.join(traceback.format_exception(error))}"
     _log.error("%s", text)
     return text

@@ -1,6 +1,6 @@
-"""Which threads go first where they are more than the cores: sound, then picture, then rendering, then all else.
+"""Priorities where threads compete for cores: sound, then the window, then rendering, then background work.
 
-And how those wait that have nothing to do.
+And how OpenMP's threads wait while they have nothing to do.
 """
 
 from __future__ import annotations
@@ -12,18 +12,19 @@ import threading
 from enum import IntEnum
 from pathlib import Path
 
-NICEST = 19
+NICEST = 19  # the lowest priority on Linux
+REAL_TIME_PRIORITY = 4  # below the sound server itself
 
 
 class Rank(IntEnum):
-    """How much nicer than the window a thread is, in the system's measure."""
+    """By how much a thread's niceness is above the window's."""
 
     RENDERING = 5
     BACKGROUND = 10
 
 
 def step_back(rank: Rank) -> None:
-    """Lets the calling thread, and those that it starts, wait for the sound and the window.
+    """Lowers the priority of the calling thread, and of those that it starts later, by `rank`.
 
     Only Linux gives each thread a niceness of its own; elsewhere this does nothing.
     """
@@ -34,20 +35,17 @@ def step_back(rank: Rank) -> None:
             os.setpriority(os.PRIO_PROCESS, thread, min(niceness, NICEST))
 
 
-REAL_TIME_PRIORITY = 4  # below the sound server itself
-
-
 def wait_asleep() -> None:
-    """Lets threads that compute for torch sleep until there is more to do; to be called before torch is loaded.
+    """Makes OpenMP's threads, which compute for torch, sleep between operations; call it before torch is loaded.
 
-    They would spin otherwise, each on a core, and keep from it whoever should work there: beside other busy
-    processes a command took two to three times as long, and as much of the processor, as with one thread.
+    By default each spins on its core and keeps it from other work: beside other busy processes a command took two to
+    three times as long, and as much processor time, as with one thread.
     """
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
 def native_threads() -> set[int]:
-    """The system's numbers of this process's threads; none where it does not tell."""
+    """The system's ids of this process's threads; empty where `/proc` cannot be read (not on Linux)."""
     try:
         return {int(folder.name) for folder in Path("/proc/self/task").iterdir()}
     except OSError:
@@ -55,7 +53,10 @@ def native_threads() -> set[int]:
 
 
 def put_first(threads: set[int]) -> bool:
-    """Real time for a device's own threads, where Linux grants it; elsewhere the system does so itself."""
+    """Schedules threads, the device's own, in real time; whether Linux has granted it to at least one.
+
+    Other systems do so by themselves.
+    """
     granted = False
     for thread in threads if sys.platform == "linux" else ():
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The program's name and version, as files and reports carry them."""
+"""The program's name and version, as written into files and reports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is heard, picked up and exported, and in which bounds: known before the engine is loaded."""
+"""Names of sources, pick-ups and sample formats, here so that they are known before the engine is loaded."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Literal, get_args
 Source = Literal["model", "truth", "difference", "both"]
 Pickup = Literal["displacement", "velocity"]
 PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
-Bits = Literal["16", "24", "32f"]  # of a WAV's samples
+Bits = Literal["16", "24", "32f"]  # of a WAV's samples; f: floating point
 BITS: tuple[Bits, ...] = get_args(Bits)
 DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)
-OTHER = "preset:"  # before the name of another preset whose model is a source
+OTHER = "preset:"  # prefix of a source that is another preset's model: "preset:NAME"
 DIFFERENCE = "difference"  # model minus truth

@@ -1,4 +1,4 @@
-"""Results that are written whole or not at all, and told in plain words why not."""
+"""Files that are written whole or not at all; a failure names the remedy."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class WriteError(Exception):
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[BinaryIO]:
-    """An open file beside `path` that takes its place when the block ends well; an error leaves nothing.
+    """An open file beside `path` that takes its place when the block ends without an error, and else is deleted.
 
     Raises:
-        WriteError: for every OSError within the block, so that a folder that cannot be written is told before
-            the work, and a full disk after it.
+        WriteError: for every OSError within the block: at its beginning where the folder cannot be written to, later
+            where the disk is full.
     """
     try:
         target = path.resolve()  # through a link, to the file that it names

@@ -1,1 +1,4 @@
-"""Widgets: gestures become calls of the session, changes of the session become pixels."""
+"""Widgets. They show the values that they are given and emit signals for gestures; `app.window` connects them.
+
+Like all of Qt's widgets they belong to the window's thread: no other thread may call them.
+"""

@@ -1,4 +1,4 @@
-"""How the window looks, as chosen."""
+"""The theme and the UI scale, as chosen."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Look(BaseModel):
-    """The window's face and the size of everything in it; the size counts from the next start on."""
+    """`face` is the theme; `size_percent`, the UI scale, takes effect at the next start."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

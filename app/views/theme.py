@@ -1,7 +1,7 @@
-"""Colours, fonts and the style sheet: a dark face and a light one, with the same roles.
+"""Colours, fonts and the style sheet. A face is the set of colours of a theme, dark or light, with the same roles.
 
-Read the colours as `theme.TEXT` when painting; never import one by name, for they change with the face. Plots, which
-keep the pens that they were made with, are told by `app.views.recolour`.
+Read the colours as `theme.TEXT` when painting; never import one by name, for they change with the face. Plots keep
+the pens that they were made with: `app.views.plots.plots.recolour` exchanges these.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FaceChoice = Literal["system", "dark", "light"]
 
 @dataclass(frozen=True)
 class Face:
-    """One colour a role."""
+    """The colours of a theme, one for each role."""
 
     background: str
     panel: str
@@ -29,16 +29,16 @@ class Face:
     text: str
     faint: str
     disabled: str
-    model: str  # what the model says is amber, everywhere
-    truth: str  # and the physics blue
-    difference: str  # what lies between them
+    model: str  # amber in every view
+    truth: str  # blue in every view
+    difference: str  # model − truth
     other: str  # another preset's model
     warning: str
     good: str
-    ground_top: str  # behind the string, from here
-    ground_bottom: str  # to here
-    shade: str  # over what the model was not trained on
-    shade_alpha: int
+    ground_top: str  # of the gradient behind the string
+    ground_bottom: str
+    shade: str  # over plucks outside the training range
+    shade_alpha: int  # 0 … 255
 
 
 DARK = Face(
@@ -116,7 +116,7 @@ changes = _Changes()
 
 
 def use(new: Face) -> None:
-    """Makes `new` the present face and tells of it; the application's style sheet is `apply_theme`'s business."""
+    """Makes `new` the present face and emits `changes.face_changed`; the style sheet is set by `apply_theme`."""
     global face, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, DISABLED
     global MODEL, TRUTH, DIFFERENCE, OTHER, WARNING, GOOD
     old, face = face, new
@@ -129,7 +129,7 @@ def use(new: Face) -> None:
 
 
 def contrast(one: str, other: str) -> float:
-    """WCAG's ratio of two colours, 1 … 21; text needs 4.5, large text and signs 3."""
+    """WCAG's ratio of two colours, 1 … 21; text needs 4.5, large text and symbols 3."""
     low, high = sorted(_luminance(QColor(colour)) for colour in (one, other))
     return (high + 0.05) / (low + 0.05)
 
@@ -282,9 +282,9 @@ def _palette() -> QPalette:
 
 
 def apply_theme(app: QApplication, choice: FaceChoice = "dark") -> None:
-    """Fusion with our palette, for the whole application; "system" follows the desktop."""
-    app.setStyleSheet("")  # a sheet that follows another is put on a part again for every part around it
-    if app.style().name() != "fusion":  # under a sheet it has no name
+    """Sets Fusion with the face's palette and style sheet for the whole application; "system" follows the desktop."""
+    app.setStyleSheet("")  # replaced directly, a sheet is applied to a widget once more for each of its ancestors
+    if app.style().name() != "fusion":  # while a sheet is set, the style has no name
         app.setStyle("Fusion")
     hints = app.styleHints()
     hints.setColorScheme(_SCHEMES[choice])  # the window's frame and the file dialogs follow
@@ -294,17 +294,17 @@ def apply_theme(app: QApplication, choice: FaceChoice = "dark") -> None:
     app.setStyleSheet(_style_sheet())
 
 
-def small_font(size: int = 11, bold: bool = False) -> QFont:
-    """The application's font in pixels, for painted text."""
+def small_font(size_px: int = 11, bold: bool = False) -> QFont:
+    """The application's font in a size in pixels, for painted text."""
     font = QFont(QApplication.font())
-    font.setPixelSize(size)
+    font.setPixelSize(size_px)
     font.setBold(bold)
     return font
 
 
 @lru_cache(maxsize=64)
 def blended(colour: str, ground: str, share: float) -> QColor:
-    """`colour` over `ground` as an opaque colour, which is several times faster to fill than a translucent one."""
+    """`share` (0 … 1) of `colour` over `ground`, as an opaque colour: that fills several times faster."""
     over, under = QColor(colour), QColor(ground)
     mixed = (
         share * a + (1 - share) * b

@@ -1,4 +1,4 @@
-"""What this program is made of, as text for people and for reports."""
+"""The text of the About dialog."""
 
 from __future__ import annotations
 
@@ -22,18 +22,17 @@ LIBRARIES = (
     "pyqtgraph",
     "sounddevice",
     "soundfile",
-    "soxr",
     "pydantic",
 )
 
 
 def library_versions() -> dict[str, str]:
-    """By distribution, as installed."""
+    """Distribution -> installed version."""
     return {name: _version(name) for name in LIBRARIES}
 
 
 def about_text(settings: Path, presets: Path) -> str:
-    """Program, libraries, licence, source and places, in lines to copy."""
+    """Program, licence, paper, files and folders, and versions of libraries; the first line is the title."""
     return "\n".join(
         [
             f"{PROGRAM} {program_version()}",

@@ -1,4 +1,4 @@
-"""How the window looks: the face and the size that the user has chosen, and a desktop that changes its own."""
+"""Applies the theme that the user has chosen, or follows that of the desktop; remembers the UI scale."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.window.main_window import MainWindow
 
 
 class Appearance(QObject):
-    """`look` is to be saved."""
+    """`look`: the present choices, to be saved."""
 
     def __init__(self, window: MainWindow, look: Look) -> None:
         super().__init__(window)

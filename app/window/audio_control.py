@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from app.rendering import Take
     from engine.voices import Gap
 
-# of the device's own buffer; sound waits for nothing else
+# of the device's buffer, which is nearly all that sound waits for
 LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
 LIST_EVERY = 5  # calls of `show` between two looks at the list of devices
 
 
 class AudioControl(QObject):
-    """`device` and `sound` are to be saved."""
+    """All of it runs in the window's thread. `device` and `sound`: what played last, to be saved."""
 
     def __init__(self, window: MainWindow, output: Sound, device: DeviceChoice | None, sound: SoundChoice) -> None:
         super().__init__(window)
@@ -46,7 +46,7 @@ class AudioControl(QObject):
         window.audio_asked.connect(self.show_dialog)
 
     def open(self, rescan: bool = False) -> None:
-        """Opens what is wished for."""
+        """Opens the output as chosen. Returns at once; `show` sees what became of it."""
         device, sound = self._wish
         self._changes += 1
         self._output.open(
@@ -58,9 +58,9 @@ class AudioControl(QObject):
         )
 
     def tell(self, problem: AudioProblem) -> None:
-        """A fault, with what it means for now."""
+        """Shows a fault of the output as a notice, with what plays on."""
         if self._notice:
-            self._window.notices.withdraw(self._notice)  # one word on the sound at a time
+            self._window.notices.withdraw(self._notice)  # one notice about the sound at a time
         self._notice = str(problem)
         if problem.kind is not ProblemKind.STALLED:
             device = self._output.status().device
@@ -70,7 +70,7 @@ class AudioControl(QObject):
         self._window.notices.tell(self._notice, problem.detail)
 
     def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
-        """The present state, ten times a second."""
+        """Shows the present state; to be called ten times a second."""
         if status.problem is None:
             if self._notice:
                 self._window.notices.withdraw(self._notice)  # the sound is back
@@ -109,7 +109,7 @@ class AudioControl(QObject):
         self._last_known = gaps[-1] if gaps else None
 
     def _list_devices(self) -> None:
-        """Fills the list when it has changed. Without PortAudio it is asked once only: asking takes long then."""
+        """Lists the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
         first = self._listed is None
         try:
             found = output_devices(rescan=first and self._output.status().device is None)
@@ -129,7 +129,7 @@ class AudioControl(QObject):
         if label.text() != text:
             label.setText(text)
             label.setToolTip(
-                plain_tip(f"{status.problem or 'No sound output'}\nAudio settings: Ctrl+,")
+                plain_tip(f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,")
                 if fault
                 else "The model's rate, converted to the sound device's rate"
             )
@@ -137,7 +137,7 @@ class AudioControl(QObject):
             label.style().polish(label)
 
     def _state(self, status: SoundStatus) -> AudioState:
-        device, gaps = status.device, status.gaps  # the latest: what was known may have been dropped
+        device, gaps = status.device, status.gaps  # the latest ones: the one that was known may be gone
         if self._last_known in gaps:
             gaps = gaps[gaps.index(self._last_known) + 1 :]
         facts = f"{status.rate_hz / 1000:g} kHz, buffer {1000 * status.latency_s:.0f} ms"

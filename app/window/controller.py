@@ -42,7 +42,7 @@ from app.window.audio_control import AudioControl
 from app.window.dragged_export import DraggedExport
 from app.window.dropped_files import receive
 from app.window.instruments import Instruments
-from app.window.main_window import KEYS, PLAYED_KEYS, MainWindow
+from app.window.main_window import KEY_NAMES, KEYS, PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
 from app.window.panels.rack import fill
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
@@ -55,8 +55,8 @@ from engine.presets import SHIPPED, PresetError
 
 FRAME_MS = 16
 IDLE_MS = 100  # between two looks while nothing moves
-FACTS_S = 0.1  # between two looks at what is read and not watched
-LIVELY_S = 1.0  # after the last movement pictures go on at full pace
+FACTS_S = 0.1  # between two updates of gains and of the audio state
+LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
 ProblemListener = Callable[[AudioProblem], None]
@@ -85,7 +85,7 @@ class Controller(QObject):
         self._settings_path = settings_path
         self._audio_mail = _AudioMail()
         self.sound = make_sound(self._audio_mail.told.emit)
-        window.closing.connect(self.sound.close)  # should the rest fail
+        window.closing.connect(self.sound.close)  # in case the rest of this fails
         self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
         self._audio_mail.told.connect(self.audio.tell)
         self.audio.open()  # it is opened while all else is made
@@ -98,12 +98,9 @@ class Controller(QObject):
         self._lively_until_s = 0.0
         self._ticks = 0
         self._facts_due_s = 0.0
-        self._decks_shown_s = {
-            True: self._last_tick_s,
-            False: self._last_tick_s,
-        }  # the left one's, and the right one's
+        self._decks_shown_s = dict.fromkeys((True, False), self._last_tick_s)  # True: of the left one
         self._peak_db = METER_FLOOR_DB
-        self._abx: AbxDialog | None = None  # while it is open, the sound is its own
+        self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self.library = Library([])
         problems = self.library.refresh()
@@ -208,7 +205,7 @@ class Controller(QObject):
     def _change(self, field: str, value: object) -> None:
         try:
             self.session.update(**{field: value})
-        except ValueError:  # a knob at its end asks for a hair more
+        except ValueError:  # a knob at its end asks for slightly more than the bound
             self._choices_shown(frozenset({field}))
 
     # Intents
@@ -221,19 +218,19 @@ class Controller(QObject):
     def _redo(self) -> None:
         words = self.history.redo_words
         self.history.redo()
-        self.window.say_briefly(f"Done again: {words}" if words else "Nothing to do again")
+        self.window.say_briefly(f"Redone: {words}" if words else "Nothing to redo")
 
     def pluck(self) -> None:
         if self._abx is None:
             self.performance.pluck()
 
     def _strike(self, choices: Choices) -> None:
-        """A note of an instrument, in its thread."""
+        """A note of an instrument; called in the instrument's thread."""
         if self._abx is None:
             self.performance.strike(choices)
 
     def _handle(self, event: Event) -> Struck | None:
-        """An event of an instrument, in its thread."""
+        """An event of an instrument; called in the instrument's thread."""
         return self.performance.handle(event) if self._abx is None else None
 
     def play_or_stop(self) -> None:
@@ -257,7 +254,7 @@ class Controller(QObject):
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
     def listening_test(self) -> None:
-        """Opens the ABX test on what is on stage; until it is closed, the sound belongs to it."""
+        """Opens the ABX test of the chosen pluck; until it is closed nothing else plays."""
         entry = self.entry
         if entry is None:
             self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
@@ -284,13 +281,16 @@ class Controller(QObject):
     def show_help(self) -> None:
         if self._help is None:
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
-            keys = [*PLAYED_KEYS, *((key, what) for key, _, what in KEYS)]
+            keys = [*PLAYED_KEYS, *((KEY_NAMES.get(key, key), what) for key, _, what in KEYS)]
             self._help = HelpDialog(keys, views, log_file(), self.window)
         self._help.show()
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """A dropped preset is taken in and chosen, a WAV's recipe restored; what a patch is made of goes there."""
+        """Takes a dropped file: installs and chooses a preset, restores a WAV's recipe; other sounds become bodies.
+
+        Patches, strings, scales and MIDI files go to `patches`.
+        """
         if file.suffix.lower() in TAKEN_FILES:
             self.patches.take_file(file)
             return
@@ -311,7 +311,7 @@ class Controller(QObject):
         return self.performance.entry
 
     def close(self) -> None:
-        """Saves the choices and ends every thread."""
+        """Saves the settings and ends every thread."""
         if self._abx is not None:
             self._abx.abandon()
         self._timer.stop()
@@ -327,7 +327,7 @@ class Controller(QObject):
         self.sound.close()
 
     def settings(self) -> Settings:
-        """What is to be remembered, as it is now."""
+        """The present settings, to be saved."""
         return self._settings.model_copy(
             update={
                 "choices": self.session.choices,
@@ -371,7 +371,7 @@ class Controller(QObject):
         self._wake()
 
     def _wake(self) -> None:
-        """Something may move: pictures at full pace for a while."""
+        """Something may move: runs the timer at its full rate for LIVELY_S."""
         self._lively_until_s = time.monotonic() + LIVELY_S
         if self._timer.interval() != FRAME_MS:
             self._timer.setInterval(FRAME_MS)
@@ -405,7 +405,10 @@ class Controller(QObject):
             self._timer.setInterval(wanted_ms)
 
     def _show_deck(self) -> None:
-        """One by turns, and between two pictures of the string: a key waits for what is being painted."""
+        """Shows the left and the right deck by turns, between two frames of the string.
+
+        So each painting is short: a key that is played waits for it.
+        """
         on_the_left, now_s, performance = bool(self._ticks % 2), time.monotonic(), self.performance
         elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
         moment = Moment(performance.take, performance.position_s, performance.moving, elapsed_s)
@@ -418,7 +421,7 @@ class Controller(QObject):
         peak, reduction_db = mixer.take_peak(), mixer.take_reduction_db()
         fallen_db = self._peak_db - METER_FALL_DB_PER_S * elapsed_s
         self._peak_db = max(20 * math.log10(peak) if peak > 0 else METER_FLOOR_DB, fallen_db, METER_FLOOR_DB)
-        hidden = self._abx is not None  # a level would give away what is heard
+        hidden = self._abx is not None  # the level would give X away
         self.window.transport.meter.show_level(
             -math.inf if hidden else self._peak_db, reduction_db > 0.01 and not hidden
         )

@@ -1,7 +1,7 @@
-"""What is chosen, dragged out of the window as a WAV file: rendered when the drag begins, as the export dialog would.
+"""The chosen pluck, dragged out of the window as a WAV file; it is rendered when the drag begins.
 
-The files lie in a folder of their own until the program ends, for another program may read them late. The same
-choices are rendered once: who lets go too early drags again.
+The files lie in a temporary folder until the program ends, for another program may read them late. They are kept
+for the next drag of the same choices: where the button is released before they are rendered, drag again.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _SOUND = {"string", "position", "amplitude_mm", "shape", "width", "listen", "lis
 
 
 class DraggedExport(QObject):
-    """`told` is for the user.
+    """Renders with the settings that the export dialog had last.
 
     Args:
-        chosen: the presets, what is chosen, and how the export dialog was last set.
+        chosen: the presets, the present choices, and those of the export dialog.
     """
 
-    told = Signal(str)
+    told = Signal(str)  # an error, for the user
 
     def __init__(
         self, button: DragButton, chosen: Callable[[], tuple[Sequence[PresetEntry], Choices, ExportChoices]]
@@ -47,7 +47,7 @@ class DraggedExport(QObject):
         button.drag_ended.connect(self._end)
 
     def close(self) -> None:
-        """Ends what is rendered, and removes all files; may be called again."""
+        """Cancels the rendering, and removes all files; may be called again."""
         self._end()
         if self._folder is not None:
             self._folder.cleanup()
@@ -73,7 +73,7 @@ class DraggedExport(QObject):
             paths = self._paths(preset, choices, export, sources)
         except OSError as error:
             where, why = tempfile.gettempdir(), error.strerror
-            self.told.emit(f"{where}: no folder can be made there ({why}); free some space.")
+            self.told.emit(f"{where}: no folder can be created there ({why}); free some space.")
             return
         self._job = job = ExportJob(
             lambda tell, cancelled: export_chosen(preset, choices, export, paths, lambda share: None, cancelled)
@@ -95,7 +95,7 @@ class DraggedExport(QObject):
         return {source: folder / suggested_name(preset, choices, export.rate_hz, source) for source in sources}
 
     def _rendered_all(self, job: ExportJob, wish: object, reports: list[WavReport]) -> None:
-        if job is self._job:  # and not one that was given up meanwhile
+        if job is self._job:  # not one that was cancelled meanwhile
             self._kept = wish, [report.path for report in reports]
             self._wait()
             self._button.carry(self._kept[1])
@@ -106,7 +106,7 @@ class DraggedExport(QObject):
             self.told.emit(message)
 
     def _end(self) -> None:
-        """The button was let go: what is not rendered yet is not wanted."""
+        """The button was released: cancels the rendering."""
         if self._job is not None:
             self._job.cancel()
             self._wait()

@@ -19,7 +19,7 @@ from app.shared.whole_file import WriteError
 
 @dataclass(frozen=True)
 class Dropped:
-    """What follows: new choices of the session, the name of a body for the patch, and a line for the user."""
+    """What follows: new values of `Choices`, a notice for the user ("": none), the name of a body for the patch."""
 
     choices: dict[str, Any] = field(default_factory=dict)
     notice: str = ""
@@ -27,7 +27,7 @@ class Dropped:
 
 
 def receive(file: Path, library: Library) -> Dropped:
-    """Takes a file in. A preset is in the library afterwards, a body in its folder; errors are notices."""
+    """Takes a dropped file: a preset is in the library afterwards, a body in its folder. Errors become notices."""
     ending = file.suffix.lower()
     try:
         if ending == SUFFIX:
@@ -41,11 +41,11 @@ def receive(file: Path, library: Library) -> Dropped:
     except (InstallError, RecipeError, ImpulseError, WriteError) as error:
         return Dropped(notice=str(error))
     kinds = f"a preset ({SUFFIX}), a patch, a string, a scale, a MIDI file, an exported WAV, an impulse response"
-    return Dropped(notice=f"{file}: cannot be taken in; drop one of these: {kinds}")
+    return Dropped(notice=f"{file}: not a file that is used here; drop one of these: {kinds}")
 
 
 def _body(file: Path) -> Dropped:
-    """A sound that is not of ours."""
+    """A WAV without a recipe: an impulse response."""
     try:
         return Dropped(body=install_body(file))
     except (ImpulseError, WriteError) as error:
@@ -68,13 +68,13 @@ def _recipe(file: Path, library: Library) -> Dropped:
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     notices = [] if exact else [changed_preset_notice(recipe)]
     if not SECONDS_RANGE[0] <= recipe.seconds <= SECONDS_RANGE[1]:
-        notices.append(f"its duration of {recipe.seconds:g} s is not one that the window plays, and was limited")
+        notices.append(f"its duration of {recipe.seconds:g} s is out of the window's range, and was limited")
     notice = f"{file.name}: {'; '.join(notices)}." if notices else ""
     return Dropped({"preset": path.stem, **restored_choices(recipe)}, notice)
 
 
 def restored_choices(recipe: Recipe) -> dict[str, Any]:
-    """Fields of `Choices` for what a recipe says, but for the preset."""
+    """The fields of `Choices` that a recipe sets, without the preset."""
     low, high = SECONDS_RANGE
     found: dict[str, Any] = {
         "position": recipe.pluck.position,

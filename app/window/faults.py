@@ -1,4 +1,4 @@
-"""Faults that nobody expected, of any thread, in one dialog of the window's."""
+"""Unexpected errors, of any thread, in one dialog."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 from app.shared.log import log_file
 from app.views.dialogs.fault_dialog import FaultDialog
 
-UNEXPECTED = "An error that nobody expected. What you hear and see may go on; if it does not, start again."
+UNEXPECTED = "An unexpected error. Sound and picture may go on; if they do not, restart the program."
 
 
 class Faults(QObject):
@@ -23,6 +23,7 @@ class Faults(QObject):
         self._told.connect(self._show, Qt.ConnectionType.QueuedConnection)
 
     def tell(self, text: str, heading: str = UNEXPECTED) -> None:
+        """Shows an error in the dialog; `heading` is that of the first one."""
         self._told.emit(text, heading)
 
     def _show(self, text: str, heading: str) -> None:

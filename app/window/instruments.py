@@ -1,4 +1,4 @@
-"""What plays besides the mouse: the computer's keys, MIDI and the keys on screen, connected to session and window."""
+"""The computer's keys and MIDI, connected to the sound, the session and the window."""
 
 from __future__ import annotations
 
@@ -24,20 +24,17 @@ HIGHEST_KEY = 127
 
 
 class Instruments(QObject):
-    """`played` after a note was struck and the session knows it; `told` is for the user.
-
-    A note goes straight to the sound, in the thread of its gesture; the session, and with it the window, is told when
-    the window has time.
+    """Plays gestures at once, in the thread of each; the session, and with it the window, learns of them later.
 
     Args:
-        strike: plucks the string as it is chosen.
-        handle: plays an event through the patch; what was struck.
+        strike: plucks the string as `Choices` say; called in the gesture's thread.
+        handle: plays an event through the patch and returns what it struck; called in the gesture's thread.
     """
 
-    played = Signal()
-    told = Signal(str)
+    played = Signal()  # a note was struck, and the session knows it
+    told = Signal(str)  # an error, for the user
 
-    _struck = Signal(dict)  # from any thread
+    _struck = Signal(dict)  # emitted in any thread
 
     def __init__(
         self,
@@ -53,7 +50,7 @@ class Instruments(QObject):
         self._library = library
         self._strike, self._handle = strike, handle
         self._lock = threading.Lock()
-        self._told: dict[str, Any] = {}  # of notes, and not in the session yet
+        self._told: dict[str, Any] = {}  # values of `Choices` of struck notes, not in the session yet
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
@@ -81,13 +78,13 @@ class Instruments(QObject):
 
     @property
     def reach(self) -> Reach:
-        """Where and how hard instruments pluck: what the preset was trained on."""
+        """The positions and amplitudes that keys pluck with: what the preset was trained on."""
         entry = self._library.find(self._session.choices.preset)
         return Reach.of(entry.info if entry else None)
 
     @property
     def plays_pitches(self) -> bool:
-        """Whether the computer's keys are a piano's."""
+        """Whether the computer's keys are a piano's; otherwise they pluck at ten places."""
         choices = self._session.choices
         return choices.keys_play == "pitch" and choices.patch is not None
 
@@ -96,7 +93,7 @@ class Instruments(QObject):
         self.midi.show_patch(self._session.choices.patch)
 
     def play(self, event: Event) -> bool:
-        """An event through the patch; False where there is none. Any thread."""
+        """Plays an event through the patch. Any thread. False where no patch is chosen."""
         choices = self._session.choices
         if choices.patch is None:
             return False
@@ -116,7 +113,7 @@ class Instruments(QObject):
         return True
 
     def perform(self, changes: dict[str, Any], plucks: bool) -> None:
-        """New values of `Choices`, and a pluck. Any thread."""
+        """Applies new values of `Choices`, and plucks with them. Without `plucks` in the window's thread alone."""
         if plucks:
             with self._lock:
                 self._told = {**self._told, **changes}
@@ -132,7 +129,7 @@ class Instruments(QObject):
             self._session.update(patch=Patch.model_validate({**dict(patch), field: value}))
 
     def _tell_session(self, changes: dict[str, Any]) -> None:
-        """Once for all notes that were struck meanwhile."""
+        """Updates the session, once for all notes that were struck meanwhile."""
         with self._lock:
             told, self._told = self._told, {}
         if told:

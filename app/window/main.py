@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
 
 Alive = Callable[["Controller"], None]
-CANNOT_START = "The models cannot be loaded: the program cannot be used like this."
+CANNOT_START = "The models cannot be loaded, so the program cannot be used."
 
 
 FIRST_PATCH = SHIPPED / "classical_guitar.json"
 
 
 def with_patch(settings: Settings) -> Settings:
-    """Where none was ever chosen, keys play the first one: there is sound at once."""
+    """The settings, with FIRST_PATCH where no patch was ever chosen: keys play from the first start on."""
     if settings.choices.patch is not None:
         return settings
-    with contextlib.suppress(PatchError):  # without it keys are places
+    with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places
         patch = read_patch(FIRST_PATCH)
         update = {"patch": patch} if settings.choices.preset else choices_of(patch)
         return settings.model_copy(update={"choices": settings.choices.model_copy(update=update)})
@@ -50,7 +50,7 @@ def with_patch(settings: Settings) -> Settings:
 
 
 class _Start(QObject):
-    """Loads the engine in a thread of its own once the window is painted, then brings the window to life."""
+    """Loads the engine in a thread of its own once the window is painted, then makes the controller."""
 
     _loaded = Signal()
 
@@ -68,7 +68,7 @@ class _Start(QObject):
         window.first_painted.connect(self._thread.start)
 
     def wait(self) -> None:
-        """Until nothing is being loaded any more."""
+        """Returns when the loading has ended."""
         if self._thread.ident is not None:
             self._thread.join()
 
@@ -98,13 +98,13 @@ class _Start(QObject):
         self._alive(self._controller)
 
     def _failed(self, error: Exception) -> None:
-        """Told where it can be read and copied; the window stays until its user closes it."""
+        """Shows the error in a dialog; the window stays until its user closes it."""
         self._window.show_failed()
         self._faults.tell(log_fault(error, "while the engine was loaded"), CANNOT_START)
 
 
 def load_engine() -> None:
-    """What the window does not need in order to be seen: two seconds, most of it for torch."""
+    """Loads what the first paint does not need: two seconds, most of it for torch."""
     threading.Thread(target=_find_devices, name="sound-finder", daemon=True).start()
     import torch
     from threadpoolctl import threadpool_limits
@@ -112,14 +112,14 @@ def load_engine() -> None:
     from engine.kernels.warm import warm
 
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
-    # NumPy's products are small here. Its BLAS would wait for the next one in a loop, a thread a core, for nothing.
+    # NumPy's products are small here; the threads of its BLAS, one a core, would spin between them for nothing.
     threadpool_limits(limits=1, user_api="blas")
     warm()
 
 
 def _find_devices() -> None:
-    """PortAudio looks for devices as it is loaded, which may take long: here it does so beside the rest."""
-    with contextlib.suppress(Exception):  # told where it is used
+    """Loads PortAudio, which looks for devices as it is loaded and may take long, beside the rest."""
+    with contextlib.suppress(Exception):  # raised again where it is used
         import sounddevice  # noqa: F401
 
 
@@ -129,8 +129,12 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
     Args:
         watch: is given the window before it is shown.
         alive: is given the controller as soon as there is one.
+
+    Raises:
+        NoDisplay: there is no screen.
+        Exception: why the engine could not be loaded, after the window was closed.
     """
-    gc.disable()  # until `collect_between_events`: nothing is thrown away before
+    gc.disable()  # until `collect_between_events`: there is hardly any garbage before
     return_large_blocks()
     check_display()
     path = settings_file()

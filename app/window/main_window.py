@@ -61,14 +61,15 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
+KEY_NAMES = {"Return": "Enter", "PgUp": "Page up", "PgDown": "Page down"}  # as tooltips call them
 FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
-WIDE, HIGH = 1100, 560  # below, the window is sparing
-ROOMY = 1240  # below, the controls stand closer
-ALL_HIGH, KNOBS_HIGH = 640, 170  # beside the instrument, and its knobs, there is room for the views above this height
+WIDE, HIGH = 1100, 560  # pixels: a narrower window hides brand and instrument button; a lower one the patch bar
+ROOMY = 1240  # pixels: in a narrower window the controls are compact
+ALL_HIGH, KNOBS_HIGH = 640, 170  # pixels: least height for views beside the instrument; more with its knobs
 FACTS_HEIGHT = 20
-BRIEFLY_MS = 1_800
-TITLE_BAR = 40  # at most; how high it is, is known too late
+BRIEFLY_MS = 1_800  # a text over the window
+TITLE_BAR = 40  # pixels, at most; its height is known only once the window is shown
 
 PLAYED_KEYS = (  # see `app/playing/keyboard.py`
     ("A S D F …  W E …", "play notes, as on a piano: white keys below, black keys above"),
@@ -80,7 +81,7 @@ PLAYED_KEYS = (  # see `app/playing/keyboard.py`
 
 
 class MainWindow(QMainWindow):
-    """See the module."""
+    """Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`."""
 
     play_asked = Signal()
     pluck_asked = Signal()
@@ -106,7 +107,7 @@ class MainWindow(QMainWindow):
     about_asked = Signal()
     quit_asked = Signal()
     closing = Signal()
-    first_painted = Signal()  # once, as soon as there is something to be seen
+    first_painted = Signal()  # once, after the first paint
 
     def __init__(self) -> None:
         super().__init__()
@@ -121,7 +122,8 @@ class MainWindow(QMainWindow):
         self.notices = NoticeBar()
         self.error_label = Label()
         self.error_label.setToolTip(
-            "Model against truth for this pluck: relative mean absolute error, all of the string"
+            "Mean absolute error of the model relative to the truth, for this pluck and the whole string:\n"
+            "as trained is over the time that the model was trained for"
         )
         self._solo = tool_button("", "Play all modes", "One mode is soloed; click, or Esc, to play all modes")
         self._solo.setObjectName("solo")
@@ -131,7 +133,7 @@ class MainWindow(QMainWindow):
         self.rate_label.setObjectName("badge")
         self._audio_button = tool_button("Audio …", "Audio settings", "Audio output, sample rate and buffer (Ctrl+,)")
         self._audio_button.clicked.connect(self.audio_asked)
-        tip = "Show or hide the instrument: keys and patch (Ctrl+K). In a low window the views make room for it"
+        tip = "Show or hide the instrument: keys and patch (Ctrl+K). A low window shows it instead of the views"
         self._instrument_button = tool_button("Instrument", tip=tip)
         self._instrument_button.setCheckable(True)
         self._instrument_button.setChecked(True)
@@ -165,7 +167,7 @@ class MainWindow(QMainWindow):
             head.addWidget(widget)
         facts = QHBoxLayout()
         facts.setSpacing(24)
-        for part in (self.presets.card, self._solo):  # one height, so that a mode alone moves nothing
+        for part in (self.presets.card, self._solo):  # of one height, so that the solo button moves nothing
             part.setFixedHeight(FACTS_HEIGHT)
         facts.addWidget(self.presets.card, 1)
         facts.addWidget(self._solo)
@@ -198,7 +200,7 @@ class MainWindow(QMainWindow):
         FocusRing(middle)
 
     def show_string(self, view: QWidget) -> None:
-        """Puts the string above the decks; it has the keyboard at first. Until then the window only waits."""
+        """Puts the string's view above the decks, gives it the focus and enables the window, which was loading."""
         self._loading.hide()
         self._string = view
         self._stage.insertWidget(0, view)
@@ -207,11 +209,11 @@ class MainWindow(QMainWindow):
         view.setFocus()
 
     def show_failed(self) -> None:
-        """Says, where the string would be, that it cannot be had."""
+        """Says, in the place of the string, that the models cannot be loaded."""
         self._loading.setText(FAILED)
 
     def order_tabs(self) -> None:
-        """Lets the Tab key go as the eye does: header, notice, string, views, controls. Once all parts are there."""
+        """Sets the order of the Tab key: header, notice, string, views, controls. Call it once all parts exist."""
         header = (self.presets, self._instrument_button, self.notices.bell, self._audio_button, self._menu_button)
         chain: list[QWidget] = []
         for part in (*header, self.notices, self._string, self.left, self.right, self.transport, self.instrument):
@@ -221,7 +223,7 @@ class MainWindow(QMainWindow):
                 for widget in inside
                 if widget.focusPolicy() & Qt.FocusPolicy.TabFocus
                 and widget.focusProxy() is None
-                and widget.window() is self  # a list's pop-up is not
+                and widget.window() is self  # not the pop-up of a combo box
             ]
             chain += sorted(stops, key=lambda widget: not isinstance(widget, QTabBar))  # a deck's names come first
         for before, after in pairwise(chain):
@@ -246,19 +248,19 @@ class MainWindow(QMainWindow):
         self._share_height()
 
     def _share_height(self) -> None:
-        """In a low window the views make room for the instrument, then most of the instrument itself."""
+        """A low window hides the views beside the instrument, then parts of the instrument."""
         height = self.height()
         needed = ALL_HIGH + (KNOBS_HIGH if self.instrument.unfolded else 0) if self.shows_instrument else 0
         self.instrument.set_low(height < ALL_HIGH, height < HIGH)
         self._decks.setVisible(self._alive and height >= needed)
 
     def show_solo(self, mode: int) -> None:
-        """Which mode is heard alone; 0: all are heard."""
+        """The soloed mode; 0: none, all are heard."""
         self._solo.setText(f"Mode {mode} solo  ✕")
         self._solo.setVisible(mode > 0)
 
     def say_briefly(self, text: str) -> None:
-        """Over the window for a moment: what a key has done that may not be seen."""
+        """Shows a text over the window for BRIEFLY_MS: what a key did, which may not be visible."""
         place = self.mapToGlobal(QPoint(self.width() // 2, self._head.geometry().bottom()))
         QToolTip.showText(place, plain_tip(text), self, QRect(), BRIEFLY_MS)
 
@@ -267,7 +269,7 @@ class MainWindow(QMainWindow):
         return bytes(self.saveGeometry().toBase64().data()).decode("ascii")
 
     def restore_geometry(self, text: str) -> None:
-        """Opens where it was closed; in any case no larger than the screen is now."""
+        """Restores size and place ("": none), no larger than the present screen."""
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
         if not self.isMaximized() and not self.isFullScreen():
@@ -275,9 +277,9 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(room.shrunkBy(QMargins(0, TITLE_BAR, 0, 0))))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """A small window spends its room on what is to be seen and turned."""
+        """A small window has narrower margins, and neither brand nor instrument button."""
         super().resizeEvent(event)
-        for spared in (self._brand, self._instrument_button):  # the latter is in the menu too
+        for spared in (self._brand, self._instrument_button):  # the menu shows and hides the instrument too
             spared.setVisible(self.width() >= WIDE)
         self._share_height()
         narrow, low = self.width() < ROOMY, self.height() < HIGH

@@ -1,4 +1,4 @@
-"""MIDI in the window: the input's messages become what the string does, and the dialog what is remembered.
+"""MIDI in the window: messages of the input become notes and new values of `Choices`; the dialog sets both up.
 
 Messages come in mido's thread. Notes are played there, without the window; controllers reach the window's thread
 through a queued signal.
@@ -22,9 +22,11 @@ from app.views.dialogs.midi_dialog import MidiDialog
 
 
 class MidiControl(QObject):
-    """`performed` asks for new values of `Choices`, `patch_turned` for one of the patch; `told` is for the user.
+    """Lives in the window's thread; notes are played in mido's.
 
     Args:
+        reach: the positions and amplitudes that notes pluck with; called in any thread.
+        presets: the names that notes may select; called in any thread.
         play: plucks with new values of `Choices`; called in mido's thread.
         handle: plays an event as a pitch; False where there is no patch to play. Called in mido's thread.
 
@@ -32,9 +34,9 @@ class MidiControl(QObject):
         choices: what is to be remembered.
     """
 
-    performed = Signal(dict)
-    patch_turned = Signal(str, object)
-    told = Signal(str)
+    performed = Signal(dict)  # new values of `Choices`, by a controller
+    patch_turned = Signal(str, object)  # field and value of the patch, by the dialog
+    told = Signal(str)  # an error, for the user
     _received = Signal(object)  # emitted in mido's thread
 
     def __init__(
@@ -52,14 +54,14 @@ class MidiControl(QObject):
         self._reach = reach
         self._presets = presets
         self._play, self._handle = play, handle
-        self._learning: str | None = None  # the field that the next controller is taught
+        self._learning: str | None = None  # the field to which the next controller is assigned
         self._dialog: MidiDialog | None = None
         self._patch: Patch | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
         self.input = MidiInput(self._receive, load)
 
     def start(self) -> None:
-        """Opens the remembered input, if any; says why it cannot."""
+        """Opens the remembered input, if any; emits `told` where it cannot."""
         if self.choices.port:
             try:
                 self.input.open(self.choices.port)
@@ -72,7 +74,7 @@ class MidiControl(QObject):
     # The dialog
 
     def show_dialog(self, window: QWidget) -> None:
-        """Opens it beside the window, which can be played on; or brings it to the front."""
+        """Opens the dialog, which does not block the window, or brings it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(
                 {field: turned.label for field, turned in TURNED.items()},
@@ -128,7 +130,7 @@ class MidiControl(QObject):
             self._dialog.show_problem(problem)
 
     def _learn(self, field: str) -> None:
-        """The next controller that moves is taught `field`; "", or the same again: none."""
+        """Assigns the next controller that moves to `field`; "", or the same field again: ends waiting for one."""
         self._learning = field if field and field != self._learning else None
         self._show_choices()
 
@@ -139,7 +141,7 @@ class MidiControl(QObject):
     # Messages
 
     def _receive(self, event: Event) -> None:
-        """In mido's thread. What a patch plays is played at once; a controller that was taught waits."""
+        """In mido's thread. Notes are played at once; an assigned controller waits for the window's thread."""
         if isinstance(event, Controller) and (
             self._learning is not None or event.number in self.choices.controllers.values()
         ):
@@ -150,6 +152,7 @@ class MidiControl(QObject):
             self._play(meaning_of(event, self.choices, self._reach(), self._presets()).changes)
 
     def _answer(self, event: Event) -> None:
+        """In the window's thread: assigns a controller that is waited for, and applies its value."""
         if self._learning is not None and isinstance(event, Controller):
             field, self._learning = self._learning, None
             self._remember(self.choices.learned(field, event.number))

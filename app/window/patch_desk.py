@@ -1,4 +1,4 @@
-"""The patch that keys play: chosen, turned, saved, recorded; and what its strip in the window shows."""
+"""The patch that keys play: chosen, changed, saved, recorded; and what the instrument's strip shows of it."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
 from app.session.instrument import choices_of, heard_at
+from app.shared.key_names import note_name
 from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
-from app.views.instrument.playable import note_name
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from engine.plain_text import one_line
@@ -51,7 +51,7 @@ AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 MANY_STRINGS = "studio_any_string"
 RECORDED = "WAV and MIDI (*.wav)"
-PLACES = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
+PLACES = "The computer's keys pluck the chosen preset at ten positions; choose a patch to play pitches"
 MIDI_FILES = (".mid", ".midi")
 STRING_FILE = ".toml"
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
@@ -64,9 +64,9 @@ class PatchDesk(QObject):
         favourites: names of patches.
     """
 
-    told = Signal(str)
-    informed = Signal(str)  # of what went well
-    _written = Signal(str)  # from a thread
+    told = Signal(str)  # an error, for the user
+    informed = Signal(str)  # what went well
+    _written, _not_written = Signal(str), Signal(str)  # from the thread that writes a recording
 
     def __init__(
         self,
@@ -86,7 +86,8 @@ class PatchDesk(QObject):
         self._shown_s = 0.0
         self._recording_began_s = 0.0
         self._playback = Playback(instruments.play)
-        self._written.connect(self.told, Qt.ConnectionType.QueuedConnection)
+        self._written.connect(self.informed, Qt.ConnectionType.QueuedConnection)
+        self._not_written.connect(self.told, Qt.ConnectionType.QueuedConnection)
         self.reload()
         self._connect()
 
@@ -129,8 +130,8 @@ class PatchDesk(QObject):
         return next((each for each in self._entries if patch is not None and each.patch.name == patch.name), None)
 
     def reload(self) -> None:
-        """The user may have put files into the folder meanwhile."""
-        if self._panel.bar.compare.isChecked():  # what is saved may be another
+        """Reads patches and bodies again: the user may have added files."""
+        if self._panel.bar.compare.isChecked():  # the saved patch may have changed
             self.compare(False)
         self._entries, problems = list_patches()
         for problem in problems:
@@ -141,13 +142,13 @@ class PatchDesk(QObject):
     # Intents
 
     def choose(self, name: str) -> None:
-        """A patch by the name of its entry."""
+        """Makes a patch, by the name of its entry, the one that keys play."""
         for entry in self._entries:
             if entry.name == name:
                 self._session.update(**choices_of(entry.patch))
 
     def step(self, step: int) -> None:
-        """To the next or previous of the filtered list, going round."""
+        """To the next or previous patch of the filtered list, going round."""
         names = list(self.browser.listed) or [entry.name for entry in self._entries]
         entry = self.entry
         if names:
@@ -162,14 +163,14 @@ class PatchDesk(QObject):
             self.browser.show_over()
 
     def audition(self, name: str) -> None:
-        """A note of a patch in the middle of its range."""
+        """Chooses a patch and plays a note in the middle of its range."""
         self.choose(name)
         if self.patch is not None:
             key = sum(self.patch.range) // 2
             self._playback.play(_note(key))
 
     def change(self, field: str, value: float) -> None:
-        """A field of the patch by its path; a value beyond its bounds is left alone."""
+        """Changes a field of the patch, by its path; a value beyond its bounds is ignored."""
         patch = self.patch
         if patch is None:
             return
@@ -180,14 +181,14 @@ class PatchDesk(QObject):
                 part, _, name = field.partition(".")
                 inner = {**dict(getattr(patch, part)), name: value} if name else value
                 changed = Patch.model_validate({**dict(patch), part: inner})
-        except (ValueError, AttributeError):  # a knob at its end asks for a hair more
+        except (ValueError, AttributeError):  # a knob at its end asks for slightly more than the bound
             self._show_patch()
             return
         heard = heard_at(changed) if changed.pickup != patch.pickup else {}
         self._session.update(patch=changed, **heard)
 
     def save(self) -> None:
-        """Under its own name where it is the user's, else under one that is asked for."""
+        """Saves the patch: under its name where it is the user's own, else asks for one."""
         patch, entry = self.patch, self.entry
         if patch is None:
             return
@@ -211,7 +212,7 @@ class PatchDesk(QObject):
         self._show_patch()
 
     def rename(self, name: str = "") -> None:
-        """One of the user's own, by default the present one."""
+        """Asks for a new name of one of the user's own patches, by default the present one."""
         entry = next((each for each in self._entries if each.name == name), self.entry)
         if entry is None or not entry.own:
             self.told.emit("Only patches of your own can be renamed: save this one first.")
@@ -229,23 +230,23 @@ class PatchDesk(QObject):
         self.reload()
 
     def delete(self, name: str) -> None:
-        """One of the user's own."""
+        """Deletes one of the user's own patches."""
         entry = next((each for each in self._entries if each.name == name and each.own), None)
         if entry is None:
             return
         try:
             entry.path.unlink()
         except OSError as error:
-            self.told.emit(f"{entry.path}: cannot be removed ({error.strerror}).")
+            self.told.emit(f"{entry.path}: cannot be deleted ({error.strerror}).")
         self.reload()
 
     def revert(self) -> None:
-        """As it was saved."""
+        """Goes back to the patch as it was saved."""
         if (entry := self.entry) is not None:
             self._session.update(**choices_of(entry.patch))
 
     def compare(self, saved: bool) -> None:
-        """Keys play the patch as it was saved, or as it is now; what is chosen stays. Any change of it ends that."""
+        """Lets keys play the patch as it was saved, or as it is now. The choices stay; any change of them ends it."""
         entry = self.entry if saved else None
         self._performance.hear_patch(None if entry is None else entry.patch)
         self._panel.bar.show_comparing(entry is not None)
@@ -265,23 +266,26 @@ class PatchDesk(QObject):
             self.told.emit(one_line(str(error)))
 
     def _take_string(self, file: Path) -> None:
-        """A string by its physical parameters is plucked, by the model of many strings."""
+        """Chooses the string whose physical parameters the file has, plucked by the model of many strings."""
         many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
         if many is None:
             self.told.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
             return
-        string = read_string(file)
-        of_string(load_preset(many.path), string)  # it can be plucked
+        string, preset = read_string(file), load_preset(many.path)
+        try:
+            of_string(preset, string)  # it can be plucked
+        except PresetError as error:
+            raise PresetError(f"{file.name}: {error}") from error
         self._session.update(preset=many.name, string=PhysicalString(**asdict(string)))
         outside = many.info.family.outside(string) if many.info.family is not None else []
         beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""
-        self.told.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
+        self.informed.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
 
     def _tune(self, file: Path) -> None:
-        """The patch by a Scala file. Of a scale and a mapping that do not go together, the new one stays."""
+        """Tunes the patch by a Scala file. Where scale and mapping do not fit each other, the new one stays."""
         patch, text = self.patch, read_scala(file)
         if patch is None:
-            self.told.emit(f"{file.name}: tunes a patch, and none is chosen; choose one first.")
+            self.told.emit(f"{file.name} tunes a patch, and none is chosen; choose one first.")
             return
         field, other = ("keymap", "scale") if file.suffix.lower() == ".kbm" else ("scale", "keymap")
         tuned, left_out = {**dict(patch.tuning), field: text}, ""
@@ -289,36 +293,35 @@ class PatchDesk(QObject):
             tuning = TuningChoice.model_validate(tuned)
         except ValueError:  # both are well by themselves
             tuning = TuningChoice.model_validate({**tuned, other: ""})
-            left_out = (
-                "; the scale before does not fit it" if other == "scale" else "; the mapping before does not fit it"
-            )
+            kind = "scale" if other == "scale" else "keyboard mapping"
+            left_out = f"; the {kind} that it had does not fit and was removed"
         self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
         self.informed.emit(f"{file.name} tunes {patch.name}{left_out}.")
 
     def take_body(self, name: str) -> None:
-        """One of the user's own that has come: the strings of the patch stand on it."""
+        """Gives the patch one of the user's own bodies, which was just installed."""
         self._panel.bar.set_bodies([(each, each) for each in body_names()])
         if self.patch is None:
-            self.informed.emit(f"{name} is a body for patches now; choose a patch, and it in the patch's bar.")
+            self.informed.emit(f"The body {name} was added; choose a patch, then this body in its bar.")
             return
         if self.patch.body.name == name:  # its file was missing
             self._performance.choices_changed(frozenset({"patch"}))
         self._choose_body(name)
-        self.informed.emit(f"{self.patch.name} stands on the body {name}.")
+        self.informed.emit(f"{self.patch.name} now has the body {name}.")
 
     def stop(self) -> None:
-        """Of a MIDI file that is played."""
+        """Stops the MIDI file that is played."""
         self._playback.stop()
 
     @property
     def playing(self) -> bool:
-        """Whether a MIDI file is."""
+        """Whether a MIDI file is played."""
         return self._playback.playing
 
     # Recording
 
     def record(self) -> None:
-        """Begins, or ends and asks for a file."""
+        """Begins to record, or ends it and asks for a file."""
         live = self._performance.live
         if not live.recording:
             live.begin_recording()
@@ -342,7 +345,7 @@ class PatchDesk(QObject):
             self.told.emit(f"{taken[0]} exists already; choose another name.")
 
     def write(self, path: Path, events: list[TimedEvent]) -> threading.Thread | None:
-        """What was played, as WAV and MIDI of one name, in the background."""
+        """Writes what was played as WAV and MIDI of one name, in a thread; None where there is no patch or preset."""
         patch = self.patch
         entry = None if patch is None else self._library.find(patch.preset)
         if patch is None or entry is None:
@@ -353,7 +356,7 @@ class PatchDesk(QObject):
             try:
                 self._written.emit(write_recorded(path, patch, load_preset(entry.path), events, source))
             except (ValueError, PresetError, WriteError, OSError) as error:
-                self._written.emit(str(error).splitlines()[0])
+                self._not_written.emit(str(error).splitlines()[0])
 
         thread = threading.Thread(target=work, name="performance-writer", daemon=True)
         thread.start()
@@ -376,14 +379,14 @@ class PatchDesk(QObject):
             self._panel.show_source(self._session.source_heard)
 
     def show_played(self) -> None:
-        """What is beyond training of a note that was played, which the session knows by now."""
+        """Says in the bar what of the latest note, which the session knows by now, lies outside the training."""
         choices = self._session.choices
         entry = self._library.find(choices.preset)
         if entry is not None and choices.string is not None:
             self._panel.bar.show_note("; ".join(outside_training(info_of(choices, entry), choices.pluck)))
 
     def tick(self) -> None:
-        """Now and then: which keys sound."""
+        """Shows which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
         now_s = time.monotonic()
         if now_s - self._shown_s < SHOWN_EVERY_S or not self._panel.isVisible():
             return
@@ -421,7 +424,7 @@ class PatchDesk(QObject):
         self._show_entries()
 
     def _press(self, key: int, velocity: int) -> None:
-        """Of the keys on the screen, which are pitches always."""
+        """Plays a key on the screen; these are always pitches."""
         self._session.update(keys_play="pitch")
         self._instruments.play(NoteOn(key, velocity))
 
@@ -444,7 +447,7 @@ class PatchDesk(QObject):
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            self.told.emit(f"{folder}: cannot be made ({error.strerror}).")
+            self.told.emit(f"{folder}: cannot be created ({error.strerror}).")
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
             self.told.emit(f"No file manager was found here; your own patches are in {folder}.")
@@ -455,7 +458,7 @@ def _note(key: int) -> list[TimedEvent]:
 
 
 def facts_of(patch: Patch) -> dict[str, str]:
-    """Of the string in the middle of the range, in physical units."""
+    """The string in the middle of the patch's range: its properties in words, with units."""
     key = sum(patch.range) // 2
     try:
         found = Strings(patch).of_key(key)

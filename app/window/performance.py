@@ -1,7 +1,7 @@
 """The pluck that is played and the pluck that is shown.
 
 A gesture strikes a note, which sounds at once; the picture follows: the render worker makes the motion of the same
-pluck, and the views show it at the note's own time. Everything here runs in the window's thread, but for `strike`.
+pluck, and the views show it at the note's own time. All but `strike` and `handle` runs in the window's thread.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from app.playing.notes import Note, Notes
 from app.playing.sources import Sources
 from app.playing.stroke import Stroke
 from app.presets.library import Library, PresetEntry
-from app.presets.words import percent
+from app.presets.words import model_word, percent
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices, Session
@@ -41,26 +41,20 @@ from engine.pluck import Pluck
 from engine.resonators.string import StringParameters
 
 MotionKey = tuple[str, StringParameters, Pluck, float]  # the preset's name, its string, the pluck, how long it is
-LOOP_AHEAD_S = 0.5  # the next turn of a loop is handed over so long before it begins
+LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
-KEY_FIELDS = {
-    "preset",
-    "string",
-    "amplitude_mm",
-    "shape",
-    "width",
-}  # what the keys' plucks depend on beside their places
+KEY_FIELDS = {"preset", "string", "amplitude_mm", "shape", "width"}  # what plucks of keys at ten places depend on
 MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
 
 def motion_key(take: Take) -> MotionKey:
-    """What tells the motion of a take from others."""
+    """What the motion of a take depends on."""
     return take.preset_name, take.info.string, take.pluck, take.seconds
 
 
 @dataclass
 class _Shown:
-    """What the views show: a motion, and the note that says how far it is; None: it stands at `parked_s`."""
+    """What the views show: a motion, and the note whose time it follows; without a note it stands at `parked_s`."""
 
     take: Take | None = None
     note: Note | None = None
@@ -68,7 +62,7 @@ class _Shown:
 
 
 class Performance(QObject):
-    """See the module. `notes` may be told from any thread."""
+    """Owns the notes, the patch that is played (`live`) and the render worker. Times are in s from the pluck."""
 
     def __init__(
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
@@ -79,7 +73,7 @@ class Performance(QObject):
         self._asked: RenderRequest | None = None
         self._shown = _Shown()
         self._latest: Note | None = None  # struck last
-        self._next_turn: Note | None = None  # of the loop, handed over and waiting for its frame
+        self._next_turn: Note | None = None  # of the loop, which waits in the mixer for its frame
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
         mail.started.connect(self._take_started)
@@ -104,23 +98,23 @@ class Performance(QObject):
 
     @property
     def ready(self) -> bool:
-        """Whether what is shown is what was chosen."""
+        """Whether the motion that is shown is that of the chosen pluck."""
         return self.take is not None and motion_key(self.take) == self._key(self._session.choices)
 
     @property
     def at_hand(self) -> bool:
-        """Whether a pluck of what is chosen would sound at once: its sources are loaded, and the output is open."""
+        """Whether the chosen pluck would sound at once: its sources are loaded, and the output is open."""
         stroke = self._stroke()
         return stroke is not None and self._sound.status().changes_done > 0 and self.notes.have(stroke)
 
     @property
     def playing(self) -> bool:
-        """Whether anything rings that has not been told to end."""
+        """Whether a note rings that was not released."""
         return self.notes.ringing > 0
 
     @property
     def position_s(self) -> float:
-        """Of what is shown: how far what is heard of it is now."""
+        """The playhead: the time in the shown motion that is heard now, or where it stands."""
         shown = self._shown
         if shown.take is None:
             return 0.0
@@ -137,18 +131,21 @@ class Performance(QObject):
 
     @property
     def settled(self) -> bool:
-        """Whether what is shown is whole, so that views may rest."""
+        """Whether motion and signals are complete, so that views need not look for more."""
         return self.take is None or (self.take.complete and self.take.listened.complete)
 
     @property
     def match(self) -> Mapping[str, float] | None:
-        """The gains that bring the sources of the latest note to one level, once they are known."""
+        """By source, the factor that brings the latest note to the level of the truth; None: not known yet."""
         return None if self._latest is None else self._latest.match
 
     # Intents
 
     def strike(self, choices: Choices) -> Note | None:
-        """Lets the string go as `choices` say, beside those that ring. From any thread; the picture is told later."""
+        """Plucks the string as `choices` say, while other notes ring on. Any thread; `follow` then shows it.
+
+        None where the preset is not in the library.
+        """
         entry = self._library.find(choices.preset)
         if entry is None:
             return None
@@ -157,7 +154,7 @@ class Performance(QObject):
         return note
 
     def handle(self, event: Event) -> Struck | None:
-        """Plays an event through the patch; what was struck. From any thread; the picture is told later."""
+        """Plays an event through the patch. Any thread; `follow` then shows it. None where it struck no string."""
         made = self.live.handle(event)
         if made is None:
             return None
@@ -165,12 +162,12 @@ class Performance(QObject):
         return struck
 
     def pluck(self) -> None:
-        """Lets the string go as it is chosen."""
+        """Plucks the string as chosen, and shows it."""
         self.strike(self._session.choices)
         self.follow()
 
     def follow(self) -> None:
-        """Shows the latest note while it rings, where its motion is there; otherwise when it comes."""
+        """Shows the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
         latest = self._latest
         if latest is None or latest is self._shown.note or latest.released or latest.over:
             return
@@ -179,6 +176,7 @@ class Performance(QObject):
             self._shown.note, self._shown.parked_s = latest, latest.from_s
 
     def play_or_stop(self) -> None:
+        """Stops what rings; where nothing does, plucks."""
         if self.playing:
             self.stop()
         else:
@@ -193,7 +191,7 @@ class Performance(QObject):
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
-        """Moves the playhead; what rings goes on from there alone."""
+        """Moves the playhead; while notes ring, one that begins there replaces them."""
         if self.take is None:
             return
         position_s = min(max(position_s, 0.0), self.take.seconds)
@@ -207,13 +205,13 @@ class Performance(QObject):
         entry = self.entry
         self._asked = None if entry is None else render_request(self._session.choices, entry.path, self._library)
         if self._asked is None:
-            self._window.notices.tell("No preset was found: train one, or get the presets again.")
+            self._window.notices.tell("No preset was found: install the presets again, or train one.")
             return
         self.notes.prepare(self._asked.preset, *self._asked.others)
         self._worker.submit(self._asked)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        """Tells the notes what concerns them, and asks for another motion where another is chosen."""
+        """Applies changed fields of `Choices` to the notes, and asks for another motion where that has changed."""
         choices, entry = self._session.choices, self.entry
         if names & MIX_FIELDS:
             self.notes.set_mix(mix_of(choices))
@@ -236,14 +234,17 @@ class Performance(QObject):
         self.follow()
 
     def hear_patch(self, patch: Patch | None) -> None:
-        """Keys play this one until another is chosen; None: the chosen one. What is shown stays."""
+        """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
         if patch is not None:
             choices = choices.model_copy(update=choices_of(patch))
         self.live.set_patch(choices.patch, heard_ear(choices))
 
     def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """Model and truth of a pluck as they are heard, (frames, channels), in the background."""
+        """Model and truth of a pluck as they are heard, (frames, channels) by source, rendered in the background.
+
+        `choices.preset` must be in the library.
+        """
         entry = self._library.find(choices.preset)
         assert entry is not None
         stroke = replace(stroke_of(choices, entry.path, self._library), sources=("model", "truth"))
@@ -258,6 +259,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
+        """Forgets notes that ended, goes on with the loop, and updates the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._turn()
@@ -267,23 +269,23 @@ class Performance(QObject):
             self._show_words()
 
     def _waiting(self) -> str:
-        """Of a model that is rendered before it is heard."""
+        """When a model that is rendered before it is heard will sound; "" where none waits."""
         latest = self._latest
         if latest is None or not latest.waits_s:
             return ""
         entry = self._library.find(path_of(latest.stroke.preset).stem)
-        name = entry.info.model.upper() if entry else "model"
+        name = model_word(entry.info.model) if entry else "model"
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
     def _turn(self) -> None:
-        """Hands over the next turn of the loop in time."""
+        """Hands the next turn of the loop to the mixer, LOOP_AHEAD_S before it begins."""
         note, take, turn = self._shown.note, self._shown.take, self._next_turn
         if note is None or take is None or not note.began:
             return
         if turn is not None:
             if turn.began and not turn.cut:
                 self._latest = self._shown.note = turn
-            if turn.began:  # or its mixer has gone: there will be another
+            if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another
                 self._next_turn = None
             return
         if note.cut or note.released or (stroke := self._stroke()) is None:
@@ -301,7 +303,7 @@ class Performance(QObject):
             if self._shown.note is not None:
                 self._shown.note.release_at(0)
 
-    # What the worker says
+    # Signals of the render worker
 
     def _take_started(self, take: Take) -> None:
         if motion_key(take) != self._key(self._session.choices):  # overtaken by the next one
@@ -339,7 +341,7 @@ class Performance(QObject):
         self._show_words()
 
     def _show_words(self) -> None:
-        """Of a model that one waits for rather than of its error."""
+        """In the header: how long a model is still waited for, or the error."""
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
     def _stroke(self) -> Stroke | None:
@@ -347,7 +349,7 @@ class Performance(QObject):
         return None if entry is None else self._stroke_of(self._session.choices, entry)
 
     def _stroke_of(self, choices: Choices, entry: PresetEntry) -> Stroke:
-        """A string that keys have played is as loud by hand."""
+        """The chosen pluck, with the gain that its string has when a key plays it."""
         stroke = stroke_of(choices, entry.path, self._library)
         string = string_of(stroke.preset)
         return stroke if string is None else replace(stroke, gain=self.live.gain_of(string))

@@ -1,4 +1,4 @@
-"""What preset bar and browser show, and what follows from their gestures: filter, favourites, previous, next."""
+"""The presets in bar and browser: filter, favourites, previous and next."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class PresetDesk(QObject):
     """Lives in the window's thread, as long as the window.
 
     Attributes:
-        favourites: names of presets, also of such as are not here at present.
+        favourites: names of presets, also of presets whose files are missing at present.
     """
 
     pluck_asked = Signal()
@@ -57,7 +57,7 @@ class PresetDesk(QObject):
             self.browser.show_over()
 
     def step(self, step: int) -> None:
-        """To the next or previous preset of the filtered list, going round; from outside of it, to its end."""
+        """To the next or previous preset of the filtered list, going round; from outside, to its first or last."""
         names = [entry.name for entry in self._filter.applied(self._library.entries, self.favourites)]
         chosen = self._session.choices.preset
         if names:
@@ -70,7 +70,7 @@ class PresetDesk(QObject):
         self._show()
 
     def choice_changed(self) -> None:
-        """Another preset is chosen."""
+        """To be called when another preset is chosen."""
         name = self._session.choices.preset
         self._bar.set_chosen(self._library.find(name), name in self.favourites)
         self.browser.set_chosen(name)
@@ -80,7 +80,7 @@ class PresetDesk(QObject):
         self._show()
 
     def _reload(self) -> None:
-        """The user may have put files into the folder meanwhile."""
+        """Reads the folders again: the user may have added files."""
         for problem in self._library.refresh():
             self.told.emit(problem)
 
@@ -101,7 +101,7 @@ class PresetDesk(QObject):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             self.told.emit(
-                f"{folder}: cannot be made ({error.strerror}); choose another with LEARNED_STRINGS_PRESETS."
+                f"{folder}: cannot be created ({error.strerror}); choose another with LEARNED_STRINGS_PRESETS."
             )
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):

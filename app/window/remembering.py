@@ -1,4 +1,4 @@
-"""Settings are saved soon after each change, so that a process that ends in any way loses a moment at most."""
+"""Settings are saved soon after each change, so that a process that is killed loses the last seconds at most."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ LOCK_S = 2.0  # waited for another instance that is saving
 
 
 class Keeper(QObject):
-    """Looks now and then at what there is to remember, and writes what has changed and then rested.
+    """Looks at the settings each second, and writes them when they have changed and then stayed for one look.
 
-    Another instance's changes are kept: of each field, what this one has changed since it read or wrote the file.
+    Only fields that this instance has changed are written over those of the file, which another one may have changed.
 
     Args:
         current: what is to be remembered, as it is now.
     """
 
-    failed = Signal(str)
+    failed = Signal(str)  # once: why the file cannot be written
 
     def __init__(self, path: Path, read: Settings, current: Callable[[], Settings], parent: QObject) -> None:
         super().__init__(parent)
@@ -37,7 +37,7 @@ class Keeper(QObject):
         self._timer.start()
 
     def look(self) -> None:
-        """Writes, in a thread of its own, what has changed since the last time but not since the last look."""
+        """Writes, in a thread of its own, where the settings have changed, but not since the last look."""
         now = self._current()
         rested, self._seen = now == self._seen, now
         if not rested or now == self._base or (self._writing is not None and self._writing.is_alive()):
@@ -47,7 +47,7 @@ class Keeper(QObject):
         self._writing.start()
 
     def close(self) -> None:
-        """Writes what has not been written yet."""
+        """Stops looking, and writes what has not been written yet."""
         self._timer.stop()
         if self._writing is not None:
             self._writing.join()

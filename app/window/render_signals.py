@@ -1,4 +1,4 @@
-"""What the threads of rendering and playing say, carried into the window's thread (Qt queues the signals)."""
+"""Calls of the threads that render and play, carried into the window's thread: Qt queues the signals."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from engine.metrics import ErrorSums
 class RenderSignals(QObject):
     """Its methods are called in other threads; see `RenderListener`."""
 
-    started = Signal(object)  # take
-    finished = Signal(object, object)
-    other_refused = Signal(str, str)
-    failed = Signal(str, str)
-    refused = Signal(str, str)  # a pluck cannot be played
+    started = Signal(object)  # Take
+    finished = Signal(object, object)  # Take, ErrorSums
+    other_refused = Signal(str, str)  # name of the preset, message
+    failed = Signal(str, str)  # message, details
+    refused = Signal(str, str)  # a pluck cannot be played: message, details
 
     def take_started(self, take: Take) -> None:
         self.started.emit(take)

@@ -1,4 +1,4 @@
-"""The patch as an instrument for samplers, beside the window that goes on playing."""
+"""The export of the patch for samplers: its dialog, which does not block the window."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.views.dialogs.sampled_dialog import SampledDialog
 
 
 class SampledExport(QObject):
-    """Lives as long as the window; `told` is for the user."""
+    """Lives as long as the window; `told` has notices for the user."""
 
     told = Signal(str)
 
@@ -25,11 +25,11 @@ class SampledExport(QObject):
 
     @property
     def choices(self) -> SampledChoices:
-        """What is to be remembered."""
+        """The dialog's choices, to be saved."""
         return self._choices if self.dialog is None else self.dialog.choices()
 
     def open(self) -> None:
-        """The dialog, or brings it to the front."""
+        """Opens the dialog, or brings it to the front."""
         if self.dialog is None:
             if (played := self._played()) is None:
                 self.told.emit("There is no patch to export: choose one first.")

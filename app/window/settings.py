@@ -25,7 +25,7 @@ from engine.plain_text import one_line
 from engine.schema import SchemaError, parse_json
 from engine.whole_file import whole_file
 
-# what a first start finds at the top: strings at full bandwidth, plucked anywhere
+# at the top of the browser at a first start: strings at full bandwidth, trained on plucks anywhere
 FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
 
 
@@ -40,7 +40,7 @@ class InstrumentChoice(BaseModel):
 
 
 class Settings(BaseModel):
-    """The whole file."""
+    """The content of the file."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -95,7 +95,7 @@ def load_settings(path: Path) -> tuple[Settings, str]:
 
 
 def read_settings(path: Path) -> Settings | None:
-    """Those of a file as it is; None where there is none that can be used as a whole."""
+    """The settings of a file; None where it is missing or cannot be used as a whole. Never raises."""
     try:
         return Settings.model_validate_json(_bytes(path))
     except (OSError, ValueError, OverflowError):
@@ -103,9 +103,9 @@ def read_settings(path: Path) -> Settings | None:
 
 
 def merged(base: Settings, mine: Settings, theirs: Settings) -> Settings:
-    """What two instances have changed since `base`: of each field mine where I have changed it, else theirs.
+    """The changes of two instances since `base`: of each field mine where I have changed it, else theirs.
 
-    Of the choices each by itself.
+    Fields of `choices` are merged one by one.
     """
     own = {name: getattr(mine, name) for name in _changed(base, mine) - {"choices"}}
     choices = {name: getattr(mine.choices, name) for name in _changed(base.choices, mine.choices)}
@@ -143,7 +143,7 @@ def _without(text: bytes, error: ValidationError) -> Settings | None:
 
 
 def _drop(data: dict[str, Any], field: list[str]) -> None:
-    """Takes the value at a path of keys out; what lacks a necessary key goes as a whole."""
+    """Removes the value at a path of keys; where a necessary key is missing, the object that lacks it."""
     key, *rest = field
     inner = data.get(key)
     if rest and isinstance(inner, dict) and rest[0] in inner:

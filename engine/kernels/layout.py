@@ -72,7 +72,9 @@ LARGEST_ENERGY = 48  # R of latents that share a tension
 LARGEST_STRETCH = 49  # R
 PEAK = 50  # R m: of the displacement as it is let go, a least one
 JOINS = 51  # W whether its fade-in is the complement of the other's fade
-HEADER = 52
+ENDS_AT = 52  # W frames since the pluck, from which on it fades out whatever it still gives
+ENDS_IN = 53  # W frames of that fade
+HEADER = 54
 
 
 @njit(inline="always", **COMPILED)
@@ -113,9 +115,7 @@ BANK_ROWS = 21
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
 FOLLOWING = 6
 TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
-PHYSICAL = (
-    FOLLOWING + 8
-)  # behind those of `kernels.tension.node`, κ p and ω²: amplitudes and speeds, between two moments
+PHYSICAL = FOLLOWING + 8  # behind the rows of `kernels.tension.node`, κ p and ω²: amplitudes and speeds for a moment
 TENSION_ROWS = PHYSICAL + 2
 
 # Slots of the modes that a voice is to have, then the four rows above

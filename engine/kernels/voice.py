@@ -75,9 +75,8 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
             for frame in range(quantum):
                 past[2 * quantum + frame] = out[point, frame]
             if begins and turn == 0 and counts[at.FRAME] == 0:
-                for frame in range(
-                    1, 1 if counts[at.JOINS] else quantum
-                ):  # at rest: before the pluck lies the mirror of what follows
+                mirrored = 1 if counts[at.JOINS] else quantum  # at rest before the pluck: the mirror of what follows
+                for frame in range(1, mirrored):
                     past[2 * quantum - frame] = past[2 * quantum + frame]
                 counts[at.WARM] = WARMED - 1
     for point in range(counts[at.POINTS]):
@@ -162,6 +161,8 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
         return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
         counts[at.RELEASE] = counts[at.FADE_FRAMES]
+    if counts[at.FRAME] >= counts[at.ENDS_AT] and counts[at.RELEASE] == 0:
+        counts[at.RELEASE] = counts[at.ENDS_IN]
     release = counts[at.RELEASE]
     wanted = 0.0 if release > 0 else voice[at.WANTED_GAIN]
     if wanted != voice[at.GAIN_TO]:

@@ -10,6 +10,7 @@ where the sum is the stretch, whose tension acts on all alike (the paper's Eq. 3
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 
 import torch
@@ -114,6 +115,11 @@ class Resonator:
             first = int((squared <= 0).nonzero()[0, -1]) + 1
             raise ValueError(f"mode {first} is overdamped: lower its damping, or keep fewer modes")
         return torch.complex(-self.sigma, squared.sqrt())
+
+    def falls_s(self, db: float) -> float:
+        """How long its slowest mode takes to fall by so many dB, as a free one; inf where it never does."""
+        slowest = float(self.sigma.min())
+        return db * math.log(10) / 20 / slowest if slowest > 0 else math.inf
 
     def relative_tension_rise(self, amplitudes: Tensor) -> Tensor:
         """ΔT/T₀ of modal amplitudes (..., modes) in m; result (...)."""

@@ -80,7 +80,8 @@ def voice_blocks(
     Args:
         source: what renders the samples of a program that is not compiled.
         advanced: is told the share that is done now and then; may raise, to end it.
-        until_db: ends, with a little silence, where all of the string has fallen so far below its start.
+        until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
+            voice is over.
 
     Raises:
         Runaway: the output stopped being a string's.
@@ -99,7 +100,7 @@ def voice_blocks(
         advanced(FILLING + (1 - FILLING) * done / frames if program.rendered else done / frames)
         level_db = offline.voice.level_db
         loudest_db = max(loudest_db, level_db)
-        if until_db is not None and level_db < loudest_db - until_db:
+        if until_db is not None and (level_db < loudest_db - until_db or offline.voice.over):
             yield np.zeros((min(round(SILENCE_S * program.rate_hz), frames - done), len(ear.points)), np.float32)
             return
 

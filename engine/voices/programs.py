@@ -30,6 +30,7 @@ from engine.truth.splitting import KICKS, ROTATIONS
 from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
+STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 
@@ -48,6 +49,7 @@ class Program:
         read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
             scale.
         resonator: whose modes its voices begin with, and may leave; None: its kind has none of its own.
+        ends_s: since the pluck, when a voice ends whatever its model still gives.
     """
 
     kind: int
@@ -58,6 +60,7 @@ class Program:
     start: Strike
     read: Callable[[Tensor], tuple[Array, Array]]
     resonator: Resonator | None = None
+    ends_s: float = math.inf
     _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
@@ -76,6 +79,16 @@ class Program:
     @property
     def address(self) -> int:
         return int(self.memory.ctypes.data)
+
+
+def voice_ends_s(info: PresetInfo) -> float:
+    """When a pluck of a preset's model has ended for certain, in s; inf where its string has no losses.
+
+    The string itself is silent by then. A model need not be: one that was trained on a part of a second may settle to
+    a hum of its own, and nothing it has learned makes it end. Latents that share a tension need no such end: their
+    energy is held below that of the slowest mode.
+    """
+    return max(info.horizon_s, info.resonator.falls_s(STRING_SILENT_DB))
 
 
 @singledispatch
@@ -156,7 +169,7 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
         scale = info.scale_m / FULL_SCALE_M
         return (scale * weights.T @ weight).numpy(), (scale * offset @ weights).numpy()
 
-    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
+    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read, ends_s=voice_ends_s(info))
 
 
 @bank_program.register
@@ -187,7 +200,7 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
     def read(weights: Tensor) -> tuple[Array, Array]:
         return (info.scale_m / FULL_SCALE_M * weights.T @ modes).numpy(), np.zeros(weights.shape[1])
 
-    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read)
+    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read, ends_s=voice_ends_s(info))
 
 
 @bank_program.register
@@ -256,16 +269,16 @@ def model_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pr
 
 def rendered_program(info: PresetInfo, rate_hz: int) -> Program:
     """For samples that are rendered ahead at the preset's own rate."""
-    return _samples_program(info.rate_hz, rate_hz, info.grid_points)
+    return _samples_program(info.rate_hz, rate_hz, info.grid_points, voice_ends_s(info))
 
 
 @lru_cache(maxsize=4)
 def plain_program(rate_hz: int) -> Program:
     """For samples of the device's own rate, which are played as they are."""
-    return _samples_program(rate_hz, rate_hz, 0)
+    return _samples_program(rate_hz, rate_hz, 0, math.inf)
 
 
-def _samples_program(source_rate_hz: int, rate_hz: int, grid_points: int) -> Program:
+def _samples_program(source_rate_hz: int, rate_hz: int, grid_points: int, ends_s: float) -> Program:
     """Converts by a Kaiser-windowed sinc in `FILTER_PHASES` phases; equal rates leave every sample as it is."""
     ratio = source_rate_hz / rate_hz
     cutoff = min(1.0, 1 / ratio)
@@ -287,7 +300,7 @@ def _samples_program(source_rate_hz: int, rate_hz: int, grid_points: int) -> Pro
     def read(weights: Tensor) -> tuple[Array, Array]:
         return np.zeros((weights.shape[1], 0)), np.zeros(weights.shape[1])
 
-    return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read)
+    return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read, ends_s=ends_s)
 
 
 def _flat(layer: nn.Linear) -> NDArray[np.float32]:

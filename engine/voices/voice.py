@@ -17,9 +17,12 @@ from engine.voices.programs import Program
 
 ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade would swallow
 FADE_S = 0.020  # another source, another gain
+END_FADE_S = 0.25  # of a model that hums on where its string has long been silent
+SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
 BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
 LEAST_PEAK_M = 1e-4  # of these
+LONGEST_S = 1e9  # of a voice that never ends
 BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
@@ -29,7 +32,7 @@ class Voice:
     Args:
         displacement_m: as it is let go, (grid_points,), projected on the modes in use.
         gain: with which it is heard, 0 for a source that is only kept ready.
-        seconds: of a rendered voice: how much room there is for its samples.
+        seconds: of a rendered voice: how much room there is for its samples, of which none is needed after its end.
         begin: what `program.start` gives for this displacement, where it is known.
     """
 
@@ -54,6 +57,8 @@ class Voice:
         counts[at.BEGAN_FRAME] = -1
         counts[at.FADE_FRAMES] = round(FADE_S * program.rate_hz)
         counts[at.ATTACK] = round(ATTACK_S * program.rate_hz)
+        counts[at.ENDS_AT] = round(min(program.ends_s, LONGEST_S) * program.rate_hz)
+        counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         memory[at.PEAK] = peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
         memory[at.LIMIT] = BELIEVED * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
@@ -72,6 +77,7 @@ class Voice:
 
             strike(memory, program.memory, np.empty(at.SCRATCH_ROWS * at.MOST_MODES))
         else:
+            seconds = min(seconds, program.ends_s + END_FADE_S + SPARE_S)
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
             self._samples = np.zeros((length, len(ear.points)), np.float32)
             counts[at.SAMPLES], counts[at.LENGTH] = self._samples.ctypes.data, length

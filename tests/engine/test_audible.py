@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.audible import FLOOR_DB, audible_errors
+from engine.audible import FLOOR_DB, audible_errors, heard_level_db
 
 RATE_HZ = 24_000
 PARTIALS_HZ = tuple(247.0 * n for n in range(1, 9))
@@ -108,3 +108,11 @@ def test_sounds_of_two_lengths_and_too_short_ones_are_refused() -> None:
         errors(string()[:-1])
     with pytest.raises(ValueError, match="less than a frame"):
         audible_errors(string()[:100], string()[:100], RATE_HZ, PARTIALS_HZ, 0.25)
+
+
+def test_a_level_is_a_sines_amplitude_whatever_it_rests_on() -> None:
+    time_s = np.arange(RATE_HZ // 2) / RATE_HZ
+    for hz in (247.0, 1003.3):
+        assert heard_level_db(1e-3 * np.sin(2 * np.pi * hz * time_s) + 0.1, RATE_HZ) == pytest.approx(-60, abs=0.1)
+    assert heard_level_db(0.5 * np.sin(2 * np.pi * 4 * time_s), RATE_HZ) < -60  # nobody hears it
+    assert heard_level_db(np.zeros(RATE_HZ // 2), RATE_HZ) == -200

@@ -88,6 +88,27 @@ def test_a_flat_partial_above_half_the_rate_has_negative_cents() -> None:
     assert (found.phase_cycles[0, 0, RESOLVED] < 0).all()
 
 
+def test_a_glide_is_told_of_truth_and_prediction() -> None:
+    """Frequencies that fall in a straight line, the prediction's further: between the thirds' middles two thirds."""
+    time_s, hz, sigma = ten_modes(1)
+
+    def gliding(fall: float) -> Tensor:  # relative, in the whole second
+        fallen_s = time_s - fall * time_s.square() / 2
+        return torch.exp(torch.complex(-sigma * time_s, 2 * math.pi * hz * fallen_s))[None]
+
+    found = errors(gliding(0.02).real, gliding(0.01), (0, 1), (0, 0.05))
+    true, predicted = (1200 * math.log2((1 - fall / 6) / (1 - 5 * fall / 6)) for fall in (0.01, 0.02))
+    # segments of 5 ms: the thirds are 66 and 67 of 200
+    assert found.glide_cents[0, 0, RESOLVED] == pytest.approx(true, rel=5e-3)
+    assert found.glide_error_cents[0, 0, RESOLVED] == pytest.approx(predicted - true, rel=0.02)
+    assert np.isnan(found.glide_cents[0, 1]).all()  # ten segments have no thirds of four
+    assert np.isnan(found.glide_error_cents[0, 1]).all()
+    (row, *_) = found.by_mode(0)
+    assert row.glide_cents == found.glide_cents[0, 0, 0]
+    assert row.glide_error_cents == found.glide_error_cents[0, 0, 0]
+    assert found.weighted(0).glide_error_cents == pytest.approx(predicted - true, rel=0.02)
+
+
 def test_what_lies_below_the_floor_is_absent() -> None:
     time_s, hz, sigma = ten_modes(1)
     levels = torch.ones(10, dtype=torch.float64)

@@ -15,7 +15,7 @@ from engine.sources import Runaway
 from training.heard import AMPLITUDES_MM, listen_to, standard_plucks
 from training.heard_file import COLUMNS, LARGEST_BYTES, METHOD, MOST_TOLD, NAME, Heard, add_heard, read_heard
 
-GOOD = Heard("good", "a" * 64, 4.0, 0.25, -0.5, 0.0, 13.0, 22.0, 3.2)
+GOOD = Heard("good", "a" * 64, 4.0, 0.25, -0.5, 0.0, 13.0, 22.0, 3.2, METHOD, -66.0)
 HEAD = ",".join(COLUMNS)
 
 
@@ -77,6 +77,27 @@ def test_a_model_that_runs_away_is_heard_with_its_earliest_time(
     heard = listen_to(load_preset(small_preset))
     assert heard.runs_away_s == 1.0
     assert heard.distance_db > 2 / 3 * 60
+
+
+def test_a_model_that_hums_on_is_heard_to(small_preset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where its voice is made to end; one of a string without losses is not waited for."""
+    preset = load_preset(small_preset)
+    assert listen_to(preset).hum_db is None
+    with torch.no_grad():
+        preset.model.nu_log.sub_(40)  # hardly any decay
+    heard = listen_to(preset)
+    assert heard.hum_db is not None and -40 < heard.hum_db < 0
+    monkeypatch.setattr("training.heard.LONGEST_HUM_S", 1.0)
+    assert listen_to(preset).hum_db is None
+
+
+def test_a_table_of_before_hums_were_measured_is_read(tmp_path: Path) -> None:
+    head, before = ",".join(COLUMNS[:-1]), line().rpartition(",")[0]
+    (tmp_path / NAME).write_text(f"{head}\n{before}\n", encoding="utf-8")
+    old = replace(GOOD, hum_db=None)
+    assert read_heard(tmp_path) == ({GOOD.sha256: old}, [])
+    add_heard(tmp_path, [replace(GOOD, name="new", sha256="d" * 64)])
+    assert [row.count(",") for row in (tmp_path / NAME).read_text().splitlines()] == [len(COLUMNS) - 1] * 3
 
 
 def test_plucks_stay_within_what_was_trained(small_preset: Path) -> None:

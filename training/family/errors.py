@@ -182,34 +182,32 @@ def _played(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tens
     return torch.cat(blocks)
 
 
-def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple[float, float, FamilyErrors]]:
-    """In ranges of the rise of tension, those that hold strings."""
-    found = []
-    for low, high in pairwise(edges):
-        inside = tuple(one for one in errors if low <= one.tension_rise < high)
-        if inside:
-            found.append((low, high, FamilyErrors(inside)))
-    return found
-
-
 Edges = tuple[float, float]
+
+
+def by_rise(errors: Sequence[StringError], rises: Sequence[float]) -> list[tuple[Edges, FamilyErrors]]:
+    """In ranges of the rise of tension, those that hold strings; the last has both ends."""
+    return [(edges, FamilyErrors(part)) for edges, part in _in_ranges(errors, rises, "tension_rise")]
 
 
 def by_cell(
     errors: Sequence[StringError], rises: Sequence[float], inharmonicities: Sequence[float]
 ) -> list[tuple[Edges, Edges, FamilyErrors]]:
-    """In ranges of the rise of tension and of inharmonicity, those that hold strings; the last have both ends."""
+    """The same in ranges of the rise of tension and of inharmonicity."""
+    return [
+        (of_rise, of_inharmonicity, FamilyErrors(part))
+        for of_rise, strings in _in_ranges(errors, rises, "tension_rise")
+        for of_inharmonicity, part in _in_ranges(strings, inharmonicities, "inharmonicity")
+    ]
+
+
+def _in_ranges(
+    errors: Sequence[StringError], edges: Sequence[float], figure: str
+) -> list[tuple[Edges, tuple[StringError, ...]]]:
     found = []
-    for low, high in pairwise(rises):
-        for least, most in pairwise(inharmonicities):
-            inside = tuple(
-                one
-                for one in errors
-                if low <= one.tension_rise <= high
-                and least <= one.inharmonicity <= most
-                and (one.tension_rise < high or high == rises[-1])
-                and (one.inharmonicity < most or most == inharmonicities[-1])
-            )
-            if inside:
-                found.append(((low, high), (least, most), FamilyErrors(inside)))
+    for low, high in pairwise(edges):
+        values = ((one, getattr(one, figure)) for one in errors)
+        inside = tuple(one for one, value in values if low <= value < high or value == high == edges[-1])
+        if inside:
+            found.append(((low, high), inside))
     return found

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
+from engine.plain_text import one_line
 from training.family.baselines import BASELINES, LONGEST_S, Baseline, Strings, in_own_units, units
 from training.family.fit import FLOOR
 from training.family.motions import solve
@@ -42,6 +44,21 @@ class BaselineProgress:
 
 
 @dataclass(frozen=True)
+class TrainedBaseline:
+    """The best model in validation, after so many steps; geometric means of the errors.
+
+    Attributes:
+        train: of the last batches.
+        validation: of the model.
+    """
+
+    model: Baseline
+    steps: int
+    train: float
+    validation: float
+
+
+@dataclass(frozen=True)
 class _Motions:
     """True motions at some times, float64 (rows, times), ascending; amplitudes (rows, times, MOST_MODES)."""
 
@@ -54,15 +71,24 @@ def checkpoint_file(runs: Path, name: str) -> Path:
     return runs / f"family_{name}" / "checkpoint.safetensors"
 
 
-def trained_baseline(path: Path) -> Baseline:
-    """The best model of a run. Raises ValueError where its checkpoint is damaged."""
+def trained_baseline(path: Path) -> TrainedBaseline:
+    """The result of a run. Raises ValueError, naming file and remedy, where its checkpoint is damaged."""
     checkpoint = Checkpoint.load(path)
-    name = checkpoint.facts.get("baseline")
-    if name not in BASELINES:
-        raise ValueError(f"{path}: no checkpoint of a baseline; delete it to start the run again")
-    model = BASELINES[name]()
-    model.load_state_dict(dict(checkpoint.best_model))
-    return model.eval()
+    with _naming(path):
+        model = BASELINES[checkpoint.facts["baseline"]]()
+        model.load_state_dict(dict(checkpoint.best_model))
+        facts = checkpoint.facts
+        return TrainedBaseline(model.eval(), int(facts["steps"]), float(facts["train"]), float(facts["best"]))
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """What a checkpoint lacks is told with its file and the remedy."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        told = one_line(repr(error), 200)
+        raise ValueError(f"{path}: no checkpoint of a baseline ({told}); delete it to start the run again") from error
 
 
 def fit_baseline(
@@ -74,7 +100,7 @@ def fit_baseline(
     strings: int | None = None,
     made: Callable[[float], None] = lambda share: None,
     report: Callable[[BaselineProgress], None] = lambda progress: None,
-) -> Baseline:
+) -> TrainedBaseline:
     """Trains, or goes on with the run whose checkpoint is at `path`; the best model on the validation strings.
 
     Args:
@@ -90,15 +116,18 @@ def fit_baseline(
     torch.manual_seed(c.seed)
     model = BASELINES[name]()
     optimiser = torch.optim.AdamW(model.parameters(), lr=PEAK_LEARNING_RATE, weight_decay=1e-4)
-    best, best_model, steps, spent_s = math.inf, _weights(model), 0, 0.0
+    best, best_model, train_error, steps, spent_s = math.inf, _weights(model), math.inf, 0, 0.0
     if path.exists():
         checkpoint = Checkpoint.load(path)
         if {key: checkpoint.facts.get(key) for key in facts} != facts:
             raise ValueError(f"{path}: of another run; give its options again, or delete it")
-        model.load_state_dict(dict(checkpoint.model))
-        restore_moments(optimiser, checkpoint.optimiser)
-        best, best_model = checkpoint.facts["best"], dict(checkpoint.best_model)
-        steps, spent_s = checkpoint.facts["steps"], checkpoint.facts["spent_s"]
+        with _naming(path):
+            model.load_state_dict(dict(checkpoint.best_model))
+            best_model = _weights(model)
+            model.load_state_dict(dict(checkpoint.model))
+            restore_moments(optimiser, checkpoint.optimiser)
+            best, train_error, spent_s = (float(checkpoint.facts[name]) for name in ("best", "train", "spent_s"))
+            steps = int(checkpoint.facts["steps"])
     if spent_s < 60 * minutes:
         train = _motions("train", counts["train"], FRAMES_KEPT // counts["train"], c, lambda s: made(0.8 * s))
         validation = _motions("validation", counts["validation"], FRAMES_VALIDATED, c, lambda s: made(0.8 + 0.2 * s))
@@ -121,14 +150,15 @@ def fit_baseline(
             if found < best:
                 best, best_model = found, _weights(model)
             spent_s = saved_s = time.process_time() - started
-            told = facts | {"best": best, "steps": steps, "spent_s": spent_s}
+            train_error = math.exp(total / counted)
+            told = facts | {"best": best, "train": train_error, "steps": steps, "spent_s": spent_s}
             Checkpoint(_weights(model), best_model, {}, optimiser_moments(optimiser), told).save(path)
             share = min(1.0, spent_s / (60 * minutes))
             left_s = (time.monotonic() - begun) * (1 - share) / max(share - begun_share, 1e-6)
-            report(BaselineProgress(share, steps, math.exp(total / counted), best, left_s))
+            report(BaselineProgress(share, steps, train_error, best, left_s))
             total, counted = 0.0, 0
     model.load_state_dict(best_model)
-    return model.eval()
+    return TrainedBaseline(model.eval(), steps, train_error, best)
 
 
 def _motions(

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.resonators.base import Resonator
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver, default_substeps
 from engine.whole_file import whole_file
@@ -50,6 +51,10 @@ def true_motion(plucked: PluckedString, rate_hz: int, steps: int, cache: Path | 
 
 def solve(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
     """The same without the cache, as it is computed."""
-    substeps = max(1, -(-default_substeps(plucked.resonator, rate_hz) // COARSER))
-    solver = SplittingSolver(plucked.resonator, rate_hz, substeps=substeps)
+    solver = SplittingSolver(plucked.resonator, rate_hz, substeps=substeps_of(plucked.resonator, rate_hz))
     return solver.advance(ModalState.at_rest(plucked.amplitudes_m[None]), steps)[0][0]
+
+
+def substeps_of(resonator: Resonator, rate_hz: int) -> int:
+    """Of the true motion in a frame."""
+    return max(1, -(-default_substeps(resonator, rate_hz) // COARSER))

@@ -1,4 +1,4 @@
-"""What the listening test was last set to."""
+"""The last settings of the listening test."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from app.analysis.abx.trials import MOST_TRIALS
 
 
 class AbxChoices(BaseModel):
-    """The listening test's last state. An empty folder: `app.analysis.abx.record.default_folder`."""
+    """The last settings. `restart`: each switch starts the sound anew; `folder`: "" for `record.default_folder`."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -1,7 +1,7 @@
-"""The record of a test: one JSON file that says what was heard, what was answered and what follows.
+"""The record of a test: a JSON file with what was played, what was answered, and the result.
 
-A record is checked when it is read: its numbers must follow from its trials, and its order from its seed. So a file
-that was damaged or edited is not taken for a result.
+A record is checked when it is read: its numbers must follow from its trials, and its order from its seed, so that a
+damaged or edited file is refused.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from app.analysis.abx.trials import LARGEST_SEED, MOST_TRIALS, Run, Trial, draw_order, p_value
+from app.patches.patch import PhysicalString
 from app.shared.version import program_version
 from app.shared.vocabulary import Pickup
 from app.shared.whole_file import WriteError, explain, whole_file
@@ -22,7 +23,7 @@ from engine.plain_text import one_line
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Shape
 
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
-VERSION: Literal[1] = 1
+VERSION: Literal[2] = 2  # 1 did not tell the string
 LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -31,14 +32,14 @@ _FROZEN = ConfigDict(frozen=True, extra="forbid")
 
 
 class RecordError(ValueError):
-    """A record that cannot be used. The message names the file, what is wrong with it and the remedy, in one line."""
+    """A record cannot be used. The message, one line, names the file, what is wrong with it and the remedy."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
 
 
 class HeardSource(BaseModel):
-    """A or B: its name for people, the preset that made it (of the truth: whose string it is), and its gain."""
+    """A or B: its name for people, the preset that made it (for the truth, the one whose string it is), its gain."""
 
     model_config = _FROZEN
 
@@ -49,7 +50,11 @@ class HeardSource(BaseModel):
 
 
 class HeardPluck(BaseModel):
-    """The pluck, and where it was heard; positions in lengths of the string."""
+    """The pluck, and where and how it was heard; positions and width as fractions of the string's length.
+
+    Attributes:
+        string: which one was chosen, of a preset of many; None: the preset's own.
+    """
 
     model_config = _FROZEN
 
@@ -62,6 +67,7 @@ class HeardPluck(BaseModel):
     pickup: Pickup = "displacement"
     solo: Annotated[int, Field(ge=0)] = 0
     seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    string: PhysicalString | None = None
 
 
 class HeardThrough(BaseModel):
@@ -80,15 +86,16 @@ class AbxRecord(BaseModel):
     """See the module.
 
     Attributes:
-        correct: right answers among the trials that were answered.
-        p_value: only of a complete test: one that was stopped early proves nothing.
-        remark: why it is not complete, if anything is known.
+        trials: those that were answered, in order.
+        correct: how many of them were answered right.
+        p_value: None unless the test is complete: stopping early would bias it.
+        remark: why it is not complete, if that is known.
     """
 
     model_config = _FROZEN
 
     kind: Literal["learned-strings-abx"]
-    version: Literal[1]
+    version: Literal[1, 2]
     program: str
     date: AwareDatetime
     a: HeardSource
@@ -105,6 +112,8 @@ class AbxRecord(BaseModel):
 
     @model_validator(mode="after")
     def _numbers_follow_from_trials(self) -> AbxRecord:
+        if self.version == 1 and self.pluck.string is not None:
+            raise ValueError("pluck.string belongs to version 2")
         answered = len(self.trials)
         if self.complete != (answered == self.planned_trials) or answered > self.planned_trials:
             raise ValueError(f"complete does not fit {answered} answers to {self.planned_trials} trials")
@@ -122,12 +131,12 @@ class AbxRecord(BaseModel):
 
 
 def default_folder() -> Path:
-    """Among the user's documents."""
+    """Where records are saved by default: a folder within the user's documents."""
     return user_documents_path() / "Learned Strings" / "Listening tests"
 
 
 def save_record(folder: Path, record: AbxRecord) -> Path:
-    """Writes a new file, whole or not at all, and makes the folder; no earlier record is overwritten.
+    """Writes a new file, whole or not at all, and returns its path; makes the folder, overwrites no earlier record.
 
     Raises:
         WriteError: the folder or the file cannot be written.
@@ -167,7 +176,7 @@ def load_record(path: Path) -> AbxRecord:
 
 
 def list_records(folder: Path) -> tuple[list[tuple[Path, AbxRecord]], list[str]]:
-    """The records of a folder, the latest first, and a line for each file that is not usable."""
+    """The records of a folder, the latest first, and a line for each file that cannot be used."""
     found, problems = [], []
     for path in folder.glob("abx_*.json"):
         try:
@@ -180,7 +189,7 @@ def list_records(folder: Path) -> tuple[list[tuple[Path, AbxRecord]], list[str]]
 def make_record(
     run: Run, a: HeardSource, b: HeardSource, pluck: HeardPluck, through: HeardThrough, remark: str = ""
 ) -> AbxRecord:
-    """What has become of a run, dated now."""
+    """The record of a run as it stands, dated now."""
     correct = sum(trial.correct for trial in run.trials)
     return AbxRecord(
         kind=KIND,

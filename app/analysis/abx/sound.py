@@ -1,6 +1,6 @@
-"""What the test plays: A and B of equal level, sample by sample side by side, never loud enough for the limiter.
+"""The sounds of the test: A and B at equal level, aligned sample by sample, below the limiter's threshold.
 
-A limiter that acts on one of the two, or a level that differs, would give X away.
+A difference in level, or a limiter that acts on one of the two, would give X away.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from app.analysis.abx.trials import Identity
 from engine.kernels.limiter import CEILING
 from engine.spectra import spectral_distances
 
-LARGEST_PEAK = CEILING / 2  # where a sound begins anew, the end of the old one is still under it
-END_S = 0.008  # the fade at the end of each turn
-TRIVIAL_CONVERGENCE = 0.5  # half of the spectrum differs: nobody needs a test to hear that
+LARGEST_PEAK = CEILING / 2  # at a restart two sounds overlap: the new beginning and the end of the old one
+END_S = 0.008  # the fade at the end of each repetition
+TRIVIAL_CONVERGENCE = 0.5  # spectral distance above which the difference is obvious without a test
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """What can be A or B.
+    """A source that can be A or B.
 
     Attributes:
         source: its name among the sounds of a pluck.
         label: its name for people.
-        preset, preset_sha256: what made it; of the truth, the preset whose string it is.
+        preset, preset_sha256: the preset that made it; for the truth, the one whose string it is.
     """
 
     source: str
@@ -45,9 +45,9 @@ class Stimuli:
     Attributes:
         rate_hz: of the samples.
         samples: of "A" and "B", (frames, channels).
-        gains_db: of A and B, ≤ 0: what they were turned down by.
-        same: not one sample differs.
-        trivial: the spectra differ so much that the test would say nothing.
+        gains_db: of A and B, ≤ 0.
+        same: whether all samples are equal.
+        trivial: whether the spectra differ so much that a test is pointless.
     """
 
     rate_hz: int
@@ -60,11 +60,12 @@ class Stimuli:
 def make_stimuli(
     sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, sources: Sequence[str], volume_db: float = 0.0
 ) -> Stimuli:
-    """Two sources of a pluck, levelled by their RMS over all of it, and faded at their ends: they are looped.
+    """Two sources of a pluck with equal RMS over all of it, and faded at their ends, because they are looped.
 
     Args:
-        sounds: samples by source, (frames, channels), of one length.
-        volume_db: with which they are played; it counts for the limiter.
+        sounds: samples by source, (frames, channels), of one length; ±1 is full scale.
+        sources: the names of A and B.
+        volume_db: with which they are played, as it counts for the limiter.
 
     Raises:
         ValueError: one of them is silent.
@@ -96,5 +97,5 @@ def make_stimuli(
 
 
 def _convergence(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """How far apart the spectra are, relative to their strength: of phases alone nobody hears much."""
+    """The distance of the magnitude spectra (see `engine.spectra`); differences in phase alone are hardly heard."""
     return float(spectral_distances(torch.from_numpy(a)[None], torch.from_numpy(b)[None])[0])

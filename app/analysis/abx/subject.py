@@ -1,4 +1,4 @@
-"""What is put to the test: the sounds that can be A or B, and the pluck that they share."""
+"""The subject of a test: the sources that can be A or B, and the pluck that they share."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from engine.presets import preset_digest
 
 @dataclass(frozen=True)
 class Subject:
-    """See the module. `volume_db` is the player's: it stays as it is during the test.
+    """See the module.
 
     Attributes:
-        candidates: two or more; the first two are A and B until another choice is made.
+        candidates: two or more; the first two are A and B until others are chosen.
+        volume_db: of the playback, which stays the same during the test.
     """
 
     candidates: tuple[Candidate, ...]
@@ -25,7 +26,11 @@ class Subject:
 
 
 def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
-    """Model and truth of the preset on stage. Raises PresetError where its file cannot be read."""
+    """Model and truth of a preset, plucked and heard as chosen.
+
+    Raises:
+        PresetError: its file cannot be read.
+    """
     digest = preset_digest(entry.path)
     pluck = HeardPluck(
         position=choices.position,
@@ -37,6 +42,7 @@ def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
         pickup=choices.pickup,
         solo=choices.solo,
         seconds=choices.seconds,
+        string=choices.string,
     )
     candidates = tuple(Candidate(source, source.capitalize(), entry.name, digest) for source in ("model", "truth"))
     return Subject(candidates, pluck, choices.volume_db)

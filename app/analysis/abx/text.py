@@ -1,9 +1,10 @@
-"""A record in words and columns, for the screen, for a file and for the command line."""
+"""A record as text: for the screen, a file and the command line."""
 
 from __future__ import annotations
 
-from app.analysis.abx.record import AbxRecord, HeardSource
+from app.analysis.abx.record import AbxRecord, HeardPluck, HeardSource
 from app.analysis.abx.trials import LEVEL
+from app.patches.patch import PhysicalString
 from app.presets.words import shape_word
 
 MEANING = (
@@ -19,14 +20,14 @@ def p_text(p_value: float) -> str:
 
 
 def score_text(record: AbxRecord) -> str:
-    """The result in a line."""
+    """The result in one line."""
     if record.p_value is None:
         return f"incomplete: {record.correct} right of {len(record.trials)} answered, {record.planned_trials} planned"
     return f"{record.correct} of {record.planned_trials} right, {p_text(record.p_value)}"
 
 
 def verdict(record: AbxRecord) -> str:
-    """What follows from it."""
+    """What follows from the result, in a sentence."""
     if record.p_value is None:
         return "The test was not completed, so no p-value can be given."
     if record.p_value < LEVEL:
@@ -35,7 +36,7 @@ def verdict(record: AbxRecord) -> str:
 
 
 def as_text(record: AbxRecord) -> str:
-    """The whole record; every line ends with a line break."""
+    """The whole record, with a line break at the end of every line."""
     pluck, through = record.pluck, record.through
     width = "" if pluck.shape == "triangular" else f", width {pluck.width:g}"
     head = {
@@ -45,8 +46,9 @@ def as_text(record: AbxRecord) -> str:
         "A": _source(record.a),
         "B": _source(record.b),
         **_presets(record),
+        "String": "" if pluck.string is None else _string(pluck.string),
         "Pluck": f"position {pluck.position:g}, {pluck.amplitude_mm:g} mm, {shape_word(pluck.shape)}{width}",
-        "Heard": f"at {pluck.listen:g} of the length, {pluck.seconds:g} s",
+        "Heard": _heard(pluck),
         "Device": f"{through.device} ({through.host_api}), {through.rate_hz} Hz, volume {through.volume_db:+g} dB",
         "Switch": "from the beginning" if through.restart_at_switch else "at the playhead",
         "Seed": str(record.seed),
@@ -64,12 +66,25 @@ def as_text(record: AbxRecord) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _heard(pluck: HeardPluck) -> str:
+    right = "" if pluck.listen_right is None else f" (left) and {pluck.listen_right:g} (right)"
+    parts = [f"at {pluck.listen:g}{right} of the length"]
+    parts += ["as velocity"] if pluck.pickup == "velocity" else []
+    parts += [f"mode {pluck.solo} alone"] if pluck.solo else []
+    return ", ".join([*parts, f"{pluck.seconds:g} s"])
+
+
 def _source(source: HeardSource) -> str:
     return f"{source.label}, turned down by {abs(source.gain_db):.2f} dB"
 
 
+def _string(string: PhysicalString) -> str:
+    values = ", ".join(f"{name} {value:g}" for name, value in string.model_dump().items())
+    return f"{string.first_hz:.1f} Hz: {values}"
+
+
 def _presets(record: AbxRecord) -> dict[str, str]:
-    """One, or that of A and that of B; a name may have come to mean another file, its digest may not."""
+    """The presets of A and B, once where they are the same, with their digests: a name may come to mean another."""
     a, b = ((source.preset, source.preset_sha256) for source in (record.a, record.b))
     if a == b:
         return {"Preset": a[0], "SHA-256": a[1]}

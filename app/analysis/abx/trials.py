@@ -1,7 +1,7 @@
-"""The rules of the test: a drawn order, answers, and what guessing alone would have reached.
+"""The rules of the test: the random order, the answers, and the p-value under guessing.
 
-Each trial hides A or B behind X by a fair coin of its own, so that a guesser's number of right answers is binomial.
-The number of trials is fixed beforehand: stopping at a lucky moment would make any p-value worthless.
+In each trial X is A or B by an independent fair coin, so that the number of right answers by guessing is binomial.
+The number of trials is fixed beforehand, because a test that stops at a lucky moment has no valid p-value.
 """
 
 from __future__ import annotations
@@ -24,20 +24,23 @@ LEVEL = 0.05  # below it, luck is an unlikely explanation
 
 
 def new_seed() -> int:
-    """One that nobody knows beforehand."""
+    """A seed that cannot be foreseen, 0 … `LARGEST_SEED`."""
     return secrets.randbelow(LARGEST_SEED + 1)
 
 
 def draw_order(seed: int, trials: int) -> tuple[Identity, ...]:
-    """Who hides behind X in each trial. The same seed gives the same order in every version of Python."""
-    coin = random.Random(seed)  # of its methods, random() alone is promised never to change
+    """Whether X is A or B in each trial. The same seed gives the same order in every version of Python."""
+    coin = random.Random(seed)  # Python guarantees the sequence of random() alone
     return tuple("A" if coin.random() < 0.5 else "B" for _ in range(trials))
 
 
 def p_value(correct: int, trials: int) -> float:
     """The probability that guessing alone gives `correct` right answers or more: one-sided, binomial, exact.
 
-    In integers and not by `scipy.stats`, whose import would let the window stand still for seconds.
+    Computed in integers, because importing `scipy.stats` would freeze the window for seconds.
+
+    Raises:
+        ValueError: `correct` does not lie in 0 … `trials`.
     """
     if not 0 <= correct <= trials:
         raise ValueError(f"{correct} of {trials} answers cannot be right")
@@ -53,9 +56,9 @@ class Trial(BaseModel):
     """One trial that has been answered.
 
     Attributes:
-        x: who was hidden.
+        x: which of the two X was.
         seconds: from the beginning of the trial to the answer.
-        auditions: how often A, B or X was chosen or begun again.
+        auditions: how often A, B or X was chosen or restarted.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -77,11 +80,11 @@ class Run:
     Attributes:
         planned: number of trials, fixed before the start.
         trials: those that are answered.
-        auditions: of the present trial.
-        x_heard: in the present trial; without it there is nothing to answer.
+        auditions: of the present trial, so far.
+        x_heard: whether X has been heard in the present trial; only then can it be answered.
 
     Raises:
-        ValueError: a value is out of its range, or the step is not possible now.
+        ValueError: a value is out of its range.
     """
 
     seed: int
@@ -102,19 +105,23 @@ class Run:
 
     @property
     def number(self) -> int:
-        """Of the present trial, from 1."""
+        """The number of the present trial, from 1."""
         return len(self.trials) + 1
 
     def heard_as(self, sound: Sound) -> Identity:
-        """What is to be played for a key."""
+        """Whether A or B is to be played for a choice of A, B or X."""
         return draw_order(self.seed, self.planned)[len(self.trials)] if sound == "X" else sound
 
     def auditioned(self, sound: Sound) -> Run:
-        """A, B or X has been chosen, or begun again."""
+        """The run after A, B or X has been chosen or restarted."""
         return replace(self, auditions=self.auditions + 1, x_heard=self.x_heard or sound == "X")
 
     def answered(self, answer: Identity, seconds: float) -> Run:
-        """The next trial."""
+        """The run after an answer, at its next trial.
+
+        Raises:
+            ValueError: the test is complete, or X has not been heard in this trial.
+        """
         if self.complete:
             raise ValueError("The test is complete; there is nothing to answer.")
         if not self.x_heard:

@@ -1,1 +1,1 @@
-"""Benchmarks: what the program costs on this machine. Timings are medians of repeats; nothing is asserted."""
+"""Benchmarks: what the program costs on this machine. Nothing is asserted."""

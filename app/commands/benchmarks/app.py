@@ -1,6 +1,6 @@
-"""The window as its user meets it: how soon it is there and can be plucked, how smoothly the picture moves.
+"""The window: how soon after the start it is shown and can be played, and how smoothly the picture moves.
 
-What is heard of it, and how soon, is measured by `bench play`, from outside.
+Sound and its latency are measured by `bench play`, from outside.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from app.window.settings import Settings
 
 SIZE = (1920, 1080)
 PICTURE_S = 4.0
-SETTLING_S = 2.5  # what rings ends, and pictures go on for a while
+SETTLING_S = 2.5  # before each measurement, until what rings has ended and the pictures have stopped
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One line: a median (or a mean over the time of measurement), the worst where there are several, the target."""
+    """One line: the median (or a mean over the time of measurement), the worst of several, and the target."""
 
     name: str
     unit: str
@@ -37,7 +37,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class AppBenchmark:
-    """`platform` is Qt's; `size` of the window in pixels; `views`: those beside the string."""
+    """`platform`: Qt's; `size`: of the window in pixels; `views`: those beside the string."""
 
     machine: Machine
     platform: str
@@ -48,7 +48,7 @@ class AppBenchmark:
 
 
 class PaintCounter(QObject):
-    """Counts how often a widget is really painted."""
+    """Counts how often a widget is painted."""
 
     def __init__(self, widget: QWidget) -> None:
         super().__init__(widget)
@@ -61,7 +61,7 @@ class PaintCounter(QObject):
 
 
 def measure(starts: int, seconds: float, report: Callable[[float, str], None]) -> AppBenchmark:
-    """`starts`: how many are timed; `seconds`: how long the picture is watched, playing and stopped."""
+    """`starts`: how many are timed; `seconds`: how long the picture is observed, playing and stopped."""
     figures = _starts(starts, lambda number: report(0.8 * number / (starts + 1), "starts"))
     with opened(Settings(), SIZE, silent) as stage:
         report(0.8, "picture")
@@ -85,7 +85,7 @@ def _picture(stage: Stage, seconds: float) -> list[Figure]:
     painted = PaintCounter(next(panel.view for panel in controller.panels if isinstance(panel, StringPanel)))
 
     def watch() -> tuple[float, float]:
-        """Paintings a second, and the share of a core that this thread takes."""
+        """Paint events per second, and the share of a core that this thread takes."""
         stage.run_for(SETTLING_S)
         count, cpu_s, now_s = painted.count, time.thread_time(), time.perf_counter()
         stage.run_for(seconds)

@@ -1,7 +1,8 @@
-"""Effects: what body and room cost of a core, how evenly over quanta, and what it takes to set them.
+"""Body and room: their share of a core, the slowest quantum, and the time to set them.
 
-Costs are of this thread's own time, without what a mixer without effects costs. The worst quantum is the dearest
-place in two of the convolver's windows, by the median over all of them: other busy processes show little in it.
+Costs are processor time of this thread, less that of a mixer without effects. The worst quantum is the slowest place
+within two of the convolver's windows, by the median over all pairs of windows, on which other processes have little
+effect.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from engine.kernels import layout as at
 from engine.voices import Mixer, Voice, plain_program
 
 RATE_HZ = 48_000
-SECONDS = 10.0  # after those in which it fills
-FILLING_S = 6.5
+SECONDS = 10.0  # measured, after `FILLING_S`
+FILLING_S = 6.5  # until the longest response is full of sound
 REPEATS = 7
 CHOICES = {
     "body": Effects(Body(0.8)),
@@ -37,13 +38,13 @@ EXCHANGED = "body, room of 1.5 s"
 
 @dataclass(frozen=True)
 class EffectsCost:
-    """Of one choice.
+    """The cost of one choice of body and room.
 
     Attributes:
-        share: of a core, while it sounds.
-        at_rest: of a core, after the end of all sound.
-        worst_us, quantum_us: the dearest quantum, and how long a quantum sounds.
-        set_ms, first_ms: of the caller that sets them, with a response that is known and one that is not.
+        share: of a core, while there is sound.
+        at_rest: of a core, after all sound has ended.
+        worst_us, quantum_us: the time of the slowest quantum, and the duration of a quantum's sound.
+        set_ms, first_ms: time of the caller that sets them, with a response that is cached and one that is not.
     """
 
     name: str
@@ -64,7 +65,7 @@ class EffectsBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> EffectsBenchmark:
-    """Of body and rooms; and of one that is exchanged all the time."""
+    """Measures body and rooms, and one room that is exchanged without a pause."""
     with one_thread():
         costs = []
         names = [*CHOICES, f"{EXCHANGED}, exchanged"]
@@ -95,7 +96,7 @@ def _cost(name: str, effects: Effects, exchanged: bool) -> EffectsCost:
 
 
 def _quanta_us(effects: Effects | None, exchanged: bool, sounding: bool = True) -> NDArray[np.float64]:
-    """Of each quantum of a noise; exchanged: for another one with each window."""
+    """Times of each quantum of noise. `exchanged`: another response is set with each window."""
     mixer = Mixer(RATE_HZ)
     mixer.set_effects(effects)
     frames = round((SECONDS + FILLING_S) * RATE_HZ) if sounding else 64
@@ -114,7 +115,7 @@ def _quanta_us(effects: Effects | None, exchanged: bool, sounding: bool = True) 
 
 
 def _setting_ms(effects: Effects) -> tuple[float, float]:
-    """With responses that have to be made, and with those that are there and only mixed otherwise."""
+    """Times to set responses that must be computed, and those that are cached and only mixed differently."""
     mixer = Mixer(RATE_HZ)
     first_ms: list[float] = []
     again_ms: list[float] = []

@@ -1,4 +1,4 @@
-"""The machine, and how its time is taken."""
+"""The machine that a benchmark runs on, and timing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from training.provenance import processor
 
 @dataclass(frozen=True)
 class Machine:
-    """What a timing depends on."""
+    """What timings depend on, beside the code. `threads`: those that torch uses."""
 
     cpu_count: int
     processor: str
@@ -39,7 +39,7 @@ class Machine:
 
 
 def times_s(work: Callable[[], object], repeats: int, *, warm_up: bool = True) -> list[float]:
-    """Wall-clock times of `work` in s, after one call that does not count (compilation, caches)."""
+    """Wall-clock times of `work` in s; `warm_up`: after one call that does not count (compilation, caches)."""
     if warm_up:
         work()
     found = []
@@ -56,7 +56,7 @@ def median_s(work: Callable[[], object], repeats: int, *, warm_up: bool = True) 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """As in the app, where the window and the sound need the other cores."""
+    """Limits torch to one thread, as in the app, where the window and the sound need the other cores."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

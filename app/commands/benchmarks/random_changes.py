@@ -1,4 +1,4 @@
-"""What a restless user might change next: any choice, at random but from a seed."""
+"""Random changes of the session's choices, repeatable by a seed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HIGHEST_SOLO = 10
 
 @dataclass(frozen=True)
 class Repertoire:
-    """What there is to choose from: names of presets, keys of views, patches."""
+    """What is chosen from: names of presets, names of panels, patches."""
 
     presets: tuple[str, ...]
     left_views: tuple[str, ...]
@@ -29,7 +29,7 @@ class Repertoire:
 
 
 def random_change(random: Random, choices: Choices, repertoire: Repertoire) -> Mapping[str, Any]:
-    """One field of `Choices`, or those of a slot, with another value."""
+    """New values of one field of `Choices`, or of those that choosing a patch sets."""
     return random.choice(_CHANGES)(random, choices, repertoire)
 
 

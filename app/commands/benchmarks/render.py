@@ -1,8 +1,8 @@
 """Rendering a model: its real-time factor, and how soon after a pluck the first block is ready.
 
-Beside each factor stands a floor: the time that the model's matrix products alone would take at this machine's
-measured rate of float32 products, or that its frames would take to be written, whichever is longer. A factor below
-the floor means that the model renders by a cheaper route than its definition.
+Each factor has a floor beside it: the time that the model's matrix products alone would take at this machine's
+measured rate of float32 products, or that writing its frames would take, whichever is longer. A factor below the
+floor means that the model renders by a cheaper method than its definition.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import StringParameters
 
-FIRST_BLOCK = 256
+FIRST_BLOCK = 256  # frames
 AUDIO_S = 2.0
-PLUCKS = 25
+PLUCKS = 25  # whose first block is timed
 REPEATS = 5
 SCALE_M = 1e-3  # of the order of a data set's
 
 
 @dataclass(frozen=True)
 class Case:
-    """A model at a rate, with the modes of the string that it renders; the paper's sizes but for `sizes`."""
+    """A model at a rate, with so many modes of the string; `sizes` are those that are not the paper's."""
 
     model: str
     rate_hz: int
@@ -41,7 +41,7 @@ class Case:
 
 
 def _as_trained(modes: int) -> tuple[tuple[str, Any], ...]:
-    """The integrated phase of our recipe."""
+    """The sizes of an integrated phase in our recipe."""
     return ("state_size", modes), ("modulation", True), ("physical_units", True)
 
 
@@ -59,7 +59,7 @@ class RenderTiming:
     """One model on one thread.
 
     Attributes:
-        grid, point: real-time factors, seconds of work for a second of sound (below 1 is faster than it sounds), for
+        grid, point: real-time factors, seconds of work for a second of sound (below 1: faster than real time), for
             the whole grid and for one listening point.
         grid_floor, point_floor: see the module.
         first_block_s, worst_first_block_s: from the pluck to 256 samples on the whole grid, median and worst.
@@ -87,7 +87,7 @@ class RenderBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> RenderBenchmark:
-    """Every model, untrained: its values do not matter to its cost."""
+    """Measures every model, untrained, as its cost does not depend on its weights."""
     found = []
     with one_thread():
         machine = Machine.here()
@@ -130,7 +130,7 @@ def _measure(case: Case, products_per_s: float, written_per_s: float) -> RenderT
 def _untrained(case: Case) -> StringModel[Any]:
     model = build_model(case.model, dict(case.sizes))
     physics = Physics(StringParameters().resonator(case.modes), case.rate_hz)
-    # a string's modes fall silent one by one, which the integrated phase makes use of; a random ring would at once
+    # modes decay one by one, and the integrated phase skips those that have; random eigenvalues would decay at once
     how = "averaging" if "averaging" in model.initialisations else model.own_initialisation()
     model.initialise(how, physics, torch.Generator().manual_seed(0))
     return model.eval()

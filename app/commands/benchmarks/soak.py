@@ -5,12 +5,14 @@ a private sound card; all that it was given is recorded, by a process of its own
 random follows from the seed.
 
 The restless user rests after each minute on the same short pluck, and the process is weighed: in between, motions of
-up to hundreds of MiB come and go with what is chosen. Who plays does not rest but at the beginning and at the end.
+up to hundreds of MiB come and go with what is chosen. Who plays does not rest: the process is weighed at the end of
+each minute.
 """
 
 from __future__ import annotations
 
 import gc
+import statistics
 import sys
 import tempfile
 import threading
@@ -61,6 +63,7 @@ RATE_OF_PLAYING_HZ = 12.0
 LOOK_EVERY_S = 0.02
 WEIGH_EVERY_S = 1.0
 PART_S = 60.0  # between two rests; in the first, every kind of thing is loaded once, and caches are filled
+WEIGHED_S = 10.0  # of a minute that is played: garbage comes and goes
 REST_S = 3.0  # in which the views finish and free memory is given back
 REST_PLUCK_S = 1.0
 MOST_CHANGES = 3  # before a pluck
@@ -96,9 +99,9 @@ class Soak:
 
     Attributes:
         longest_stall_s: for which the window did nothing.
-        at_rest_mib: resident memory at each rest.
-        settled_mib, end_mib: at the first and at the last.
-        drift_mib: how far it was above the first at any other.
+        memory_mib: resident memory at each rest, or at the end of each minute that is played.
+        settled_mib, end_mib: the first and the last of them.
+        drift_mib: how far any other was from the first, above or below.
         peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
         faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
@@ -115,7 +118,7 @@ class Soak:
     changes: int
     holes: Holes
     longest_stall_s: float
-    at_rest_mib: tuple[float, ...]
+    memory_mib: tuple[float, ...]
     settled_mib: float
     end_mib: float
     drift_mib: float
@@ -140,18 +143,18 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
         with collected_faults() as faults, opened(settings, SIZE) as stage:
             if stage.controller.sound.status().device is None:
                 raise Missing(f"the app plays no sound ({stage.window.notices.text}); install libasound2-plugins")
-            at_rest_mib = [_weighed_at_rest(stage)] if playing else []
+            memory_mib: list[float] = []
             watch = _Watch(stage, seconds, report)
             gaps_before = len(stage.controller.sound.status().gaps)
             with recording_aside(server, file):
                 if playing:
                     changes, plucks = 0, _play(stage, random, seconds)
                 else:
-                    changes, plucks = _be_restless(stage, random, seconds, at_rest_mib)
+                    changes, plucks = _be_restless(stage, random, seconds, memory_mib)
                 gaps = stage.controller.sound.status().gaps[gaps_before:]
             watch.stop()
             if playing:
-                at_rest_mib.append(_weighed_at_rest(stage))
+                memory_mib = watch.at_each_minute()
             notices, platform = stage.window.notices.notices, stage.platform
             faults.update({notice.details: notice.times for notice in notices if "Traceback" in notice.details})
         holes = _holes(file, playing, Counter(gap.cause for gap in gaps))
@@ -166,10 +169,10 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
         changes,
         holes,
         watch.longest_stall_s,
-        tuple(at_rest_mib),
-        at_rest_mib[0],
-        at_rest_mib[-1],
-        max(at_rest_mib) - at_rest_mib[0],
+        tuple(memory_mib),
+        memory_mib[0],
+        memory_mib[-1],
+        max(abs(mib - memory_mib[0]) for mib in memory_mib),
         watch.peak_mib,
         tuple(sorted(left)),
         tuple(faults.items()),
@@ -223,7 +226,7 @@ class _Keys(QObject):
         QCoreApplication.sendEvent(self._window.focusWidget() or self._window, event)
 
 
-def _be_restless(stage: Stage, random: Random, seconds: float, at_rest_mib: list[float]) -> tuple[int, int]:
+def _be_restless(stage: Stage, random: Random, seconds: float, memory_mib: list[float]) -> tuple[int, int]:
     """Returns how many changes and plucks there were, and adds what the process weighs at each rest."""
     user = _User(stage, random)
     parts = max(2, round(seconds / PART_S))
@@ -231,7 +234,7 @@ def _be_restless(stage: Stage, random: Random, seconds: float, at_rest_mib: list
         user.go_on()
         stage.run_for(seconds / parts)
         user.stop()
-        at_rest_mib.append(_weighed_at_rest(stage))
+        memory_mib.append(_weighed_at_rest(stage))
     return user.changes, user.plucks
 
 
@@ -279,7 +282,7 @@ class _Watch(QObject):
     def __init__(self, stage: Stage, seconds: float, report: Callable[[float, str], None]) -> None:
         super().__init__(stage.window)
         self.longest_stall_s = 0.0
-        self.peak_mib = 0.0
+        self._weights_mib: list[tuple[float, float]] = []  # and when, in s since the beginning
         self._seconds, self._report = seconds, report
         self._begun_s = self._looked_s = self._weighed_s = time.monotonic()
         self._timer = QTimer(self, interval=round(1000 * LOOK_EVERY_S))
@@ -289,13 +292,27 @@ class _Watch(QObject):
     def stop(self) -> None:
         self._timer.stop()
 
+    @property
+    def peak_mib(self) -> float:
+        return max((mib for _, mib in self._weights_mib), default=_resident_mib())
+
+    def at_each_minute(self) -> list[float]:
+        """The medians of the last seconds of each minute, or, of less than two, of the halves of the time."""
+        part_s = min(PART_S, self._seconds / 2)
+        ends_s = [part_s * (number + 1) for number in range(round(self._seconds / part_s))]
+        parts = [
+            [mib for time_s, mib in self._weights_mib if end_s - min(WEIGHED_S, part_s) < time_s <= end_s]
+            for end_s in ends_s
+        ]
+        return [statistics.median(part) for part in parts if part] or [_resident_mib()]
+
     def _look(self) -> None:
         now_s = time.monotonic()
         self.longest_stall_s = max(self.longest_stall_s, now_s - self._looked_s - LOOK_EVERY_S)
         self._looked_s = now_s
         if now_s - self._weighed_s >= min(WEIGH_EVERY_S, self._seconds / 10):
             self._weighed_s, weight_mib = now_s, _resident_mib()
-            self.peak_mib = max(self.peak_mib, weight_mib)
+            self._weights_mib.append((now_s - self._begun_s, weight_mib))
             share = min(1.0, (now_s - self._begun_s) / self._seconds)
             self._report(share, f"{weight_mib:.0f} MiB")
 

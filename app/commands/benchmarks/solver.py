@@ -22,7 +22,7 @@ PROTOCOL = tuple(
     for rate_hz, modes in ((16_000, 25), (4_000, 10))
     for initial in ("gaussian", "noise")
 )
-LOOSE_ERROR = 1e-6  # inaudible (-120 dB), for those who prefer speed
+LOOSE_ERROR = 1e-6  # an inaudible error (-120 dB), of which the fewest sub-steps are found
 AUDIO_RATE_HZ = 48_000
 HIGHEST_AUDIBLE_HZ = 20_000
 AUDIO_S = 0.25
@@ -33,6 +33,7 @@ class SolverTiming:
     """One of the paper's data sets: cost, and error on its trajectory with the largest tension rise.
 
     Attributes:
+        relative_l2: the error with the default sub-steps.
         fast_s, dop853_s: seconds per trajectory; `fast_s` in a batch on all threads.
         loose_substeps: the fewest sub-steps with an error of at most 1e-6, with their error and cost.
     """
@@ -58,11 +59,11 @@ class SolverTiming:
 
 @dataclass(frozen=True)
 class AudioTiming:
-    """One string with all audible modes on one thread; a factor below 1 is faster than it sounds.
+    """One string with all audible modes on one thread; a factor below 1 is faster than real time.
 
     Attributes:
-        silence: below what share of all a mode is left out, as what is played does; 0 leaves out none.
-        relative_l2: from the string without that.
+        silence: the share of the whole below which a mode is left out, as when playing; 0 leaves out none.
+        relative_l2: the error that this makes.
     """
 
     rate_hz: int
@@ -81,7 +82,7 @@ class SolverBenchmark:
 
 
 def measure(batch: int, steps: int, report: Callable[[float, str], None]) -> SolverBenchmark:
-    """`batch`: trajectories at once for the speed; `steps`: samples of each."""
+    """Measures the solver. `batch`: trajectories at once for the speed; `steps`: samples of each."""
     protocol = []
     for number, data in enumerate(PROTOCOL):
         report(number / (len(PROTOCOL) + 1), f"{data.initial} {data.rate_hz} Hz")
@@ -105,7 +106,7 @@ def _measure_protocol(data: DatasetConfiguration, batch: int) -> SolverTiming:
 
     def cost_s(substeps: int) -> float:
         solver, state = _solver(data, substeps), ModalState.at_rest(initial[:batch])
-        # warm already: the error was measured before
+        # no warm-up: `error` has run the solver before
         return median_s(lambda: solver.solve(state, data.steps), 3, warm_up=False) / len(state.amplitude)
 
     default = _solver(data, None).substeps

@@ -1,4 +1,4 @@
-"""The real window with its controller: what benchmarks of the app drive."""
+"""The app's window with its controller, for benchmarks that drive it from within."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from app.window.main import load_engine
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
 
-LOOK_MS = 2  # between two looks at what is waited for
+LOOK_MS = 2  # between two checks of a condition
 PATIENCE_S = 120.0
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Everything here is called in the window's thread; events are handled meanwhile."""
+    """A window that is open. Methods are called in its thread and handle events while they wait."""
 
     window: MainWindow
     controller: Controller
@@ -44,9 +44,14 @@ class Stage:
         loop.exec()
 
     def wait_for(self, condition: Callable[[], bool], what: str, seconds: float = 0.0) -> None:
-        """Raises TimeoutError, with the latest notice, where `condition` does not come true.
+        """Waits until `condition` holds.
 
-        `seconds`: how long it should take.
+        Args:
+            what: is waited for, in words.
+            seconds: how long it should take; `PATIENCE_S` are added.
+
+        Raises:
+            TimeoutError: it did not hold in time; the message has the latest notice.
         """
         patience_s = seconds + PATIENCE_S
         loop, timer, until_s = QEventLoop(), QTimer(interval=LOOK_MS), time.monotonic() + patience_s
@@ -58,7 +63,7 @@ class Stage:
             raise TimeoutError(f"{what} did not come within {patience_s:g} s; {self.window.notices.text}")
 
     def wait_until_rendered(self) -> None:
-        """Until the motion of what is chosen is whole, and a pluck of it would sound at once."""
+        """Waits until the take of what is chosen is complete, and a pluck of it would sound at once."""
         stage = self.controller.performance
         self.wait_for(lambda: stage.ready and stage.settled and stage.at_hand, "the rendering of a pluck")
 
@@ -76,7 +81,7 @@ def silent(on_problem: ProblemListener) -> Sound:
 def opened(
     settings: Settings, size: tuple[int, int], make_sound: Callable[[ProblemListener], Sound] = Sound
 ) -> Iterator[Stage]:
-    """The window, alive and with its first pluck rendered, `size` in pixels; afterwards it is closed and gone."""
+    """Opens the window with its first pluck rendered, and closes and deletes it afterwards. `size`: in pixels."""
     choose_display()
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)

@@ -1,4 +1,4 @@
-"""How long the app takes to start, each time in a process of its own, where `main` runs."""
+"""How long the app takes to start, each time in a process of its own, which runs `main`."""
 
 from __future__ import annotations
 
@@ -25,12 +25,11 @@ COMMAND = "import sys; import app.commands.cli; from app.commands.benchmarks.sta
 
 @dataclass(frozen=True)
 class Starts:
-    """Seconds since the process was asked for.
+    """Seconds of each start, from the moment when the process is started.
 
     Attributes:
-        painted_s: of each start, until the window has been painted.
-        ready_s: until the sources of the first pluck are loaded and the
-            output is open: a key would sound at once.
+        painted_s: until the window has been painted.
+        ready_s: until the sources of the first pluck are loaded and the output is open, so that a key sounds at once.
     """
 
     painted_s: tuple[float, ...]
@@ -38,7 +37,11 @@ class Starts:
 
 
 def measure_starts(count: int, report: Callable[[int], None]) -> Starts:
-    """`count` warm starts with default settings, after one that fills the caches and does not count."""
+    """Times `count` starts with default settings, after one that fills the caches.
+
+    Raises:
+        RuntimeError: the app did not start.
+    """
     found = []
     for number in range(count + 1):
         report(number)
@@ -50,7 +53,7 @@ def measure_starts(count: int, report: Callable[[int], None]) -> Starts:
 def _measure() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "LEARNED_STRINGS_SETTINGS": str(Path(folder) / "settings.json")}
-        begun_s = time.time()  # the one clock that two processes share everywhere
+        begun_s = time.time()  # the only clock that two processes share on every system
         done = subprocess.run(
             [sys.executable, "-c", COMMAND],
             env=environment,
@@ -65,7 +68,7 @@ def _measure() -> dict[str, float]:
 
 
 def main() -> int:
-    """Starts the app as its command does, notes the times on the way, and ends it."""
+    """Starts the app as its command does, prints the times (`time.time`) as JSON, and ends it."""
     from app.commands.benchmarks.display import choose_display
     from app.shared.thread_priority import wait_asleep
     from app.window.main import run

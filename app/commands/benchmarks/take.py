@@ -1,6 +1,6 @@
-"""What the pictures and the signals of a pluck cost: processor time, memory, and a listening point that moves.
+"""Cost of a pluck's pictures and signals: processor time, memory, and the time after a listening point has moved.
 
-Times are of all threads of this process; other busy processes lengthen them little.
+Processor times are of all threads of this process; other processes have little effect on them.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class TakeCost:
     """Model and truth of one pluck.
 
     Attributes:
-        picture_hz: pictures a second.
-        rendered_s: processor time for all of both.
+        picture_hz: pictures per second.
+        rendered_s: processor time for all pictures and signals of both.
         megabytes: memory of one source.
-        moved_s, moved_wall_s: from another listening point to both signals there, processor time and time; the
+        moved_s, moved_wall_s: processor and wall-clock time from a moved listening point to both signals there; the
             shortest of a few.
     """
 
@@ -55,7 +55,7 @@ class TakeBenchmark:
 
 
 class _Nobody:
-    """Hears nothing of it."""
+    """A listener that does nothing."""
 
     def take_started(self, take: Take) -> None: ...
 
@@ -67,7 +67,7 @@ class _Nobody:
 
 
 def measure(report: Callable[[float, str], None]) -> TakeBenchmark:
-    """Studio strings."""
+    """Measures `PRESETS`."""
     found = []
     with one_thread(), ThreadPoolExecutor(1) as helper:
         machine = Machine.here()
@@ -100,7 +100,7 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
 
 
 def _finish(job: Job) -> tuple[float, float]:
-    """Processor time and time."""
+    """Finishes the job; returns processor time and wall-clock time in s."""
     began_s, began_wall_s = time.process_time(), time.perf_counter()
     while not job.idle:
         job.advance()

@@ -1,4 +1,4 @@
-"""A train step at the size of the paper's own: 50 trajectories of 400 frames; of 50 for the Fourier cells."""
+"""A training step of the paper's size: 50 trajectories of 400 frames, or of 50 frames for the Fourier cells."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRAMES = 400
 REPEATS = 5
 # DMD is fitted, not trained
 MODELS = ("koopman", "koopman_var", "koopman_integrated", "lru", "s5", "fgru", "frnn")
-FEWER_FRAMES = {"fgru": 50, "frnn": 50}  # their cost is that of a frame times their number
+FEWER_FRAMES = {"fgru": 50, "frnn": 50}  # their cost is proportional to the number of frames
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class TrainBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
-    """Each model at the paper's size, on random data: its values do not matter to its cost."""
+    """Measures each model at the paper's size, on random data, on which its cost does not depend."""
     found = []
     for number, name in enumerate(MODELS):
         report(number / len(MODELS), name)

@@ -1,6 +1,6 @@
-"""Patches as they are heard: pitch and loudness of their keys, chords, and the model beside the truth under hands.
+"""Patches: pitch and loudness of keys, level of a chord, and the model's error while a key is bent and plucked again.
 
-Everything is measured on rendered sound. Pitch is that of the first partial of a quiet pluck, without body and room.
+All is measured on rendered sound. Pitch is that of the first partial of a quiet pluck, without body and room.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from app.patches.patch import Body, Patch, Room
 from engine.presets import Preset
 
 RATE_HZ = 48_000
-QUIET_MM = 0.03  # 100 dB below full scale a voice is over
-PITCH_S = 1.2  # of sound, of which the first tenth is left out
-PADDED = 2**21
-CHORD = (0, 7, 12, 16, 19, 24)  # semitones above a chord's root
-HARD = 120
-HANDS_S = 1.5
+QUIET_MM = 0.03  # amplitude at which the pitch is measured, above the level at which a voice ends
+PITCH_S = 1.2  # of sound in which the pitch is measured, of which the first 0.1 s is left out
+PADDED = 2**21  # samples of the transform
+CHORD = (0, 7, 12, 16, 19, 24)  # semitones above the chord's root
+HARD = 120  # velocity of the chord
+HANDS_S = 1.5  # of sound in which the model is compared with the truth
 
 
 @dataclass(frozen=True)
 class TunedPatch:
-    """What was heard of one patch.
+    """What was measured of one patch.
 
     Attributes:
-        keys: of which each measure was taken.
-        cents: the worst of them, from the pitch of the patch's tuning.
-        spread_db: between the loudest and the softest key, K-weighted over the first 0.4 s, as it is heard.
-        level_db: their mean.
-        chord_peak_db: the highest of six hard keys at once, of full scale, before the limiter.
-        shortest_s: until the fastest key has fallen by 30 dB.
-        hands_rel_mse: the model from the truth while a key is bent, let go and plucked again.
+        keys: those measured.
+        cents: the largest deviation from the pitch of the patch's tuning.
+        spread_db: from the softest to the loudest key, K-weighted over the first 0.4 s, with body and room.
+        level_db: the mean of these levels, relative to full scale.
+        chord_peak_db: the peak of six hard keys at once, relative to full scale, before the limiter.
+        shortest_s: the shortest time in which a key falls by 30 dB.
+        hands_rel_mse: the model's error against the truth while a key is bent, plucked again and released.
     """
 
     patch: str
@@ -60,7 +60,7 @@ class TuneBenchmark:
 
 
 def pitch_hz(sound: NDArray[np.floating], near_hz: float, rate_hz: int = RATE_HZ) -> float:
-    """Of the strongest partial within 3 % of a frequency; nan for silence."""
+    """The frequency of the strongest partial within 3 % of `near_hz` in a sound (frames,); NaN for silence."""
     part = np.asarray(sound, np.float64)
     spectrum = np.abs(np.fft.rfft(part * np.hanning(len(part)), PADDED))
     low, high = (int(near_hz * factor * PADDED / rate_hz) for factor in (0.97, 1.03))
@@ -72,7 +72,7 @@ def pitch_hz(sound: NDArray[np.floating], near_hz: float, rate_hz: int = RATE_HZ
 
 
 def loudness_db(sound: NDArray[np.floating], rate_hz: int = RATE_HZ) -> float:
-    """K-weighted mean square of all of it, (frames, channels), in dB of full scale."""
+    """K-weighted mean square (ITU-R BS.1770) of a sound (frames, channels), in dB relative to full scale."""
     part = np.asarray(sound, np.float64)
     power = (np.abs(np.fft.rfft(part, axis=0)) ** 2).mean(1)
     total = (
@@ -84,7 +84,7 @@ def loudness_db(sound: NDArray[np.floating], rate_hz: int = RATE_HZ) -> float:
 def measure(
     patches: Sequence[tuple[Patch, Preset]], every: int, report: Callable[[float, str], None]
 ) -> TuneBenchmark:
-    """Every so many keys of each patch."""
+    """Measures one of every so many keys of each patch."""
     found = []
     for number, (patch, preset) in enumerate(patches):
         report(number / len(patches), patch.name)
@@ -125,7 +125,7 @@ def _measure(patch: Patch, preset: Preset, every: int) -> TunedPatch:
 
 
 def _falls_s(sound: NDArray[np.float32]) -> float:
-    """Until its level has fallen 30 dB below its loudest 20 ms; its whole length where it has not."""
+    """The time until its level has fallen 30 dB below its loudest 20 ms; its whole duration where it has not."""
     block = RATE_HZ // 50
     power = (np.asarray(sound[: len(sound) // block * block], np.float64) ** 2).mean(1).reshape(-1, block).mean(1)
     below = np.flatnonzero(power[power.argmax() :] < power.max() / 1000)

@@ -1,7 +1,7 @@
-"""Voices: what one costs as it rings, how far it is from what it stands for, and what a strike costs.
+"""Voices: the cost of one while it rings, its error, and the cost of a pluck.
 
-Costs are of this thread's own time, on one core, without what an empty mixer costs: other busy processes lengthen
-them little. Errors are relative L2 of what is heard of the first second.
+Costs are processor time of this thread, less that of an empty mixer, so that other processes have little effect.
+Errors are relative L2 over the first second of what is heard.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import torch
 from numpy.typing import NDArray
 
 from app.commands.benchmarks.machine import Machine, one_thread
+from app.presets.library import STUDIO
 from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, Pluck
 from engine.presets import SHIPPED, Preset, load_preset, preset_files
 from engine.sources import ModelSource, StringSource, TruthSource, project
@@ -25,8 +26,7 @@ from engine.voices import Ear, Mixer, Program, Voice, bank_program, truth_progra
 from engine.voices.voice import ATTACK_S
 
 RATE_HZ = 48_000
-PREFIX = "studio_"
-EDGES_S = (0.0, 0.05, 1.0, 4.0)  # of the ages that are told apart; the last is the mean age of what is played
+EDGES_S = (0.0, 0.05, 1.0, 4.0)  # of the ages of a voice that are measured apart
 REPEATS = 5
 ERROR_S = 1.0
 STRIKES = 200
@@ -39,12 +39,12 @@ STEP_FRAMES = 480
 
 @dataclass(frozen=True)
 class VoiceCost:
-    """One voice, "model" or "truth".
+    """A voice of the kind "model" or "truth".
 
     Attributes:
         onset, first_second, later: shares of a core over the first 50 ms, the first second, and seconds 1 to 4.
-        mean: over the first four seconds.
-        error: of the truth from the solver with its default sub-steps, of the model from its own definition.
+        mean: share of a core over the first four seconds.
+        error: the truth's against the solver with its default sub-steps, the model's against its definition.
     """
 
     preset: str
@@ -57,13 +57,13 @@ class VoiceCost:
     error: float
 
     def voices_at(self, share: float) -> int:
-        """How many of all ages fit into a share of a core."""
+        """How many voices, of ages up to four seconds, fit into a share of a core."""
         return int(share / self.mean)
 
 
 @dataclass(frozen=True)
 class StrikeCost:
-    """Making the voices of model and truth of a pluck, in ms."""
+    """Time to make the voices of model and truth of a pluck."""
 
     preset: str
     median_ms: float
@@ -79,8 +79,8 @@ class VoicesBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> VoicesBenchmark:
-    """Of every studio preset."""
-    paths = [path for path in preset_files(SHIPPED) if path.stem.startswith(PREFIX)]
+    """Measures every studio preset."""
+    paths = [path for path in preset_files(SHIPPED) if path.stem.startswith(STUDIO)]
     voices: list[VoiceCost] = []
     strikes = []
     with one_thread():
@@ -115,7 +115,7 @@ def _struck(program: Program, preset: Preset, pluck: Pluck = PLUCK) -> Voice:
 
 
 def _shares(program: Program, preset: Preset) -> tuple[float, float, float, float]:
-    """Of a core: over the first age, the first two, the last, and all."""
+    """Shares of a core: over the first age, the first two, the last, and all."""
     empty_s = statistics.median(sum(_times_s(None)) for _ in range(REPEATS)) / EDGES_S[-1]
     runs = [_times_s(_struck(program, preset)) for _ in range(REPEATS)]
     onset_s, rest_s, later_s = (statistics.median(times) for times in zip(*runs, strict=True))
@@ -128,7 +128,7 @@ def _shares(program: Program, preset: Preset) -> tuple[float, float, float, floa
 
 
 def _times_s(voice: Voice | None) -> list[float]:
-    """Of this thread for each age; of an empty mixer without a voice."""
+    """Processor time of this thread for each age; None: of an empty mixer."""
     mixer = Mixer(RATE_HZ)
     if voice is not None:
         voice.never_ends()
@@ -143,7 +143,7 @@ def _times_s(voice: Voice | None) -> list[float]:
 
 
 def _error(program: Program, preset: Preset, source: StringSource) -> float:
-    """From when the fade-in is over; both at the preset's own rate."""
+    """Relative L2 of a voice against its source from the end of the fade-in on, at the preset's own rate."""
     info = preset.info
     frames, first = round(ERROR_S * info.rate_hz), round(ATTACK_S * info.rate_hz)
     voice, mixer = _struck(program, preset), Mixer(info.rate_hz, limited=False)
@@ -158,7 +158,7 @@ def _error(program: Program, preset: Preset, source: StringSource) -> float:
 
 
 def _strikes(preset: Preset, programs: tuple[Program, Program]) -> StrikeCost:
-    """All that a gesture waits for before it hands its voices over."""
+    """Times to make both voices, for which a key waits."""
     times_s = []
     for number in range(STRIKES + 1):
         pluck = PLUCK.moved(position=0.1 + 0.8 * number / STRIKES)

@@ -1,4 +1,4 @@
-"""What the dialog that exports an instrument was last set to."""
+"""The last settings of the dialog that exports an instrument."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampleBits, SampledSource
 from app.patches.patch import Key
 
-SampledForm = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
+SampledKind = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
 
 
 class SampledChoices(BaseModel):
-    """The dialog's last state. Without `keys`, all of the patch's range."""
+    """The last settings. `keys`: the lowest and the highest; None: all of the patch's range."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     folder: str = ""
-    form: SampledForm = "flac"
+    form: SampledKind = "flac"
     bits: SampleBits = "24"
     rate_hz: int = 48_000
     keys: tuple[Key, Key] | None = None

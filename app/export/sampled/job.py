@@ -6,6 +6,7 @@ An export that was stopped goes on with the same call: whole samples are kept, u
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,12 +37,12 @@ class SampledReport:
     """What was written.
 
     Attributes:
-        samples: of the instrument; rendered: those of them that were not there yet.
+        samples: how many the instrument has; rendered: how many of them were not there yet.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: what all of it is louder than the patch: an SFZ is softer where a note would clip, a SoundFont is
-            raised to full level.
-        peak_db: of its loudest note as a sampler plays it, in dB of full scale.
+        gain_db: by how much the whole is louder than the patch: an SFZ is softer where a note would clip, a SoundFont
+            is raised to full level.
+        peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
 
     path: Path
@@ -54,7 +55,7 @@ class SampledReport:
 
 
 def plain_stem(text: str) -> str:
-    """Letters, digits and `_.+-` of ASCII: what every player takes within an SFZ file, on every system."""
+    """`text` with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
 
 
@@ -90,7 +91,7 @@ def export_sampled(
 
     Raises:
         ValueError: see `planned`.
-        ExportCancelled: `cancelled` said so; samples that are whole stay for the next time; without any, nothing.
+        ExportCancelled: `cancelled` returned True; whole samples stay for the next time, without any no folder stays.
         ExportError: a file cannot be written, or a note not rendered.
     """
     plan = planned(plan, out)
@@ -108,7 +109,7 @@ def export_sampled(
                     file.write(sfz_text(plan, samples, store.folder.name).encode())
                     gain_db = sfz_gain_db(samples)
                 else:
-                    gain_db = write_sf2(file, plan, samples, store.folder)
+                    gain_db = write_sf2(file, plan, samples, store.folder, cancelled)
             size = out.stat().st_size
             if out.suffix.lower() == ".sfz":
                 size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)
@@ -130,15 +131,22 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
     from app.instrument.offline import render_note  # compiled code, and torch
 
     def rendered(
-        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
+        patch: Patch,
+        key: int,
+        velocity: int,
+        held_s: float,
+        seconds: float,
+        rate_hz: int,
+        *,
+        advanced: Callable[[float], None],
     ) -> NDArray[np.float32]:
-        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source)
+        return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced)
 
     return rendered
 
 
 def kept_samples(plan: SampledPlan, out: Path) -> int:
-    """How many samples of a plan an export that was stopped has left, as its index tells.
+    """How many samples of a plan are there already from an export that was stopped, by its index.
 
     Raises:
         ValueError: see `planned`.

@@ -1,4 +1,4 @@
-"""How loud a key is at each velocity: measured where it was rendered, between them as the patch's plucks go."""
+"""The level of a key at each velocity: measured where it was rendered, else interpolated along the plucks' levels."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def by_key(samples: Mapping[Zone, StoredSample]) -> Iterator[tuple[list[Zone], l
 
 
 def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]) -> Levels:
-    """Of one key. Below the softest layer's own velocity it falls as steeply as from the next layer to that one.
+    """The levels of one key. Below the softest layer's velocity they fall as steeply as from the next layer to it.
 
-    Where a layer is silent, or there is but one, the plucks' amplitudes alone say how it falls.
+    Where a layer is silent, or there is only one, they follow the amplitudes of the plucks.
     """
     velocities = range(VELOCITIES[1] + 1)
     plucks_db = 20 * np.log10([patch.pluck.pluck(velocity).amplitude_mm for velocity in velocities])
@@ -33,7 +33,7 @@ def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]
     measured_db = np.array([sample.level_db for sample in stored])
     if len(layers) < 2 or measured_db.min() <= INAUDIBLE_DBFS:
         return measured_db[-1] + plucks_db - plucks_db[rendered[-1]]
-    # a pluck that is as hard at any velocity has other widths still
+    # plucks of equal amplitude still differ in width, and so in level
     along = plucks_db if np.ptp(plucks_db) > 0 else np.array(velocities, np.float64)
     places = along[rendered]
     slope = (measured_db[1] - measured_db[0]) / (places[1] - places[0])

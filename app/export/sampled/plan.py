@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from functools import cached_property
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,18 +27,33 @@ MOST_LAYERS = 32
 WIDEST_STEP = 12  # keys from one sample to the next
 SECONDS_RANGE = (0.1, 60.0)
 SAMPLED_RATE_RANGE_HZ = (8_000, 192_000)
-UNHEARD_FIELDS = {"name", "category", "description", "author", "macros"}  # a macro's targets hold what it wrote
+# Fields of a patch that no sample depends on. A macro's targets hold what it wrote; a sample is one key that is held
+# to its end, with no hand on a wheel: it is neither damped nor bent, and the same in every mode.
+UNHEARD_FIELDS = frozenset(
+    {"name", "category", "description", "author", "macros"}
+    | {"damping", "mode", "bend_semitones", "bend_by", "mod_wheel"}
+)
 
 
 class NoteRenderer(Protocol):
     """Renders one note of a patch, struck at the first frame and let go after `held_s`.
 
-    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. Raises
-    ValueError where there is no such note.
+    Returns float32 (frames, channels) where ±1 is full scale; the same arguments give the same samples. `advanced` is
+    called several times a second with the seconds rendered, and may raise to stop the rendering. Raises ValueError
+    where there is no such note.
     """
 
     def __call__(
-        self, patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, /
+        self,
+        patch: Patch,
+        key: int,
+        velocity: int,
+        held_s: float,
+        seconds: float,
+        rate_hz: int,
+        /,
+        *,
+        advanced: Callable[[float], None],
     ) -> NDArray[np.float32]: ...
 
 
@@ -51,16 +68,17 @@ class Zone:
 
     @property
     def stem(self) -> str:
-        """Of its file: numbers alone, so that no name of a patch becomes a path."""
+        """The name of its file without suffix: from numbers alone, so that no patch's name becomes part of a path."""
         return f"key{self.key:03d}_vel{self.velocity:03d}"
 
 
 @dataclass(frozen=True)
 class SampledPlan:
-    """What is rendered. Without `keys`, all of the patch's range.
+    """What is rendered.
 
     Attributes:
-        every: a sample for each so many keys; its neighbours are the same sample, transposed. 1 transposes none.
+        keys: the lowest and the highest MIDI key; None: all of the patch's range.
+        every: one of so many keys is sampled; the others transpose its samples. 1 transposes none.
         layers: velocity layers, of equal widths; each is rendered at its highest velocity.
         seconds: the longest sample. One that is silent sooner ends there; one that still rings is faded out.
         preset_sha256: of the model that plays the patch, so that samples of an earlier one are not kept.
@@ -109,7 +127,7 @@ class SampledPlan:
     def key_range(self) -> tuple[int, int]:
         return self.keys or self.patch.range
 
-    @property
+    @cached_property
     def zones(self) -> tuple[Zone, ...]:
         """By key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
         return tuple(
@@ -124,7 +142,7 @@ class SampledPlan:
 
     @property
     def largest_bytes(self) -> int:
-        """Of all samples, were none silent before `seconds` and none compressed."""
+        """The size of all samples if each lasted `seconds` and none were compressed."""
         frames = round(self.seconds * self.rate_hz)
         return len(self.zones) * frames * self.channels * int(self.bits) // 8
 
@@ -132,17 +150,25 @@ class SampledPlan:
         return f"{zone.stem}.{self.format}"
 
     def digest(self, zone: Zone) -> str:
-        """Of all that decides how a zone's file sounds; names and descriptions do not."""
+        """SHA-256 of all that the sound of a zone's file depends on; names and descriptions are not among it."""
         told = {
-            "patch": self.patch.model_dump(mode="json", exclude=UNHEARD_FIELDS),
+            "patch": self._heard_fields,
             "preset": self.preset_sha256,
-            **({"body": self.body_sha256} if self.body_sha256 else {}),
+            **({"body": self.body_sha256} if self.body_sha256 and "body" in self._heard_fields else {}),
             "source": self.source,
             "note": [zone.key, zone.velocity, self.seconds, self.rate_hz],
             "file": [self.format, self.bits],
             "version": program_version(),
         }
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+    @cached_property
+    def _heard_fields(self) -> dict[str, Any]:
+        """Of the patch: all that its samples depend on."""
+        body, room = self.patch.body, self.patch.room
+        silent = {"body": not body.name or body.mix == 0, "room": room.mix == 0}
+        unheard = UNHEARD_FIELDS | {name for name, left_out in silent.items() if left_out}
+        return self.patch.model_dump(mode="json", exclude=set(unheard))
 
     def _key_spans(self) -> list[tuple[int, int]]:
         low, high = self.key_range

@@ -16,10 +16,10 @@ from app.export.wav import faded_out, quantised
 SILENT_DB = -90.0  # below the note's own peak
 INAUDIBLE_DBFS = -120.0  # a note without a sample above this is silence
 PEAK_DBFS = -1.0  # of every stored sample: players interpolate, and overshoot
-END_FADE_S = 0.02  # where a note is silent
-CUT_FADE_S = 0.5  # where it still rings; no more than a quarter of the sample
-LEVEL_PART_S = 0.4  # of the note, whose level is told: a loudness meter's block
-FEWEST_FRAMES = 64  # of a sample that every player takes
+END_FADE_S = 0.02  # the fade-out of a note that has become silent
+CUT_FADE_S = 0.5  # of one that still rings, a quarter of the sample at most
+LEVEL_PART_S = 0.4  # at the beginning of a note, whose level is stored: the block of a loudness meter
+FEWEST_FRAMES = 64  # the shortest sample that every player accepts
 _SUBTYPES: dict[SampleBits, str] = {"16": "PCM_16", "24": "PCM_24"}
 
 
@@ -29,9 +29,9 @@ class Sample:
 
     Attributes:
         sound: float64 (frames, channels), its peak at PEAK_DBFS.
-        gain_db: what it was raised by; taken off again, it has the level that it was rendered with.
-        level_db: root mean square of its first 0.4 s, of all channels, as it was rendered.
-        cut: it still rang at its last frame.
+        gain_db: by how much it was raised above the level at which it was rendered.
+        level_db: root mean square of its first 0.4 s, over all channels, as rendered.
+        cut: whether it still rang at its last frame.
     """
 
     sound: NDArray[np.float64]
@@ -41,7 +41,7 @@ class Sample:
 
 
 def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
-    """Of a rendered note (frames, channels), where ±1 is full scale.
+    """Prepares a rendered note, (frames, channels), where ±1 is full scale.
 
     Raises:
         ValueError: there are no frames, or a value is not finite.

@@ -19,6 +19,7 @@ import soundfile
 from app.export.sampled.levels import by_key, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
+from app.export.sound import Cancelled, ExportCancelled
 from app.export.wav import quantised
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
@@ -61,7 +62,7 @@ class _Channel:
 
 
 def check_sf2(plan: SampledPlan) -> None:
-    """Raises ValueError where a plan cannot be one SoundFont; the message names the remedy."""
+    """Raises ValueError where a plan does not fit into one SoundFont; the message names the remedy."""
     low, high = RATE_RANGE_HZ
     if not low <= plan.rate_hz <= high:
         raise ValueError(f"a SoundFont's rate must lie in {low} … {high} Hz, not {plan.rate_hz}; lower it")
@@ -74,13 +75,20 @@ def check_sf2(plan: SampledPlan) -> None:
         )
 
 
-def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: Path) -> float:
+def write_sf2(
+    file: BinaryIO,
+    plan: SampledPlan,
+    samples: Mapping[Zone, StoredSample],
+    folder: Path,
+    cancelled: Cancelled = lambda: False,
+) -> float:
     """Writes the whole file; the stored samples are read one after the other.
 
     Returns:
-        What all of it was raised by, in dB: the loudest sample, which has 16 bits here, is at full level.
+        By how much the whole was raised, in dB: the loudest sample is at the full level of 16 bits.
 
     Raises:
+        ExportCancelled: `cancelled` said so; the file is not whole.
         OSError, soundfile.LibsndfileError: a sample cannot be read, or the file not written.
     """
     channels = _channels(samples)
@@ -94,6 +102,8 @@ def write_sf2(file: BinaryIO, plan: SampledPlan, samples: Mapping[Zone, StoredSa
     levels_db = {zone: _raised_db(attenuations_cb[zone], zone) - stored.gain_db for zone, stored in samples.items()}
     gain_db = -max(levels_db.values())
     for zone in samples:
+        if cancelled():
+            raise ExportCancelled
         sound, _ = soundfile.read(folder / plan.file_name(zone), dtype="float64", always_2d=True)
         steps, _ = quantised(sound * 10 ** ((levels_db[zone] + gain_db) / 20), "16")
         silence = bytes(2 * ZEROS_BEHIND)
@@ -121,7 +131,7 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
 
 
 def _raised_db(attenuation_cb: int, zone: Zone) -> float:
-    """What the velocity's attenuation takes at the velocity that the zone is rendered at: its level is kept there."""
+    """By how much a zone is raised to make up for the velocity's attenuation at the velocity it was rendered at."""
     return attenuation_cb / 10 * (1 - zone.velocity / 128)
 
 

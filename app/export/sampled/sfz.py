@@ -26,7 +26,7 @@ def sfz_text(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: st
 
 
 def sfz_gain_db(samples: Mapping[Zone, StoredSample]) -> float:
-    """What all of it is raised by: 0, or below where a note would clip. No volume is above 0 dB then."""
+    """By how much the whole is raised: 0, or less where a note would clip, so that no volume is above 0 dB."""
     return min(0.0, *(sample.gain_db for sample in samples.values()))
 
 
@@ -50,8 +50,8 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
     # one_shot: letting go damps nothing; the damping is still what ends a string that is plucked again
     yield f"loop_mode={'one_shot' if patch.damping.let_ring else 'no_loop'}"
     yield f"ampeg_release={min(100.0, release_s(patch)):.4f}"
-    # a string that is plucked again: `off_by` for players of SFZ 1, where one key may end itself;
-    # `note_polyphony` for the others, `note_selfmask=off` so that a soft note ends a loud one as well
+    # a string that is plucked again ends the former note: by `off_by` in players of SFZ 1, where a key may end
+    # itself, by `note_polyphony` in the others, with `note_selfmask=off` so that a soft note ends a loud one as well
     yield "off_mode=normal"
     yield "note_polyphony=1"
     yield "note_selfmask=off"

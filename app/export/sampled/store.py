@@ -1,4 +1,4 @@
-"""The folder of samples, and its index, which says what each was rendered from: a stopped export goes on there."""
+"""The folder of samples, and its index of what each was rendered from, with which a stopped export continues."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class StoredSample(BaseModel):
 
     @property
     def peak_db(self) -> float:
-        """As it was rendered, in dB of full scale."""
+        """Of the note as rendered, relative to full scale."""
         return PEAK_DBFS - self.gain_db if self.level_db > INAUDIBLE_DBFS else INAUDIBLE_DBFS
 
 
@@ -88,7 +88,7 @@ class SampleStore:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Nobody else writes here meanwhile. Raises ExportError where somebody does."""
+        """Within, no other export writes here. Raises ExportError where one does."""
         lock = FileLock(self.folder / LOCK, timeout=0)
         try:
             lock.acquire()
@@ -125,22 +125,30 @@ class SampleStore:
             ExportError: a file cannot be written, or a note is not finite.
         """
         self._write_index()  # before any sample: it says whose they are
-        wanted = [zone for zone in plan.zones if not self._keeps(plan, zone)]
-        started = time.monotonic()
-        for done, zone in enumerate(wanted):
+
+        def check(_: object = None) -> None:
             if cancelled():
                 raise ExportCancelled
+
+        wanted = []
+        for zone in plan.zones:
+            check()
+            if not self._keeps(plan, zone):
+                wanted.append(zone)
+        started = time.monotonic()
+        for done, zone in enumerate(wanted):
+            check()
             share = done / len(wanted)
             if done == 1:
                 started = time.monotonic()  # the first note also loads and compiles
             left_s = (time.monotonic() - started) * (len(wanted) - done) / (done - 1) if done > 1 else None
             progress(share, f"key {zone.key}, velocity {zone.velocity}", left_s)
-            self._add(plan, zone, render)
+            self._add(plan, zone, render, check)
         self._remove_all_but({plan.file_name(zone) for zone in plan.zones})
         return {zone: self._index.samples[plan.file_name(zone)] for zone in plan.zones}, len(wanted)
 
     def remove(self) -> None:
-        """Our files, and the folder where nothing else is left in it."""
+        """Deletes the samples and the index, and the folder if nothing else is in it; errors are ignored."""
         with contextlib.suppress(OSError, ExportError):
             self._remove_all_but(set())
             (self.folder / INDEX).unlink(missing_ok=True)
@@ -158,11 +166,11 @@ class SampleStore:
         except OSError:
             return False
 
-    def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer) -> None:
+    def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer, advanced: Callable[[float], None]) -> None:
         name = plan.file_name(zone)
         try:
             note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
-            sample = sample_of(render(*note), plan.rate_hz)
+            sample = sample_of(render(*note, advanced=advanced), plan.rate_hz)
         except ValueError as error:
             raise ExportError(f"{self.path(name)}: {error}") from error
         data = encoded(sample, plan.rate_hz, plan.format, plan.bits)
@@ -203,7 +211,7 @@ class SampleStore:
 
 
 def read_index(path: Path) -> SampleIndex | None:
-    """None where there is no file.
+    """The index; None where there is no file.
 
     Raises:
         ExportError: there is one that is not the index of samples, or one of another version.

@@ -1,25 +1,44 @@
-"""What an export of samples takes and what came of it, in words; the same on the command line and in the window."""
+"""Size, notes and results of an export of samples in words, for the command line and the window alike."""
 
 from __future__ import annotations
 
 from app.export.sampled.job import SampledReport
 from app.export.sampled.plan import SampledPlan
+from app.export.sampled.sf2 import ZEROS_BEHIND
 
 SMALLEST_TOLD_DB = 0.05
+_LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's header, or its rows of a SoundFont
 
 
 def number_of(count: int, thing: str) -> str:
-    """As in 1 key, 2 keys."""
+    """Such as "1 key", "2 keys"."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
-def largest_bytes(plan: SampledPlan, soundfont: bool) -> int:
-    """Of what is written, at most; a SoundFont of 16 bits has its samples beside it until it is whole."""
-    return plan.largest_bytes * (16 + 24 if soundfont else int(plan.bits)) // int(plan.bits)
+def instrument_bytes(plan: SampledPlan, soundfont: bool) -> int:
+    """The finished instrument's size at most: as if all samples were of full length and FLAC did not compress."""
+    if soundfont:
+        behind = ZEROS_BEHIND * len(plan.zones) * plan.channels * 2
+        return plan.largest_bytes * 16 // int(plan.bits) + behind + _LINES_BYTES * len(plan.zones) * plan.channels
+    return plan.largest_bytes + _LINES_BYTES * len(plan.zones)
+
+
+def needed_bytes(plan: SampledPlan, soundfont: bool) -> int:
+    """The space on disk needed at most: a SoundFont's samples, FLAC of 24 bits, lie beside it until the end."""
+    return instrument_bytes(plan, soundfont) + (plan.largest_bytes * 24 // int(plan.bits) if soundfont else 0)
+
+
+def size_words(plan: SampledPlan, soundfont: bool) -> str:
+    """The instrument's size, and what else is needed meanwhile, in words."""
+    most = f"at most {megabytes(instrument_bytes(plan, soundfont))}"
+    if soundfont:
+        beside = needed_bytes(plan, soundfont) - instrument_bytes(plan, soundfont)
+        return f"{most} (16-bit), and up to {megabytes(beside)} more while it is written"
+    return f"{most}, before FLAC compression" if plan.format == "flac" else most
 
 
 def counted(plan: SampledPlan) -> str:
-    """How many samples, and of what."""
+    """The numbers of samples, keys and layers in words."""
     zones = plan.zones
     keys = number_of(len({zone.key for zone in zones}), "key")
     between = "" if plan.every == 1 else f", each for {plan.every} keys"

@@ -1,4 +1,4 @@
-"""The window's menu: how it looks, and the dialogs that have no place of their own in the header."""
+"""The window's menu: theme, UI scale, undo, and the dialogs without a button in the header."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIZES_PERCENT = (100, 115, 125, 150)
 
 
 class AppMenu(QMenu):
-    """Asks with signals, shows with `show_look`. `asked` are actions, and the window's signal that each one means."""
+    """Emits `look_asked`; shows `show_look`. `asked`: for each action the name of the window's signal to emit."""
 
     look_asked = Signal(str, object)  # a field of `Look` and its new value
 
@@ -31,7 +31,7 @@ class AppMenu(QMenu):
         self.asked = {self._undo: "undo_asked", self._redo: "redo_asked"} | {
             self.addAction(text): signal
             for text, signal in (
-                ("Instrument: keys and patch\tCtrl+K", "instrument_asked"),
+                ("Show or hide instrument\tCtrl+K", "instrument_asked"),
                 ("Export instrument …\tCtrl+Shift+E", "sampled_asked"),
                 ("Audio settings …\tCtrl+,", "audio_asked"),
                 ("MIDI …\tCtrl+M", "midi_asked"),
@@ -47,7 +47,7 @@ class AppMenu(QMenu):
             action.setChecked(getattr(look, field) == value)
 
     def show_steps(self, undo: str, redo: str) -> None:
-        """What would be undone and done again; "" where there is nothing."""
+        """What undo and redo would change; "" where there is nothing to."""
         for action, what, step, keys in (
             (self._undo, "Undo", undo, "Ctrl+Z"),
             (self._redo, "Redo", redo, "Ctrl+Shift+Z"),
@@ -68,8 +68,8 @@ class AppMenu(QMenu):
 
 
 def menu_button(menu: QMenu) -> QToolButton:
-    """What opens it."""
-    button = tool_button("☰", "Menu", "Theme, UI scale, notices, help")
+    """The button in the header that opens the menu."""
+    button = tool_button("☰", "Menu", "Theme, UI scale, undo, MIDI, notices, help")
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)
     return button

@@ -1,4 +1,4 @@
-"""What browsers share: a search and a list over the window, keys that work in both, the keyboard given back."""
+"""Base of both browsers: a search field and a list over the window, and keys that work in either."""
 
 from __future__ import annotations
 
@@ -12,7 +12,15 @@ CLOSES = (KEYS.Key_Return, KEYS.Key_Enter, KEYS.Key_Escape)
 
 
 class Browser(QFrame):
-    """Hidden at first. Who builds on it makes `list`, calls `watch_keys`, and says what keys do and where it is."""
+    """Hidden at first; closing gives the focus back to the widget that had it.
+
+    A subclass makes `list`, calls `watch_keys` at the end of its `__init__`, and overrides what raises
+    NotImplementedError here.
+
+    Args:
+        what: of what it is a browser, in the plural, for labels.
+        tip: the tooltip of the search field.
+    """
 
     opened = Signal()
 
@@ -21,15 +29,15 @@ class Browser(QFrame):
     def __init__(self, what: str, tip: str, parent: QWidget | None) -> None:
         super().__init__(parent)
         self.setObjectName("browser")
-        self.setAccessibleName(f"{what.capitalize()} browser")
-        self._before: QWidget | None = None  # had the keyboard
-        self.search = QLineEdit(placeholderText=f"Search {what}s")
-        self.search.setAccessibleName(f"Search {what}s")
+        self.setAccessibleName(f"Browser of {what}")
+        self._before: QWidget | None = None  # had the focus
+        self.search = QLineEdit(placeholderText=f"Search {what}")
+        self.search.setAccessibleName(f"Search {what}")
         self.search.setToolTip(tip)
         self.search.setClearButtonEnabled(True)
 
     def watch_keys(self) -> None:
-        """Once search and list are there."""
+        """Takes the keys of search and list, and hides the browser; to be called once both are made."""
         for widget in (self.search, self.list):
             widget.installEventFilter(self)
         if (parent := self.parentWidget()) is not None:
@@ -37,7 +45,7 @@ class Browser(QFrame):
         self.hide()
 
     def show_over(self) -> None:
-        """Opens with the keyboard in the search."""
+        """Opens with the focus in the search field."""
         self._before = QApplication.focusWidget()
         self.opened.emit()
         self.place()
@@ -49,20 +57,21 @@ class Browser(QFrame):
             self.list.scrollToItem(item)  # type: ignore[arg-type]
 
     def dismiss(self) -> None:
+        """Closes, and gives the focus back; a filter that nothing passes is cleared."""
         self.hide()
         if self._before is not None and self._before.isVisible():
             self._before.setFocus()
         if not self.lists_any():  # next and previous would lead nowhere
             self.clear_filter()
 
-    # What a browser is
+    # For subclasses
 
     def place(self) -> None:
-        """Stands where it hides nothing that is needed."""
+        """Sets the geometry within the parent; called when opened and when the parent is resized."""
         raise NotImplementedError
 
     def press(self, event: QKeyEvent) -> None:
-        """A key of its own: a move, Space, Ctrl+D, or one that closes it."""
+        """Handles one of MOVES, Space, Ctrl+D or one of CLOSES."""
         raise NotImplementedError
 
     def lists_any(self) -> bool:
@@ -70,7 +79,7 @@ class Browser(QFrame):
         raise NotImplementedError
 
     def clear_filter(self) -> None:
-        """Everything is listed again; told once."""
+        """Lists everything again; emits the change of the filter once."""
         raise NotImplementedError
 
     def page(self) -> int:
@@ -91,7 +100,7 @@ class Browser(QFrame):
             return False
         if event.type() == QEvent.Type.ShortcutOverride:
             if self._is_ours(watched, event) or (event.text() and event.text().isprintable()):
-                event.accept()  # the window's own keys rest meanwhile
+                event.accept()  # or a shortcut of the window would get it
                 return True
         elif event.type() == QEvent.Type.KeyPress:
             if self._is_ours(watched, event):

@@ -1,4 +1,4 @@
-"""A button that is pressed as any other; dragged, it takes files out of the window, as soon as there are any."""
+"""A push button from which files can be dragged out of the window."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
 
 class DragButton(QPushButton):
-    """`drag_began` asks for files; `carry` brings them, then or later, and the next movement takes them along.
+    """Emits `drag_began` when it is dragged; the owner then gives the files to `carry`, at once or later.
 
-    `drag_ended`: they were dropped, or the button was let go.
+    With the next movement of the mouse they are dragged. `drag_ended`: they were dropped, or the button was released.
     """
 
     drag_began = Signal()
@@ -26,7 +26,7 @@ class DragButton(QPushButton):
         self._files: tuple[Path, ...] = ()
 
     def carry(self, files: Sequence[Path]) -> None:
-        """For the drag that has begun; without one nothing happens."""
+        """The files of the drag under way; ignored where there is none."""
         if self._dragged:
             self._files = tuple(files)
 
@@ -36,12 +36,12 @@ class DragButton(QPushButton):
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed_at is None:  # and not to the button itself, to which it would be pressed again
+        if self._pressed_at is None:  # after a drag: the button itself would take it for a press
             return
         moved = event.position().toPoint() - self._pressed_at
         if not self._dragged and moved.manhattanLength() >= QApplication.startDragDistance():
             self._dragged = True
-            self.setDown(False)  # it will be no click
+            self.setDown(False)  # so that the release is no click
             self.drag_began.emit()
         if self._files:
             mime = QMimeData()
@@ -49,7 +49,7 @@ class DragButton(QPushButton):
             drag = QDrag(self)
             drag.setMimeData(mime)
             drag.exec(Qt.DropAction.CopyAction)
-            self._end()  # the release went to where it was dropped
+            self._end()  # the button gets no release event
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:

@@ -1,4 +1,4 @@
-"""A line of text that is told in fewer words, or cut with an ellipsis, where there is too little room for it."""
+"""A line of text with shorter wordings for little room, cut with an ellipsis where none of them fits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QStyle, QStyleOption, QWidget
 
 
 class ElidedLabel(QLabel):
-    """Takes the room there is; what it says never moves what is beside it. `text` is whole."""
+    """Its least width is 0: its text never moves other widgets. `text()` is whole, `shown` what is painted."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -28,7 +28,7 @@ class ElidedLabel(QLabel):
 
     @property
     def shown(self) -> str:
-        """As much of it as there is room for."""
+        """The longest wording that fits, or the shortest one cut."""
         metrics, room = self.fontMetrics(), self.contentsRect().width()
         for words in (self.text(), *self._shorter):
             if metrics.horizontalAdvance(words) <= room:

@@ -28,7 +28,7 @@ class KnobRange:
     low: float
     high: float
     default: float
-    step: float  # of a key or a wheel notch; a ratio above 1 where logarithmic
+    step: float  # of an arrow key or a wheel notch; a ratio above 1 where logarithmic
     text: str = "{:.2f}"
     logarithmic: bool = False
 
@@ -39,18 +39,20 @@ class KnobRange:
         return (value - self.low) / (self.high - self.low)
 
     def value(self, share: float) -> float:
+        """The inverse of `share`, which is limited to 0 … 1."""
         share = min(max(share, 0.0), 1.0)
         if self.logarithmic:
             return self.low * (self.high / self.low) ** share
         return self.low + share * (self.high - self.low)
 
     def stepped(self, value: float, steps: float) -> float:
+        """`value` moved by so many steps, within the range."""
         moved = value * self.step**steps if self.logarithmic else value + self.step * steps
         return min(max(moved, self.low), self.high)
 
 
 class _Editor(QLineEdit):
-    """Takes a typed number. Enter and Escape are its own, whatever the window's shortcuts say."""
+    """Takes a typed number; Enter and Escape, which are shortcuts of the window, are its own."""
 
     given_up = Signal()
 
@@ -66,7 +68,7 @@ class _Editor(QLineEdit):
 
 
 class Knob(QWidget):
-    """Shows a value and asks for new ones: `value_asked` is a wish, `set_value` is what became of it."""
+    """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`."""
 
     value_asked = Signal(float)
     drag_started = Signal()
@@ -88,7 +90,7 @@ class Knob(QWidget):
         self.set_name(name, tip)
 
     def set_name(self, name: str, tip: str = "") -> None:
-        """Both may come from a file."""
+        """The label and the tooltip, shown as plain text: both may come from a file."""
         self._name = name
         self.setAccessibleName(name)
         told = "Drag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
@@ -161,7 +163,7 @@ class Knob(QWidget):
         event.accept()
 
     def event(self, event: QEvent) -> bool:
-        """Page up and Page down are the knob's while it has the keyboard, though the window has shortcuts of them."""
+        """Keeps Page up and Page down, which are shortcuts of the window, while the knob has the focus."""
         paging = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in paging:
             event.accept()

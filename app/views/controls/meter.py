@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from app.views import theme
 
 LOWEST_DB = -60.0
-LIMIT_HOLD_TICKS = 30  # the light stays on long enough to be seen
+LIMIT_HOLD_TICKS = 30  # calls of `show_level`: half a second at 60 Hz
 
 
 class Meter(QWidget):
@@ -32,21 +32,22 @@ class Meter(QWidget):
         return QSize(90, 40)
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
+        """The peak in dBFS, and whether the limiter reduces it now."""
         hold = LIMIT_HOLD_TICKS if limiting else max(0, self._hold - 1)
         peak_db = max(peak_db, LOWEST_DB)
         if (peak_db, hold) == (self._peak_db, self._hold):
             return
         if self._pixels(peak_db) != self._pixels(self._peak_db) or bool(hold) != bool(self._hold):
-            self.update()  # and with it what lies behind
+            self.update()  # only then: it repaints what lies behind as well
         self._peak_db, self._hold = peak_db, hold
 
     def _pixels(self, peak_db: float) -> int:
-        """How long the bar is then, in pixels of the screen."""
+        """The length of the bar at a level, in pixels of the screen."""
         return round((1 - peak_db / LOWEST_DB) * self._bar.width() * self.devicePixelRatioF())
 
     @property
     def _bar(self) -> QRectF:
-        """At 0 dBFS."""
+        """The bar at 0 dBFS."""
         return QRectF(12, 8, self.width() - 68, 9)
 
     @property

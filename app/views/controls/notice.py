@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Notice:
-    """What was told, how often, and when last."""
+    """A message, how often it was shown, and when last."""
 
     message: str
     details: str = ""

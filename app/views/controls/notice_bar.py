@@ -1,4 +1,4 @@
-"""One line for what went wrong and what to do; earlier notices can be recalled."""
+"""A line that shows the latest notice: what went wrong, and what to do. Earlier ones are in a list."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_KEPT = 50
 
 
 class NoticeBar(QFrame):
-    """Hidden until there is something to say. A notice that comes again counts up instead of standing twice."""
+    """Hidden while there is no notice. A notice that is repeated raises its count instead of being listed twice."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -45,34 +45,29 @@ class NoticeBar(QFrame):
 
     @property
     def text(self) -> str:
-        """The notice that stands, or nothing."""
+        """The notice that is shown; "" where none is."""
         return self._notices[-1].message if self._notices and not self.isHidden() else ""
 
     @property
     def notices(self) -> list[Notice]:
-        """Of this run, latest last."""
+        """The notices of this run, the latest last."""
         return list(self._notices)
 
-    @property
-    def kept(self) -> list[tuple[str, str]]:
-        """All notices of this run, latest last: (message, details)."""
-        return [(notice.message, notice.details) for notice in self._notices]
-
     def tell(self, message: str, details: str = "") -> None:
-        """A fault, and what to do about it."""
+        """Shows an error; the message says what to do about it."""
         self._take(Notice(message, details))
 
     def inform(self, message: str, details: str = "") -> None:
-        """Something worth knowing that is no fault."""
+        """Shows a message that is no error."""
         self._take(Notice(message, details, error=False))
 
     def withdraw(self, message: str) -> None:
-        """Takes a notice down that is no longer true; it can still be recalled."""
+        """Hides a notice that is no longer true; it stays in the list."""
         if self.text == message:
             self.hide()
 
     def show_all(self) -> None:
-        """The notices of this run in a list, with what the system said, to copy."""
+        """Opens the list of all notices of this run, with their details."""
         if self._list is None:
             self._list = NoticeList(self.window())
         self._list.set_notices(self.notices)
@@ -98,7 +93,7 @@ class NoticeBar(QFrame):
 
 
 class Bell(QToolButton):
-    """Opens the list; a dot and a number say how many notices have not been looked at there."""
+    """The button that opens the list; a number says how many notices have not been seen there."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -1,21 +1,13 @@
-"""The notices of this run, latest first, each with what the system said, to copy."""
+"""The notices of this run, the latest first, each with its details, to copy."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import (
-    QDialog,
-    QHBoxLayout,
-    QListWidget,
-    QPlainTextEdit,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QListWidget, QVBoxLayout, QWidget
 
+from app.views.controls.parts import copy_and_close, read_only_text
 from app.views.controls.plain import Label
 
 if TYPE_CHECKING:
@@ -23,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class NoticeList(QDialog):
-    """Does not block the window; follows it while open."""
+    """Does not block the window, and shows new notices while it is open."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -34,26 +26,16 @@ class NoticeList(QDialog):
         self._list.setAccessibleName("Notices since the start")
         self._list.setWordWrap(True)
         self._list.currentRowChanged.connect(self._show_details)
-        self._details = QPlainTextEdit(readOnly=True)
-        self._details.setAccessibleName("Details")
-        self._details.setTabChangesFocus(True)
-        copy = QPushButton("Copy all")
-        copy.setToolTip("Copy all notices with their details, for a bug report")
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.report()))
-        close = QPushButton("Close", default=True)
-        close.clicked.connect(self.accept)
-        buttons = QHBoxLayout()
-        buttons.addWidget(copy)
-        buttons.addStretch(1)
-        buttons.addWidget(close)
+        self._details = read_only_text("Details")
         column = QVBoxLayout(self)
         column.addWidget(self._list, 3)
         column.addWidget(Label("Details"))
         column.addWidget(self._details, 2)
-        column.addLayout(buttons)
+        tip = "Copy all notices with their details, for a bug report"
+        column.addLayout(copy_and_close(self, self.report, "Copy all", tip))
 
     def set_notices(self, notices: Sequence[Notice]) -> None:
-        """Latest last, as they were told."""
+        """`notices`: the latest last."""
         self._notices = list(reversed(notices))
         self._list.clear()
         for notice in self._notices:

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.plain import Label
@@ -15,7 +27,7 @@ ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 def tool_button(text: str, name: str = "", tip: str = "") -> QToolButton:
-    """A flat button; `name` is what a screen reader says where the text is a sign."""
+    """A flat button; `name` is what a screen reader says where the text is a symbol."""
     button = QToolButton()
     button.setText(text)
     button.setAccessibleName(name or text)
@@ -24,7 +36,7 @@ def tool_button(text: str, name: str = "", tip: str = "") -> QToolButton:
 
 
 def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object = None) -> QComboBox:
-    """A list of (text, data) with the entry of data `chosen` on top."""
+    """A combo box of (text, data); the entry whose data is `chosen` is selected, else the first."""
     box = QComboBox()
     box.setAccessibleName(name)
     for text, data in entries:
@@ -34,13 +46,14 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
 
 
 def faint(text: str = "") -> QLabel:
+    """One line of text in the faint colour."""
     made = Label(text)
     made.setObjectName("faint")
     return made
 
 
 def words_label() -> ElidedLabel:
-    """A faint line of words that takes the room there is: what it says never moves what is beside it."""
+    """A faint line that takes the room there is and is cut where that is too little."""
     label = ElidedLabel()
     label.setObjectName("faint")
     label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -48,7 +61,7 @@ def words_label() -> ElidedLabel:
 
 
 def keeps_own_keys(event: QEvent) -> bool:
-    """True, and the event accepted, where it asks whether Enter or Esc is the focused widget's own."""
+    """Accepts the override of a shortcut on Enter or Esc, so that the widget gets the key; whether it was one."""
     asks = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
     if asks and event.key() in (*ENTER_KEYS, Qt.Key.Key_Escape):  # type: ignore[attr-defined]
         event.accept()
@@ -57,7 +70,7 @@ def keeps_own_keys(event: QEvent) -> bool:
 
 
 def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, plot: QWidget) -> None:
-    """A row of small controls with what is read off at its end, above a plot that has all other room."""
+    """A row of small controls, with a readout at its end, above a plot that takes all other room."""
     row = QHBoxLayout()
     row.setContentsMargins(4, 2, 4, 0)
     row.setSpacing(8)
@@ -69,6 +82,28 @@ def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, p
     column.setSpacing(0)
     column.addLayout(row)
     column.addWidget(plot, 1)
+
+
+def read_only_text(name: str, text: str = "") -> QPlainTextEdit:
+    """Lines that can be selected; `name` is what a screen reader says."""
+    box = QPlainTextEdit(text, readOnly=True)
+    box.setAccessibleName(name)
+    box.setTabChangesFocus(True)
+    return box
+
+
+def copy_and_close(dialog: QDialog, text: Callable[[], str], word: str, tip: str) -> QHBoxLayout:
+    """The last row of a dialog whose text is for a report: a button `word` that copies it, and Close."""
+    copy = QPushButton(word)
+    copy.setToolTip(tip)
+    copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text()))
+    close = QPushButton("Close", default=True)
+    close.clicked.connect(dialog.accept)
+    buttons = QHBoxLayout()
+    buttons.addWidget(copy)
+    buttons.addStretch(1)
+    buttons.addWidget(close)
+    return buttons
 
 
 def vertical_rule() -> QFrame:

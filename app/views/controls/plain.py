@@ -1,6 +1,6 @@
-"""Labels and tips that show their text as it is: what a file says is never taken for markup.
+"""Labels and tooltips of plain text, for what comes from files.
 
-Qt looks at a text and shows it as HTML where it seems to be some, which loads pictures that it names.
+By default Qt shows a text that looks like HTML as HTML, and loads the pictures that it names.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Label(QLabel):
 
 
 def plain_tip(text: str) -> str:
-    """A tool tip that shows this very text: tips have no format to choose, so what looks like markup is escaped."""
+    """The tooltip that shows this very text: tooltips have no text format, so what looks like markup is escaped."""
     if not GuiQt.mightBeRichText(text):
         return text
     return f"<p style='white-space: pre-wrap'>{escape(text)}</p>"

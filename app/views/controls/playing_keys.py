@@ -1,4 +1,4 @@
-"""Keys that play: a filter before the widget that has the keyboard, so that a list or a button does not take them."""
+"""The computer's keys that play: a filter on the focused widget, so that lists and buttons do not take them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLineEd
 
 from app.playing.keyboard import KeyPress, place_of, semitone_of
 
-LEAVE_MS = 20  # a release is told so much later: X11 repeats a key that is held by releases and presses
-REPEAT_MS = 5  # between these two
+LEAVE_MS = 20  # by which `released` is delayed: X11 repeats a key that is held by releases and presses
+REPEAT_MS = 5  # between such a release and its press, at most
 _WRITING = (QLineEdit, QAbstractSpinBox, QPlainTextEdit, QTextEdit)
 _HELD = (
     Qt.KeyboardModifier.ControlModifier
@@ -20,13 +20,13 @@ _HELD = (
 
 
 class PlayingKeys(QObject):
-    """`pressed` for each letter or digit that nobody writes with. A key that is held down is told once.
+    """Emits `pressed` for letters and digits, once for a key that is held down; not in text fields.
 
-    Keys that are notes come first, whatever has the keyboard; other keys only if nothing else takes them: a knob
-    takes digits. `released` is for keys that were told, also where the window loses the keyboard.
+    Keys that are notes are taken before the focused widget gets them; other keys only where it does not take them (a
+    knob takes digits). Each `pressed` is followed by a `released`, at the latest when the window loses the focus.
 
     Attributes:
-        piano: whether notes are those of a piano's two rows, or the row of places.
+        piano: whether notes are the two rows of a piano, or one row of ten places.
     """
 
     pressed = Signal(object)  # a `KeyPress`
@@ -38,7 +38,7 @@ class PlayingKeys(QObject):
         self._watched: QWidget | None = None
         self.piano = False
         self._down: dict[int, KeyPress] = {}  # by Qt's key, or the platform's code
-        self._leaving: dict[int, int] = {}  # keys that were let go just now, and when, in ms of the platform's clock
+        self._leaving: dict[int, int] = {}  # keys released just now -> when, in ms of the platform's clock
         self._leave = QTimer(self, interval=LEAVE_MS, singleShot=True)
         self._leave.timeout.connect(self._let_go)
         window.installEventFilter(self)
@@ -47,7 +47,7 @@ class PlayingKeys(QObject):
         application.focusChanged.connect(self._watch)
 
     def _watch(self, _: QWidget | None, now: QWidget | None) -> None:
-        """Looks at the keys of the widget that has the keyboard, and of no other: every event passes through here."""
+        """Filters the focused widget alone: every event of a filtered one comes here, which costs time."""
         if self._watched is not None:
             self._watched.removeEventFilter(self)
         self._watched = None
@@ -77,7 +77,7 @@ class PlayingKeys(QObject):
         number = _number(event)
         repeats = number in self._leaving and event.timestamp() - self._leaving[number] <= REPEAT_MS
         if repeats and event.nativeScanCode():
-            del self._leaving[number]  # it repeats by itself, which a busy Qt does not tell
+            del self._leaving[number]  # a repetition, which Qt does not mark as one while it is busy
             event.accept()
             return notes
         if not event.isAutoRepeat():
@@ -88,7 +88,7 @@ class PlayingKeys(QObject):
         return notes
 
     def _let_go(self) -> None:
-        """Keys that have not come back."""
+        """Releases the keys that were not pressed again within LEAVE_MS."""
         leaving, self._leaving = self._leaving, {}
         for number in leaving:
             if (press := self._down.pop(number, None)) is not None:
@@ -108,7 +108,7 @@ def _number(event: QKeyEvent) -> int:
 
 
 def _letter(event: QKeyEvent) -> str:
-    """What is printed on the key; nothing for keys without a sign."""
+    """What is printed on the key; "" for a key without a character."""
     key = event.key()
     return chr(key) if 0x21 <= key < 0x7F else ""
 

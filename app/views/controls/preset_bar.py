@@ -1,4 +1,4 @@
-"""Which preset: previous, next, its name, which opens the browser, and what the preset says of itself.
+"""Which preset: previous, next, its name, which opens the browser, and its facts in a line.
 
 Previous and next go through the browser's list. While that is filtered, a button beside them says so and clears it.
 """
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class PresetBar(QWidget):
-    """See the module."""
+    """`card`, the line of facts, is placed by the window."""
 
     browse_asked = Signal()
     step_asked = Signal(int)
@@ -41,13 +41,13 @@ class PresetBar(QWidget):
         self.filtered.setObjectName("filter")
         self.filtered.clicked.connect(self.all_asked)
         self.filtered.hide()
-        self.card = ElidedLabel()  # placed by the window
+        self.card = ElidedLabel()
         self.card.setObjectName("faint")
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
         row.addWidget(previous)
-        row.addWidget(self.name, 1000)  # all of the room, up to its greatest width
+        row.addWidget(self.name, 1000)  # takes the room first, up to its maximum width
         row.addWidget(following)
         row.addWidget(self.filtered)
         row.addStretch(1)
@@ -63,7 +63,8 @@ class PresetBar(QWidget):
         )
 
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
-        from app.views.dialogs.preset_card import (  # the engine with them: not for the first sight
+        """None: there is no preset."""
+        from app.views.dialogs.preset_card import (  # brings the engine, which the first paint does not wait for
             preset_card,
             preset_summary,
         )

@@ -1,4 +1,4 @@
-"""How far a computation is, in two pixels: a thin line that is there only while something is computed."""
+"""A progress bar two pixels high."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from app.views import theme
 
 
 class ProgressStrip(QWidget):
-    """See the module."""
+    """Empty, but of the same height, while nothing is computed."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)

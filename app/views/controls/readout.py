@@ -1,4 +1,4 @@
-"""What the mouse is over, in words: a faint line that takes the room it is given and never asks for more."""
+"""A faint line that says what the mouse points at; it takes the room it is given and never asks for more."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.views.controls.plain import plain_tip
 
 
 class Readout(ElidedLabel):
-    """Shows the `resting` text while there is nothing to tell."""
+    """Shows the text of `rest` while that of `tell` is empty."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -25,7 +25,7 @@ class Readout(ElidedLabel):
         self.tell(*self._told)
 
     def tell(self, text: str, *shorter: str) -> None:
-        """Nothing: back to the resting text. `shorter` as in `ElidedLabel`."""
+        """What the mouse points at; "" for nothing. `shorter` as in `ElidedLabel.say`."""
         self._told = (text, *shorter)
         wordings = self._told if text else self._resting
         if wordings[0] != self.text():

@@ -1,4 +1,4 @@
-"""A row of small buttons of which one is down: a choice that is seen whole and made with one click."""
+"""A segmented control: a row of small buttons, one of which is checked."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SMALL = "padding: 2px 8px; border-radius: 4px;"
 
 
 class Segments(QWidget):
-    """Choices are known by their keys; the first is down at the start."""
+    """Choices are known by their keys; the first is checked at the start."""
 
     chosen = Signal(str)  # another key, by the user
 
@@ -39,7 +39,7 @@ class Segments(QWidget):
 
     @property
     def key(self) -> str:
-        """The choice that is down."""
+        """The choice that is checked."""
         return self._keys[self._group.checkedId()]
 
     def show_key(self, key: str) -> None:

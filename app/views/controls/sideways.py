@@ -1,4 +1,4 @@
-"""A part that is scrolled sideways where the window is narrower than it."""
+"""A scroll area for a part that may be wider than the window; it scrolls sideways alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Sideways(QScrollArea):
         super().__init__(parent)
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its controls have it, and are scrolled to
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its controls take the focus, and are scrolled to
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.setWidget(part)

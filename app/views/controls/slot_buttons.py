@@ -31,7 +31,7 @@ _SOURCES = (
 
 
 class SlotButtons(QWidget):
-    """A button for each slot, and beside it a menu of what it may hold. Asks with a signal, is shown the choices."""
+    """A button for each slot, which hears it, and beside it a menu of the sources that it may hold."""
 
     change_asked = Signal(str, object)  # a field of `Choices` and its new value
 
@@ -75,7 +75,7 @@ class SlotButtons(QWidget):
         self._show()
 
     def show_gains(self, gains_db: dict[str, float | None]) -> None:
-        """By slot, the gain with which it is heard; None: not known yet."""
+        """By slot, the gain in dB with which it is heard; None: not known yet."""
         if gains_db != self._gains_db:
             self._gains_db = gains_db
             self._show()
@@ -87,10 +87,10 @@ class SlotButtons(QWidget):
             gain = self._gain_text(slot)
             button.setText(self._fitted(slot.upper(), short, gain))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
-            told = f"\nPlayed with {gain or '+0.0'} dB" + (
+            gain_line = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
             )
-            tip = f"Hear {slot.upper()}: {title} (B switches at the playhead)" + (told if gain else "")
+            tip = f"Hear {slot.upper()}: {title} (key B: switch between A and B)" + (gain_line if gain else "")
             button.setToolTip(plain_tip(tip))
             kind = theme.source_kind(source)
             if button.objectName() != kind:
@@ -101,7 +101,7 @@ class SlotButtons(QWidget):
                 button.setChecked(self._choices.heard == slot)
 
     def _title(self, source: str) -> tuple[str, str]:
-        """In full, and as short as a button needs it."""
+        """In full, and as a button shows it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
                 return entry.title, entry.title
@@ -109,7 +109,7 @@ class SlotButtons(QWidget):
         return name, "DIFF." if source == "difference" else name.upper()
 
     def _fitted(self, letter: str, text: str, gain: str) -> str:
-        """What a button has room for: where it is little, the gain without its unit, then the text cut."""
+        """The text that fits a button: where room is short, the gain loses its unit, then `text` is cut."""
         metrics = QFontMetrics(theme.small_font(12, bold=True))
         room = self._width - PADDING
         for beside in (gain, gain.removesuffix(" dB")):
@@ -147,7 +147,7 @@ class SlotButtons(QWidget):
         for entry in self._entries:
             source = f"preset:{entry.name}"
             action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
-            told = f"Its model for the same pluck, from {entry.info.rate_hz} Hz"
+            told = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
             action.setToolTip(plain_tip(f"{told}\n{entry.path.name}"))
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)

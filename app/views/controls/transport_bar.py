@@ -1,4 +1,4 @@
-"""The controls beneath: play, loop, the slots A and B, pluck, listening points, slow motion, volume and export."""
+"""The transport bar: play, loop, the slots A and B, pluck, listening points, slow motion, volume and export."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from engine.pluck import (
     WIDTH_RANGE,
 )
 
-SHAPE_WIDTH = 106  # of the longest name, with
+SHAPE_WIDTH = 106  # pixels: the longest name, with the padding of TIGHT
 TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
 _SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
 
@@ -47,7 +47,7 @@ KNOBS = {  # field of `Choices` -> (label, range, tip)
     "width": (
         "width",
         KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", logarithmic=True),
-        "Width of the pluck, in lengths of the string",
+        "Width of the pluck as a share of the string's length",
     ),
     "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Listening point on the string"),
     "listen_right": (
@@ -70,7 +70,7 @@ KNOBS = {  # field of `Choices` -> (label, range, tip)
 
 
 class TransportBar(QFrame):
-    """Asks with signals, shows with `show_choices`."""
+    """Gestures emit signals and change nothing; `show_choices` shows what became of them."""
 
     play_asked = Signal()
     export_asked = Signal()
@@ -84,7 +84,7 @@ class TransportBar(QFrame):
             knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
         self.meter = Meter()
         self._compact = False
-        self._playing: bool | None = None  # as shown; None where a click has checked the button by itself
+        self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
         row.setSpacing(5)
@@ -132,7 +132,7 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
-        self.knobs["listen_right"].setEnabled(choices.stereo)  # hidden, it would move all that is beside it
+        self.knobs["listen_right"].setEnabled(choices.stereo)  # not hidden, which would move the controls beside it
         with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
             self._stereo.setChecked(choices.stereo)
             self._velocity.setChecked(choices.pickup == "velocity")
@@ -165,7 +165,9 @@ class TransportBar(QFrame):
         return column
 
     def _build_pickup(self) -> QVBoxLayout:
-        self._stereo = tool_button("Stereo", "Stereo", "Two listening points: “listen” for the left ear, “right”")
+        self._stereo = tool_button(
+            "Stereo", "Stereo", "Two listening points: “listen” for the left channel, “right” for the right"
+        )
         self._stereo.setCheckable(True)
         self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
         self._velocity = tool_button(

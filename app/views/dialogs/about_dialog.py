@@ -1,10 +1,10 @@
-"""About: version, licence, the paper, where things lie; all of it to copy for a report."""
+"""About: version, licence, the paper, the files and folders; all of it to copy for a bug report."""
 
 from __future__ import annotations
 
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QVBoxLayout, QWidget
 
+from app.views.controls.parts import copy_and_close, read_only_text
 from app.views.controls.plain import Label
 
 
@@ -18,19 +18,7 @@ class AboutDialog(QDialog):
         self.resize(620, 460)
         heading = Label(title)
         heading.setObjectName("title")
-        body = QPlainTextEdit(rest.strip(), readOnly=True)
-        body.setAccessibleName("About this program")
-        body.setTabChangesFocus(True)
-        copy = QPushButton("Copy")
-        copy.setToolTip("Copy this text, for a bug report")
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text))
-        close = QPushButton("Close", default=True)
-        close.clicked.connect(self.accept)
-        buttons = QHBoxLayout()
-        buttons.addWidget(copy)
-        buttons.addStretch(1)
-        buttons.addWidget(close)
         column = QVBoxLayout(self)
         column.addWidget(heading)
-        column.addWidget(body)
-        column.addLayout(buttons)
+        column.addWidget(read_only_text("About this program", rest.strip()))
+        column.addLayout(copy_and_close(self, lambda: text, "Copy", "Copy this text, for a bug report"))

@@ -1,7 +1,7 @@
 """The listening test in a dialog: set up, trial by trial, the result, earlier records.
 
-While it is open the sound belongs to it, and nothing else may show what it plays: level, limiter and source
-would give X away.
+While it is open nothing else plays, and the window must not show what it plays: level, limiter and source would
+give X away.
 """
 
 from __future__ import annotations
@@ -38,17 +38,18 @@ NO_DEVICE = "No audio output: connect one, or choose another in the audio settin
 SAME = "A and B are identical, sample by sample: there is nothing to compare."
 TRIVIAL = (
     "A and B differ so much here that anyone hears it at once: the test would say little. "
-    "Choose a pluck that the model knows, or a better preset."
+    "Choose a pluck within the model's training, or a better preset."
 )
 DEVICE_CHANGED = "The sound device changed during the test."
 CLOSED = "The window was closed during the test."
 
 
 class AbxDialog(QDialog):
-    """See the module.
+    """The pages, the sound and the record of the test.
 
     Args:
-        render: starts the rendering of model and truth of the pluck at a rate, and gives what will hold the samples.
+        render: starts to render model and truth of the pluck at a rate in Hz; gives the future of their samples,
+            (frames, channels), by source.
         seed: draws a seed for each test.
     """
 
@@ -94,6 +95,7 @@ class AbxDialog(QDialog):
 
     @property
     def testing(self) -> bool:
+        """Whether a test is under way."""
         return self._run is not None
 
     def choices(self) -> AbxChoices:
@@ -127,12 +129,12 @@ class AbxDialog(QDialog):
     # Sound
 
     def _ask_for_sound(self) -> None:
-        """At the rate of the device as it is now."""
+        """Starts the rendering, at the present rate of the device."""
         self._rate_hz = self._output.rate_hz
         self._rendering = self._render(self._rate_hz)
 
     def _prepare(self) -> None:
-        """Makes A and B, where the pluck is rendered."""
+        """Makes A and B, if the pluck has been rendered."""
         self._hush()
         self._stimuli = self._pair = None
         self._silence = RENDERING
@@ -201,7 +203,7 @@ class AbxDialog(QDialog):
             self._begin_trial()
 
     def _end(self, remark: str = "") -> None:
-        """Records the run, whole or not; a test without an answer leaves no record."""
+        """Records the run, complete or not; one without an answer is not recorded."""
         run, self._run = self._run, None
         self._hush()
         assert run is not None

@@ -21,11 +21,11 @@ from app.analysis.abx.record import AbxRecord, list_records
 from app.analysis.abx.text import as_text, score_text
 from app.shared.whole_file import WriteError, whole_file
 from app.views import theme
-from app.views.controls.parts import label
+from app.views.controls.parts import label, read_only_text
 
 
 class RecordsPage(QWidget):
-    """`show_folder` reads it anew."""
+    """Shows the records of the folder that `show_folder` reads."""
 
     back_asked = Signal()
 
@@ -37,9 +37,7 @@ class RecordsPage(QWidget):
         self._list.setStyleSheet(f"QListWidget::item:selected {{ background: {theme.LINE}; color: {theme.TEXT}; }}")
         self._list.setAccessibleName("Earlier listening tests")
         self._list.currentRowChanged.connect(self._show_row)
-        self._text = QPlainTextEdit(readOnly=True)
-        self._text.setAccessibleName("The record")
-        self._text.setTabChangesFocus(True)
+        self._text = read_only_text("The record")
         self._text.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
         self._text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self._state = label("faint", selectable=True)
@@ -64,6 +62,7 @@ class RecordsPage(QWidget):
         column.addLayout(buttons)
 
     def show_folder(self, folder: Path) -> None:
+        """Reads and lists the records of a folder; says which files cannot be read."""
         self._records, problems = list_records(folder)
         self._list.clear()
         for _, record in self._records:

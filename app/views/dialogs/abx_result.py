@@ -62,6 +62,7 @@ class ResultPage(QWidget):
         self._close.setFocus()
 
     def show_saved(self, text: str, failed: bool) -> None:
+        """Where the record was saved; or why it was not, with a button to save it elsewhere."""
         self._saved.setObjectName("warning" if failed else "faint")
         self._saved.style().polish(self._saved)
         self._saved.setText(text)

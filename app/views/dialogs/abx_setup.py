@@ -34,7 +34,7 @@ class SetupPage(QWidget):
     """Asks with signals; `show_state` says whether the test can start."""
 
     start_asked = Signal()
-    audition_asked = Signal(str)  # "A" or "B", to get to know them
+    audition_asked = Signal(str)  # "A" or "B"
     pair_changed = Signal()
     records_asked = Signal()
     close_asked = Signal()
@@ -87,7 +87,7 @@ class SetupPage(QWidget):
         return self._restart.isChecked()
 
     def show_state(self, obstacle: str, advice: str) -> None:
-        """Why the test cannot start, or else what should be known before."""
+        """`obstacle`: why the test cannot start, or ""; `advice`: what to know before it does, or ""."""
         self.start.setEnabled(not obstacle)
         for listen in self._listen:
             listen.setEnabled(not obstacle)
@@ -151,7 +151,7 @@ class SetupPage(QWidget):
         row = QHBoxLayout()
         row.setSpacing(8)
         self._usual = QButtonGroup(self)
-        self._usual.setExclusive(False)  # with any other number none is chosen
+        self._usual.setExclusive(False)  # for any other number none is checked
         for trials in USUAL_TRIALS:
             button = tool_button(str(trials), f"{trials} trials", f"A test of {trials} trials")
             button.setCheckable(True)
@@ -188,7 +188,7 @@ class SetupPage(QWidget):
 
 
 def _row_name(text: str) -> QLabel:
-    """As high as the row's buttons, so that both stand on one line."""
+    """As high as the buttons of its row, so that it is level with them."""
     made = Label(text)
     made.setMinimumHeight(ROW_HEIGHT)
     return made

@@ -1,4 +1,4 @@
-"""A trial of the listening test, played by keys. Nothing here may depend on who hides behind X."""
+"""A trial of the listening test, with keys for everything. Nothing here may depend on whether X is A or B."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
 
 
 class TrialPage(QWidget):
-    """Its keys work while it is shown: the page itself has the keyboard, not its buttons, for Space begins again."""
+    """The page itself has the focus, not its buttons, so that its keys always work: Space would press a button."""
 
     audition_asked = Signal(str)  # "A", "B" or "X"
     replay_asked = Signal()
@@ -30,7 +30,7 @@ class TrialPage(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Trial")
         self.setAccessibleDescription(
-            "A, B and X: hear them. 1 or left: X is A. 2 or right: X is B. Space: begin again. Escape: stop the test."
+            "A, B and X: hear them. 1 or left: X is A. 2 or right: X is B. Space: replay. Escape: stop the test."
         )
         self._number = Label(alignment=Qt.AlignmentFlag.AlignCenter)
         self._number.setStyleSheet("font-size: 20px; font-weight: 600;")
@@ -80,7 +80,7 @@ class TrialPage(QWidget):
         self.show_sounding(None, x_heard=False)
 
     def show_sounding(self, sound: str | None, x_heard: bool) -> None:
-        """Which key sounds, by its own name, and whether X may be judged."""
+        """Which of "A", "B" and "X" sounds (None: none), and whether X was heard, so that it can be answered."""
         for name, button in self._sounds.items():
             button.setChecked(name == sound)
         for button in self._answers.values():
@@ -88,7 +88,7 @@ class TrialPage(QWidget):
         self._hint.setText(SAY if x_heard else HEAR)
 
     def _answer(self, name: str) -> None:
-        self._answers[name].click()  # a button that is disabled does not answer
+        self._answers[name].click()  # does nothing where the button is disabled
 
     def _build_sound(self, name: str) -> QPushButton:
         button = QPushButton(f"{name}\n?")
@@ -118,7 +118,7 @@ class TrialPage(QWidget):
         stop.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         stop.setToolTip("An unfinished test is recorded as incomplete and gives no p-value (Esc)")
         stop.clicked.connect(self.stop_asked)
-        keys = label("faint", "A  B  X  hear   ·   Space  begin again   ·   1 or ←  X is A   ·   2 or →  X is B")
+        keys = label("faint", "A  B  X  hear   ·   Space  replay   ·   1 or ←  X is A   ·   2 or →  X is B")
         keys.setAlignment(Qt.AlignmentFlag.AlignCenter)
         foot = QHBoxLayout()
         foot.addStretch(1)

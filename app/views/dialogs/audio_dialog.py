@@ -1,6 +1,6 @@
-"""The audio settings: where the sound goes, at which rate, how much is kept ahead; a test tone; what goes wrong.
+"""The audio settings: output, sample rate, buffer; a test tone, dropouts and load.
 
-Every choice counts at once. The dialog does not block the window: crackles can be cured while a string sounds.
+Every choice takes effect at once. The dialog does not block the window: a buffer can be tried while a string sounds.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ ADVICE = (
 class AudioState:
     """What the dialog says of the present output."""
 
-    playing_on: str  # a device with its host API, or nothing
+    playing_on: str  # a device with its host API; "": none
     facts: str  # its rate, its buffer, and the latency that was measured
     problem: str
-    gaps: tuple[str, ...]  # silences that nobody asked for: when and why
-    load: float  # share of the device's time that the mixer takes
+    gaps: tuple[str, ...]  # dropouts: when and why, the latest last
+    load: float  # processor time of the mixer as a share of the time that it renders
 
 
 class AudioDialog(QDialog):
-    """Asks with signals, shows with `show_…`."""
+    """Gestures emit signals; `show_…` shows what became of them."""
 
     choice_made = Signal(object, object)  # DeviceChoice or None, SoundChoice
     rescan_asked = Signal()
@@ -85,12 +85,14 @@ class AudioDialog(QDialog):
         self._gaps = Label("0")
         self._gaps.setMinimumWidth(40)
         self._load = Label("0 %")
-        self._load.setToolTip("Share of the sound device's time that the voices take")
+        self._load.setToolTip(
+            "Processor time of the sound as a share of the time it plays: near 100 % there are dropouts"
+        )
         self._lay_out()
 
     @property
     def device(self) -> DeviceChoice | None:
-        """As chosen in the list."""
+        """As chosen in the list; None: the system's default."""
         key = self._device.currentData()
         return DeviceChoice(name=key[0], host_api=key[1]) if key else None
 
@@ -99,7 +101,7 @@ class AudioDialog(QDialog):
         return SoundChoice(rate_hz=self._rate.currentData(), buffer=self._buffer.currentData())
 
     def show_devices(self, devices: Sequence[DeviceChoice], chosen: DeviceChoice | None) -> None:
-        """The outputs that are there; the chosen one is listed also when it is not."""
+        """The connected outputs; the chosen one is listed even where it is not connected."""
         keys = [(device.name, device.host_api) for device in devices]
         wanted = (chosen.name, chosen.host_api) if chosen else None
         with QSignalBlocker(self._device):
@@ -122,9 +124,7 @@ class AudioDialog(QDialog):
         _set(self._problem_label, state.problem)
         latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
         _set(self._gaps, f"{len(state.gaps)}{latest}")
-        tip = "Dropouts: silences while a voice should have sounded, whatever their cause\n" + "\n".join(
-            state.gaps[-12:]
-        )
+        tip = "\n".join(["Silences while a string should have sounded", *state.gaps[-12:]])
         if self._gaps.toolTip() != tip:
             self._gaps.setToolTip(tip)
         _set(self._load, f"{100 * state.load:.0f} %")
@@ -147,7 +147,7 @@ class AudioDialog(QDialog):
         ]
         for button, side in zip(self._tones, ("left", "both", "right"), strict=True):
             button.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
-        reset = _button("Reset", "Count gaps from zero", self.gaps_reset)
+        reset = _button("Reset", "Count dropouts from zero", self.gaps_reset)
         advice = Label(ADVICE)
         advice.setObjectName("faint")
         advice.setWordWrap(True)
@@ -158,7 +158,7 @@ class AudioDialog(QDialog):
         form.addRow("Sample rate", self._rate)
         form.addRow("Buffer", self._buffer)
         form.addRow("Test tone", _row(*self._tones, None))
-        form.addRow("Gaps", _row(self._gaps, reset, None))
+        form.addRow("Dropouts", _row(self._gaps, reset, None))
         form.addRow("Load", self._load)
         close = _button("Close", "Close; changes are already applied")
         close.setDefault(True)

@@ -1,8 +1,7 @@
-"""What is chosen, as WAV files: the same for the export dialog and for what is dragged out of the window."""
+"""The chosen pluck as WAV files: for the export dialog, and for files dragged out of the window."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -15,14 +14,12 @@ from engine.presets import load_preset, of_string
 
 
 def string_word(choices: Choices) -> str:
-    """Which string of many is plucked, by the frequency of its first mode; "" for the preset's own."""
-    if choices.string is None:
-        return ""
-    return f"{choices.string.parameters.undamped_frequency(1) / math.tau:.1f} Hz"
+    """The string that is plucked by a preset of many, as the frequency of its first mode; "" for the preset's own."""
+    return "" if choices.string is None else f"{choices.string.first_hz:.1f} Hz"
 
 
 def suggested_name(preset: PresetEntry, choices: Choices, rate_hz: int, source: Source) -> str:
-    """Of a file, after what is in it."""
+    """A file name that names preset, string, pluck, rate and source."""
     string = string_word(choices).replace(" ", "")
     name = f"{preset.name}_{string}" if string else preset.name
     return default_file_name(name, choices.pluck, rate_hz or preset.info.rate_hz, source)
@@ -36,7 +33,12 @@ def export_chosen(
     progress: Callable[[float], None],
     cancelled: Callable[[], bool],
 ) -> list[WavReport]:
-    """Renders the pluck of a string once, and writes a file for each source.
+    """Renders the pluck of a string once, and writes a file for each source. Any thread.
+
+    Args:
+        paths: the files to write, by source.
+        progress: is called with the share done, 0 … 1.
+        cancelled: whether to stop; asked now and then.
 
     Raises:
         PresetError: the preset cannot be used, or cannot play the string that is chosen.

@@ -1,4 +1,4 @@
-"""A piece of export in a thread of its own, with progress, time left and cancelling, told in the window's thread."""
+"""An export in a thread of its own, with progress, time left and cancelling."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from engine.presets import PresetError
 from engine.sources import Runaway
 
 Tell = Callable[..., None]  # share, what is done, seconds left (None: not known; left out: by share)
-Work = Callable[[Tell, Callable[[], bool]], object]  # is given `Tell` and whether it is cancelled
+Work = Callable[[Tell, Callable[[], bool]], object]  # is given `Tell`, and what says whether it is cancelled
 TELL_EVERY_S = 0.05
-BY_SHARE = -1.0  # seconds left: as long a share as it took until now
+BY_SHARE = -1.0  # seconds left: estimated from the share done and the time spent
 
 
 class ExportJob(QObject):
-    """See the module. One of the last three signals ends it."""
+    """Does `work` once. Its signals arrive in the window's thread; exactly one of the last three ends it."""
 
-    progressed = Signal(float, str, object)
+    progressed = Signal(float, str, object)  # share 0 … 1, what is being done, seconds left or None
     finished = Signal(object)  # what the work returned
-    failed = Signal(str)
+    failed = Signal(str)  # why, for the user
     cancelled = Signal()
 
     def __init__(self, work: Work) -> None:
@@ -40,9 +40,11 @@ class ExportJob(QObject):
         self._thread.start()
 
     def cancel(self) -> None:
+        """Asks the work to stop; returns at once."""
         self._stop.set()
 
     def wait(self) -> None:
+        """Returns when the thread has ended."""
         self._thread.join()
 
     def _tell(self, share: float, text: str = "", left_s: float | None = BY_SHARE) -> None:

@@ -43,10 +43,10 @@ SOURCE_NAMES = (
 def as_heard(
     entries: Sequence[PresetEntry], choices: Choices, export: ExportChoices
 ) -> tuple[Choices, ExportChoices]:
-    """Both with what the heard slot holds as the sound to save.
+    """Both choices, with the source that is heard as the one to save.
 
-    Model and truth together, where they were saved last, stay if one of them is heard. Another preset in the slot
-    is the preset whose model is saved.
+    Where model and truth were saved together last and one of them is heard, both are saved again. Where the heard
+    slot holds another preset, that preset's model is saved.
     """
     source = choices.source_heard
     if name := other_preset(source):
@@ -204,7 +204,7 @@ class BatchPage(QWidget):
         )
 
     def plan(self, export: ExportChoices) -> BatchPlan:
-        """What is asked for. Raises ValueError: a list is not one; the message names it."""
+        """The batch as chosen. Raises ValueError: positions or amplitudes are no numbers; the message names them."""
         choices = self._choices
         return BatchPlan(
             tuple(entry.path for entry in self._checked()),
@@ -225,7 +225,7 @@ class BatchPage(QWidget):
         )
 
     def _strings(self) -> tuple[NamedString, ...]:
-        """The one that is chosen, where every preset of the batch can play it; else they play their own."""
+        """The chosen string, where every preset of the batch can play it; else none: presets play their own."""
         string = self._choices.string
         if string is None or any(entry.info.family is None for entry in self._checked()):
             return ()

@@ -1,48 +1,36 @@
-"""What nobody expected, once: what happened, where it is written down, all of it to copy for a report."""
+"""The dialog of unexpected errors: what happened and where the log is, to copy for a bug report."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QVBoxLayout, QWidget
 
-from app.views.controls.parts import label
+from app.views.controls.parts import copy_and_close, label, read_only_text
 
 MOST_CHARACTERS = 100_000
 
 
 class FaultDialog(QDialog):
-    """Stays one: further faults are added to the same text."""
+    """There is one for all errors: further ones are added to its text."""
 
     def __init__(self, log: Path, heading: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("Something went wrong")
         self.resize(680, 420)
         words = label(text=f"{heading}\n\nPlease copy this and report it. It is also in {log}.", selectable=True)
-        self._text = QPlainTextEdit(readOnly=True)
-        self._text.setAccessibleName("What happened")
-        self._text.setTabChangesFocus(True)
-        copy = QPushButton("Copy")
-        copy.setToolTip("Copy all of this, for a report")
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.text))
-        close = QPushButton("Close", default=True)
-        close.clicked.connect(self.accept)
-        buttons = QHBoxLayout()
-        buttons.addWidget(copy)
-        buttons.addStretch(1)
-        buttons.addWidget(close)
+        self._text = read_only_text("What happened")
         column = QVBoxLayout(self)
         column.addWidget(words)
         column.addWidget(self._text)
-        column.addLayout(buttons)
+        column.addLayout(copy_and_close(self, lambda: self.text, "Copy", "Copy all of this, for a bug report"))
 
     @property
     def text(self) -> str:
         return self._text.toPlainText()
 
     def add(self, fault: str) -> None:
-        """One that is there already changes nothing: it may come with every picture."""
+        """Adds an error and shows the dialog. One that is there already is ignored: it may come with every frame."""
         if fault.strip() in self.text or len(self.text) > MOST_CHARACTERS:
             return
         self._text.appendPlainText(fault)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QTabWidget, QTextBrowser, QVBoxLayout, QWidget
 
-from app.views.dialogs.help_text import FAULTS, GESTURES, MODELS, TOUR
+from app.views.dialogs.help_text import ERRORS, GESTURES, MODELS, TOUR
 
 Pairs = Iterable[tuple[str, str]]
 
@@ -19,7 +19,7 @@ class HelpDialog(QDialog):
     Args:
         keys: (key, what it does).
         views: (title, what it shows).
-        log: the file that faults are written to.
+        log: the file that errors are written to.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class HelpDialog(QDialog):
             "<p>Every model is given the initial displacement of the string and computes the motion that follows.</p>"
             + _sections(MODELS),
         )
-        self._add("Faults", "<h3>When something goes wrong</h3>" + _paragraphs(FAULTS) + _path(log))
+        self._add("Errors", "<h3>When something goes wrong</h3>" + _paragraphs(ERRORS) + _path(log))
         close = QPushButton("Close", default=True)
         close.clicked.connect(self.accept)
         buttons = QHBoxLayout()

@@ -10,8 +10,8 @@ TOUR = (
     ),
     (
         "Choose an instrument",
-        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs turn stiffness, "
-        "gauge, damping and pluck while it rings; Record keeps what you play; a dropped MIDI file is played.",
+        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change stiffness, "
+        "gauge, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is played.",
     ),
     (
         "Pluck",
@@ -85,23 +85,24 @@ MODELS = (
         "nonlinearity is in these two maps.",
     ),
     (
-        "Koopman_var",
-        "The paper's variant: encoder and decoder are linear, and a network multiplies the latents by a factor "
+        "Koopman, variable",
+        "The paper's Koopman_var: encoder and decoder are linear, and a network multiplies the latents by a factor "
         "that depends on their present energies. It bends amplitude and phase within the motion it was trained "
         "on; a pitch that glides needs an accumulated phase, which the present energies alone do not hold.",
     ),
     (
-        "Integrated phase",
+        "Koopman, integrated phase",
         "Koopman with eigenvalues that follow the decaying energies of the modes and are integrated over time, "
         "as the tension of a real string makes its partials glide. The gain is bounded and every latent decays "
         "for any weights, and a quiet string is the linear one. Any moment can be computed directly, at any "
         "sample rate.",
     ),
     (
-        "Shared tension",
+        "Koopman, shared tension",
         "One model for every string. Each latent is a mode of the linear string; many times a period, the "
-        "tension that all of them add turns them together. Three learned curves mend what such steps get wrong, "
-        "the same for all modes of all strings: pitch, stiffness, damping and tension are inputs. Bounded and "
+        "phases of all are advanced by the tension that all of them add. Three learned curves, the same for all "
+        "modes of all strings, correct the error of such steps: pitch, stiffness, damping and tension are inputs. "
+        "Bounded and "
         "decaying for any weights, at any sample rate.",
     ),
     (
@@ -117,24 +118,24 @@ MODELS = (
         "trained model may grow; playback is limited, and an unbounded output is muted with a notice.",
     ),
     (
-        "FGRU",
-        "A gated recurrent cell whose state is a field along the string. Its gates are Fourier convolutions, "
+        "Fourier GRU",
+        "FGRU: a gated recurrent cell whose state is a field along the string. Its gates are Fourier convolutions, "
         "which mix low spatial frequencies over the whole length; the gates decide how much of the field is kept "
         "at every step.",
     ),
     (
-        "FRNN",
-        "The same Fourier convolutions in a plain recurrent cell without gates, several layers a step. Each step "
-        "adds a map of every point to the convolution; small errors feed on through the recurrence, and may hum on "
-        "softly, some 60 dB below full scale, where the string has long been silent.",
+        "Fourier RNN",
+        "FRNN: the same Fourier convolutions in a plain recurrent cell without gates, several layers a step. Each "
+        "step adds a map of every point to the convolution; small errors feed back through the recurrence and may "
+        "leave a soft hum, some 60 dB below full scale, after the string has died away.",
     ),
 )
 
-FAULTS = (
-    "What nobody expected is shown in one dialog, whose text can be copied into a report. The window goes on where "
-    "it can; what was chosen is kept.",
-    "The same text is in the log, with the version and the system; where compiled code ended the program, a file "
-    "beside it that ends in .crash tells where each thread was. Please send both. The log is here:",
+ERRORS = (
+    "An unexpected error is shown in a dialog, whose text can be copied into a bug report. The program goes on where "
+    "it can; your settings are kept.",
+    "The same text is in the log, with the version and the system. If the program crashed, a file beside the log "
+    "that ends in .crash says where each thread was. Please send both. The log is here:",
 )
 
 CITATION = (

@@ -28,10 +28,10 @@ BENDS = (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 12.0, 24.0, 48.0)  # semitones
 
 
 class MidiDialog(QDialog):
-    """Asks with signals, shows with methods.
+    """Gestures emit signals; `show_…` shows what became of them.
 
     Args:
-        turned: names of what a controller can turn, by field of `Choices`.
+        turned: the names of what a controller can turn, by field of `Choices`.
         wheel: names of what the modulation wheel can turn, by field of a patch.
     """
 
@@ -74,7 +74,7 @@ class MidiDialog(QDialog):
             ("Modulation wheel", self._wheel),
         ):
             label = Label(name)
-            label.setMinimumHeight(box.sizeHint().height())  # else it stands higher than its box
+            label.setMinimumHeight(box.sizeHint().height())  # so that it is level with its box
             form.addRow(label, box)
         column = QVBoxLayout(self)
         column.setContentsMargins(18, 16, 18, 16)
@@ -111,7 +111,7 @@ class MidiDialog(QDialog):
         return grid
 
     def show_inputs(self, names: list[str], open_name: str, problem: str) -> None:
-        """The inputs that there are, and the one that is open; or why there are none."""
+        """The inputs that are connected, and the one that is open; `problem`: why there are none."""
         with QSignalBlocker(self._inputs):
             self._inputs.clear()
             self._inputs.addItem("None" if names else "No MIDI input found", "")
@@ -134,7 +134,7 @@ class MidiDialog(QDialog):
             box.setEnabled(turnable)
 
     def set_learnable(self, why_not: str) -> None:
-        """Whether controllers can be taught; where not, why, with the remedy."""
+        """`why_not`: why no controller can be assigned, with the remedy; "" where one can."""
         for field, (_, learn, _) in self._rows.items():
             learn.setEnabled(not why_not)
             learn.setToolTip(why_not or f"Click, then move a control to assign it to {self._turned[field]}")
@@ -144,7 +144,7 @@ class MidiDialog(QDialog):
         self._problem.setVisible(bool(text))
 
     def show_choices(self, notes: str, controllers: Mapping[str, int], learning: str | None) -> None:
-        """What notes do, the controllers by field, and the field that waits for one."""
+        """What notes do, the numbers of controllers by field, and the field that waits for one."""
         self._notes.setCurrentIndex(max(0, self._notes.findData(notes)))
         for field, (taught, learn, forget) in self._rows.items():
             waits, number = field == learning, controllers.get(field)

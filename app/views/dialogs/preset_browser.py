@@ -1,9 +1,9 @@
-"""The preset browser: a search, a list under two headings (studio, research) and a card. It stays open meanwhile.
+"""The preset browser: a search, a list under two headings (studio, research) and a card. It stays open while in use.
 
 type              filters the list (words in any order)
 arrows            move in the list and load
-Space             plucks; in a search that has begun it is a blank
-Ctrl+D            makes a favourite, or no longer
+Space             plucks; while text is typed in the search it is a space
+Ctrl+D            adds to the favourites, or removes
 Enter, Escape     close
 """
 
@@ -47,12 +47,12 @@ class PresetBrowser(Browser):
 
     filter_changed = Signal(object)  # PresetFilter
     preset_chosen = Signal(str)
-    favourite_asked = Signal(str)  # to be one, or no longer
+    favourite_asked = Signal(str)  # add or remove
     pluck_asked = Signal()
     folder_asked = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("preset", "Words in any order, separated by spaces or commas", parent)
+        super().__init__("presets", "Words in any order, separated by spaces or commas", parent)
         self._entries: Sequence[PresetEntry] = ()
         self._rows: MutableSequence[QTreeWidgetItem] = []  # of the entries, without the headings
         self.search.textChanged.connect(self._tell_filter)
@@ -112,7 +112,7 @@ class PresetBrowser(Browser):
         close.clicked.connect(self.dismiss)
         folder = tool_button(
             "Open folder",
-            tip="Show your presets' folder; a preset file dropped on the window is copied to it",
+            tip="Show the folder of your presets; a preset file dropped on the window is copied there",
         )
         folder.clicked.connect(self.folder_asked)
         head = QHBoxLayout()
@@ -161,7 +161,7 @@ class PresetBrowser(Browser):
     def show_entries(
         self, entries: Sequence[PresetEntry], favourites: Collection[str], chosen: str, total: int, folder: str
     ) -> None:
-        """The presets that passed the filter, of `total`; `folder` is where the user's own lie."""
+        """The presets that pass the filter, of `total`; `folder`: of the user's own."""
         self._entries = entries
         with QSignalBlocker(self.list):
             self.list.clear()
@@ -196,6 +196,7 @@ class PresetBrowser(Browser):
         return heading
 
     def set_chosen(self, name: str) -> None:
+        """Marks a preset in the list, if it is listed, and shows its card."""
         row = self._row_of(name)
         with QSignalBlocker(self.list):
             self._mark(row)  # none where it was filtered out
@@ -217,7 +218,7 @@ class PresetBrowser(Browser):
         return bool(self._entries)
 
     def clear_filter(self) -> None:
-        """All presets are listed again; told once."""
+        """Lists all presets again; emits `filter_changed` once."""
         boxes = (self._strings, self._models, self._rates)
         for widget in (self.search, *boxes, self._starred):
             widget.blockSignals(True)
@@ -279,7 +280,7 @@ class PresetBrowser(Browser):
         self._mark(min(max(row, 0), rows - 1))
 
     def place(self) -> None:
-        """Under the bar of the presets; what moves the string and the sound stays in sight."""
+        """Under the preset bar; the transport bar stays visible where the window is high enough."""
         parent = self.parentWidget()
         if parent is not None:
             top = 52
@@ -293,7 +294,7 @@ def _name_of(item: QTreeWidgetItem | None) -> str:
 
 
 def _tip(*lines: str) -> str:
-    """Of plain text: what a file says is never taken for markup."""
+    """A tooltip of plain text, which may come from a file."""
     return f"<p>{'<br>'.join(map(escape, lines))}</p>"
 
 

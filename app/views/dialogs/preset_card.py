@@ -63,12 +63,14 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
         ("String", f"{string_word(info.tension_modulated)}, {info.string.length_m:g} m, {info.modes} partials"),
         ("Model", model_word(info.model) + (f": {meaning}" if meaning else "")),
         ("Size", f"{entry.parameters:,} parameters, {size_word(entry.size_bytes)}"),
-        ("Rate", f"{rate_word(info.rate_hz)}: nothing above {rate_word(info.rate_hz // 2)}"),
+        ("Rate", f"{rate_word(info.rate_hz)}: no sound above {rate_word(info.rate_hz // 2)}"),
         ("Trained on", f"the first {info.horizon_s:g} s ({initial_word(info.initial)}); past that it extrapolates"),
     ]
     audible = info.string.modes_below(info.rate_hz / 2)
     if audible < info.modes:
-        facts.append(("Folded", f"partials {audible + 1} … {info.modes} lie above half the rate, in model and truth"))
+        facts.append(
+            ("Aliased", f"partials {audible + 1} … {info.modes} lie above half the rate, in model and truth")
+        )
     if info.rel_mae is not None:
         test = "" if info.test_rel_mae is None else f", on the test set {100 * info.test_rel_mae:.2g} %"
         facts.append(("Error", f"{100 * info.rel_mae:.2g} % of the motion in validation{test}"))
@@ -77,7 +79,7 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
     if info.training_seconds is not None:
         facts.append(("Trained in", time_word(info.training_seconds)))
     if _can_be_remade(entry.name):
-        facts.append(("To remake", f"learned-strings train {entry.name}"))
+        facts.append(("To train it", f"learned-strings train {entry.name}"))
     facts += [("Licence", info.licence), ("File", f"{entry.name}, {_place(entry)}")]
     return facts
 

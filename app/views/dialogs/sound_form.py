@@ -18,7 +18,7 @@ LABEL_WIDTH = 104
 
 
 class SoundForm(QWidget):
-    """Tells each change; `choices` has the state."""
+    """Emits `changed` at each change; `choices` gives the state."""
 
     changed = Signal()
 
@@ -26,7 +26,7 @@ class SoundForm(QWidget):
         super().__init__(parent)
         self._preset_rate_hz = preset_rate_hz
         self.length = combo_box("Length", [("Until it has decayed", True), ("Fixed", False)], export.until_decayed)
-        self.length.setToolTip("Until it has decayed")
+        self.length.setToolTip("Where the file ends: when the sound has decayed, or after a fixed time")
         self.decay = spin_box("Decay", *DECAY_RANGE_DB, export.decay_db, " dB", 0, 5)
         self.decay.setPrefix("by ")
         self.decay.setToolTip("The sound ends where model and truth are this far below their peak")
@@ -35,7 +35,7 @@ class SoundForm(QWidget):
         self.longest.setToolTip("A string that rings longer is faded out at this length")
         self.seconds = spin_box("Duration", 0.1, LONGEST_S, export.seconds, " s", 1, 0.5)
         self.seconds.setToolTip("The end is faded out within 10 ms")
-        names = [("The model's own", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ if rate)]
+        names = [("The model's rate", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ if rate)]
         self.rate = combo_box("Sample rate", names, export.rate_hz)
         self.rate.setToolTip("A rate above the model's own adds no bandwidth")
         self._rate_note = faint()
@@ -57,7 +57,7 @@ class SoundForm(QWidget):
         form.addRow(label("Format"), row_of(self.bits))
         form.addRow(label("Level"), row_of(self.normalise))
         self._difference = QWidget()
-        self._difference.setLayout(row_of(self.gain, faint("louder than it is")))
+        self._difference.setLayout(row_of(self.gain, faint("gain")))
         form.addRow(label("Difference"), self._difference)
         self._form = form
         for box in (self.length, self.rate, self.bits):
@@ -97,12 +97,12 @@ class SoundForm(QWidget):
 
 
 def wav_settings(export: ExportChoices) -> WavSettings:
-    """The writer's settings of the dialog's choices."""
+    """The settings of the WAV writer, of the dialog's choices."""
     return WavSettings(bits=export.bits, rate_hz=export.rate_hz or None, normalise=export.normalise)
 
 
 def label(text: str) -> QLabel:
-    """A form's label, as wide as all of them so that the forms of the dialog stand in line."""
+    """A form's label; all are of one width, so that the forms of the dialog are aligned."""
     made = Label(text)
     made.setFixedWidth(LABEL_WIDTH)
     made.setMinimumHeight(28)
@@ -111,6 +111,7 @@ def label(text: str) -> QLabel:
 
 
 def row_of(*widgets: QWidget) -> QHBoxLayout:
+    """Side by side, with empty space at the end."""
     row = QHBoxLayout()
     row.setContentsMargins(0, 0, 0, 0)
     for widget in widgets:
@@ -125,7 +126,6 @@ def spin_box(
     spin = QDoubleSpinBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, decimals=decimals)
     spin.setAccessibleName(name)
     spin.lineEdit().setTextMargins(6, 0, 0, 0)
-
     spin.setMinimumWidth(84)
     spin.setValue(value)
     return spin

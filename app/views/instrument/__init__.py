@@ -1,4 +1,4 @@
 """What an instrument is played on and turned with: keys, a neck, knobs of the string, bar and browser of patches.
 
-Widgets alone: signals say what hands do, setters what became of it. `panel` holds them together in one strip.
+Gestures emit signals; setters show what became of them. `panel` holds all but the browser in one strip.
 """

@@ -1,8 +1,8 @@
-"""The strings as they lie: a neck with frets, or a fan of many strings. What sounds is seen where it is held.
+"""The strings of a patch: a neck with frets, or a fan of many strings. What sounds is lit where it is stopped.
 
-A few strings are rows, the highest above, with frets where a string of equal tension needs them, 1 - 2^(-n/12) of its
-length from the nut. Many strings, or one that is shortened for every key, stand side by side, each as long as its key
-leaves it (drawn as the square root, or the highest would be a hair).
+A few strings are rows, the highest on top, with fret n at 1 - 2^(-n/12) of the length from the nut. Many strings, or
+one that is shortened for every key, stand side by side, each as long as its key leaves it (drawn as the square root,
+or the highest would be too short to see).
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
+from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import Playable, note_name
+from app.views.instrument.playable import Playable
 
 MOST_ROWS, MOST_FRETS = 8, 24
 NAMES_WIDTH = 40  # open strings, left of the nut
@@ -30,7 +31,7 @@ TIP = (
 
 
 def fret_share(fret: float, frets: int) -> float:
-    """Where a fret lies between the nut, 0, and the last of `frets`, 1."""
+    """The place of a fret between the nut, 0, and the last of `frets`, 1."""
     return (1 - 2 ** (-fret / 12)) / (1 - 2 ** (-frets / 12))
 
 
@@ -59,7 +60,7 @@ class Neck(Playable):
 
     @property
     def frets(self) -> int:
-        """How many a neck has: to the highest key, and two octaves at most."""
+        """The number of frets: to the highest key, and two octaves at most."""
         highest = self._strings[-1][1] if self._strings else self._low
         return min(max(self._high - highest, 12), MOST_FRETS)
 
@@ -73,7 +74,7 @@ class Neck(Playable):
         return NAMES_WIDTH + fret_share(fret, self.frets) * (self.width() - NAMES_WIDTH - 6)
 
     def cell(self, string: int, fret: int) -> QRectF:
-        """What a finger stops: from the fret before to this one; of an open string, its name."""
+        """Where a finger stops the string: from the fret before to this one; fret 0: the name of the open string."""
         height = (self.height() - FOOT) / len(self._strings)
         top = (len(self._strings) - 1 - string) * height
         left = 0.0 if fret <= 0 else self.fret_x(fret - 1)

@@ -1,10 +1,10 @@
-"""The strip that is played: the patch above, keys or a neck below; between them the string's knobs, if wanted."""
+"""The instrument's strip: the patch bar, the string's knobs (if shown), and the keys or the neck."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
@@ -19,7 +19,7 @@ from app.views.instrument.string_knobs import StringKnobs
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
 FOLD_TIP, NO_ROOM = "Show or hide the knobs of the string", "The window is too low for the knobs of the string"
-ROOMY = 1180  # below, the bar stands closer
+ROOMY = 1320  # pixels: in a narrower window the bar is compact
 _SURFACES = (
     ("keys", "Keys", "Show a piano's keyboard"),
     ("neck", "Strings", "Show the strings and where they are stopped"),
@@ -27,11 +27,11 @@ _SURFACES = (
 
 
 class InstrumentPanel(QFrame):
-    """Its parts are reached by name: `bar`, `keys`, `neck`, `knobs`."""
+    """Its parts are public: `bar`, `keys`, `neck`, `knobs`."""
 
     pressed = Signal(int, int)  # key, velocity
     released = Signal(int)
-    surface_changed = Signal()  # another one is shown, or the knobs; see `surface`, `unfolded`
+    surface_changed = Signal()  # of `surface` or `unfolded`
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -81,6 +81,7 @@ class InstrumentPanel(QFrame):
         column.addWidget(self._knobs_row)
         column.addLayout(below)
         self._stack.installEventFilter(self)
+        self._hint.installEventFilter(self)
 
     # What is shown
 
@@ -107,7 +108,7 @@ class InstrumentPanel(QFrame):
         self.surface_changed.emit()
 
     def set_low(self, low: bool, lowest: bool) -> None:
-        """For a window with little height: without the string's knobs; at last with the surface alone."""
+        """For a window with little height: `low` hides the string's knobs, `lowest` the patch bar too."""
         if (low, lowest) != self._low:
             self._low = low, lowest
             self._share_room()
@@ -129,22 +130,22 @@ class InstrumentPanel(QFrame):
         self.neck.set_range(low, high)
 
     def set_octave(self, octave: int) -> None:
-        """Of the lowest of the computer's keys."""
+        """The octave of the lowest of the computer's keys; C4 is middle C."""
         self.bar.show_octave(octave)
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
-        """The computer's keys, by the key that each plays."""
+        """What is printed on the computer's keys, by the MIDI key that each plays."""
         self.keys.show_letters(letters)
 
     def show_sounding(self, levels: Mapping[int, float]) -> None:
-        """How loud each key sounds, 0 … 1. The first one takes the hint away."""
+        """How loud each key sounds, 0 … 1; hides the hint once one does."""
         if levels:
             self.hide_hint()
         self.keys.show_sounding(levels)
         self.neck.show_sounding(levels)
 
     def show_source(self, source: str) -> None:
-        """Who is heard."""
+        """The source that is heard, in whose colour keys are lit."""
         self.keys.show_source(source)
         self.neck.show_source(source)
 
@@ -152,7 +153,7 @@ class InstrumentPanel(QFrame):
         self._hint.hide()
 
     def let_go(self) -> None:
-        """Releases what the mouse holds."""
+        """Releases all keys that are down."""
         self.keys.let_go()
         self.neck.let_go()
 
@@ -163,6 +164,8 @@ class InstrumentPanel(QFrame):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show):
             self._place_hint()
+        elif watched is self._hint and event.type() == QEvent.Type.StyleChange:
+            QTimer.singleShot(0, self, self._place_hint)  # when the label has taken the style
         return super().eventFilter(watched, event)
 
     def _place_hint(self) -> None:

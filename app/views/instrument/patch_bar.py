@@ -1,39 +1,40 @@
 """Which patch: previous, next, its name, which opens the browser; save, rename, revert; its macros, body and room.
 
-Beside them is told what the instrument does: the octave of the computer's keys, how many voices ring, recording, and
-what lies beyond the model's training.
+Below them is its state: what lies outside the model's training, the octave of the computer's keys, the number of
+voices, and recording.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
+from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch
+from app.session.step_words import PATCH
 from app.views.controls.knob import Knob, KnobRange
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, plain_tip
 
-if TYPE_CHECKING:
-    from app.patches.patch import Macro, Patch
-
-MOST_MACROS = 8
-ROOMY_MACROS = 6  # more of them stand closer
+ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
-COMPARE_TIP = "Hear the patch as it was saved, while this is pressed; its knobs stay. Any change ends it"
+COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
-    "body.mix": ("mix", SHARE, "How much is heard of the body that the strings stand on"),
-    "room.mix": ("room", KnobRange(0, 1, 0, 0.02, "{:.0%}"), "How much is heard of the room"),
-    "level_db": ("level", KnobRange(-60, 24, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
+    "body.mix": ("mix", SHARE, "Mix of the body: 0 % the strings alone, 100 % the body alone"),
+    "room.mix": (
+        "room",
+        KnobRange(0, 1, 0, 0.02, "{:.0%}"),
+        "Mix of the room: 0 % without it, 100 % its reverberation alone",
+    ),
+    "level_db": ("level", KnobRange(*LEVEL_RANGE_DB, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
 }
 
 
 class PatchBar(QFrame):
-    """Asks with signals, shows with setters."""
+    """Gestures emit signals; setters show what became of them."""
 
     previous_asked = Signal()
     next_asked = Signal()
@@ -41,7 +42,7 @@ class PatchBar(QFrame):
     save_asked = Signal()
     rename_asked = Signal()
     revert_asked = Signal()
-    compare_asked = Signal(bool)  # whether the saved one is to be heard
+    compare_asked = Signal(bool)  # whether keys are to play the saved patch
     record_asked = Signal()  # begin or end
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
@@ -100,7 +101,9 @@ class PatchBar(QFrame):
         self.category.hide()
         self.save = tool_button("Save", "Save the patch", "Save the patch; a shipped one under a name of your own")
         self.rename = tool_button("Rename …", "Rename the patch", "Give your patch another name")
-        self.revert = tool_button("Revert", "Revert the patch", "As it was saved; your changes are given up")
+        self.revert = tool_button(
+            "Revert", "Revert the patch", "Go back to the patch as it was saved; your changes are lost"
+        )
         for button, signal in (
             (self.save, self.save_asked),
             (self.rename, self.rename_asked),
@@ -134,10 +137,10 @@ class PatchBar(QFrame):
         lower.clicked.connect(lambda: self.octave_asked.emit(-1))
         higher.clicked.connect(lambda: self.octave_asked.emit(1))
         self.octave = faint()
-        self.octave.setToolTip("From which C on the computer's keys play; C4 is middle C (Z, X)")
+        self.octave.setToolTip("The lowest C on the computer's keys; C4 is middle C (Z, X)")
         self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.voices = faint("0 voices")
-        self.voices.setToolTip("How many strings ring now")
+        self.voices.setToolTip("Number of strings that ring")
         self.voices.setMinimumWidth(62)
         self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.record = QToolButton()
@@ -158,7 +161,7 @@ class PatchBar(QFrame):
 
     def _build_sound(self) -> QHBoxLayout:
         self.body = combo_box("Body", [("No body", "")])
-        self.body.setToolTip("What the strings stand on")
+        self.body.setToolTip("The body of the instrument, which colours the sound of the strings")
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.body.setMinimumWidth(104)
         self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
@@ -192,7 +195,7 @@ class PatchBar(QFrame):
             knob.set_narrow(close)
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
-        """Name and title of each; none, the name "", is always there."""
+        """The name and the title of each; "No body", of the name "", is always listed."""
         chosen = self.body.currentData()
         with QSignalBlocker(self.body):
             self.body.clear()
@@ -201,7 +204,7 @@ class PatchBar(QFrame):
             self._show_body(chosen or "")
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
-        """`own`: it is the user's, so that it can be renamed; `changed`: it is not as it was saved."""
+        """`own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
         mark = "●  " if changed else ""
         self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Patch: {patch.name}{', changed' if changed else ''}")
@@ -230,9 +233,8 @@ class PatchBar(QFrame):
             if number >= len(macros):
                 continue
             macro = macros[number]
-            if number >= len(self._macros) or self._macros[number].name != macro.name:
-                fields = ", ".join(target.field for target in macro.targets)
-                knob.set_name(macro.name, f"{macro.name}: turns {fields}")
+            if number >= len(self._macros) or _named(self._macros[number]) != _named(macro):
+                knob.set_name(macro.name, f"{macro.name}: changes {', '.join(_named(macro)[1])}")
             knob.set_value(macro.value)
         self._macros = macros
         self._before_macros.setVisible(bool(macros))
@@ -240,22 +242,22 @@ class PatchBar(QFrame):
 
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)
-        if row < 0:  # a body that is not there any more
+        if row < 0:  # its file is missing
             self.body.addItem(name, name)
             row = self.body.count() - 1
         self.body.setCurrentIndex(row)
 
     def show_voices(self, voices: int, most: int | None = None) -> None:
-        """How many ring, of how many at most."""
+        """The number of voices that ring, and the most that may."""
         of = f" of {most}" if most is not None else ""
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
     def show_octave(self, octave: int) -> None:
-        """Of the lowest of the computer's keys."""
+        """The octave of the lowest of the computer's keys."""
         self.octave.setText(f"from C{octave}")
 
     def show_recording(self, seconds: float | None) -> None:
-        """For how long it has been recording; None: it is not."""
+        """For how many seconds it has been recording; None: it is not."""
         on = seconds is not None
         self.record.setChecked(on)
         self.record.setText(
@@ -265,7 +267,7 @@ class PatchBar(QFrame):
         self.record.setToolTip("End the recording and save it" if on else "Record what is played")
 
     def show_note(self, text: str) -> None:
-        """What is beyond the model's training, or "" where nothing is."""
+        """A warning: what lies outside the model's training; "" for none."""
         if text == self.note.text():
             return
         self.note.setObjectName("warning" if text else "faint")
@@ -273,3 +275,14 @@ class PatchBar(QFrame):
         self.note.style().polish(self.note)
         self.note.say(text)
         self.note.setToolTip(plain_tip(text))
+
+
+def _named(macro: Macro) -> tuple[str, list[str]]:
+    """Its name, and its targets in words."""
+    return macro.name, [_words(target.field) for target in macro.targets]
+
+
+def _words(field: str) -> str:
+    """The words for a field of a patch; the same for all pick-up points."""
+    inside, _, last = field.rpartition(".")
+    return PATCH.get(field) or PATCH.get(inside) or last.replace("_", " ")

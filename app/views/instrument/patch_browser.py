@@ -1,9 +1,9 @@
-"""The patch browser: a search, a list under the categories and a card. It stays open meanwhile.
+"""The patch browser: a search, a list under the categories and a card. It stays open while in use.
 
 type              filters the list (words in any order)
 arrows            move in the list, load and play a note
-Space             plays a note; in a search that has begun it is a blank
-Ctrl+D            makes a favourite, or no longer
+Space             plays a note; while text is typed in the search it is a space
+Ctrl+D            adds to the favourites, or removes
 Enter, Escape     close
 """
 
@@ -25,18 +25,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.shared.key_names import note_name
 from app.views import theme
 from app.views.controls.browser import KEYS, MOVES, Browser
 from app.views.controls.parts import combo_box, label, tool_button
 from app.views.controls.plain import Label, plain_tip
-from app.views.instrument.playable import note_name
 
 if TYPE_CHECKING:
     from app.patches.library import PatchEntry
 
 _HINT = "Type to search   ·   ↑ ↓ load and play   ·   Space plays   ·   Ctrl+D favourite   ·   Enter closes"
 _NAME = Qt.ItemDataRole.UserRole
-REST_MS = 160  # an arrow key that is held down loads, and plays when it rests
+REST_MS = 160  # after the last step in the list, a note is played
 DELETE, REALLY = "Delete", "Delete it for good?"
 
 
@@ -47,7 +47,7 @@ class PatchBrowser(Browser):
 
     chosen = Signal(str)  # the name of an entry: to be loaded
     audition_asked = Signal(str)  # to be heard
-    favourite_asked = Signal(str)  # to be one, or no longer
+    favourite_asked = Signal(str)  # add or remove
     rename_asked = Signal(str)
     delete_asked = Signal(str)  # and confirmed
     folder_asked = Signal()
@@ -55,7 +55,7 @@ class PatchBrowser(Browser):
     listed_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("patch", "Words in any order: name, category, description, author", parent)
+        super().__init__("patches", "Words in any order: name, category, description, author", parent)
         self.setAcceptDrops(True)
         self._entries: dict[str, PatchEntry] = {}
         self._favourites: Collection[str] = ()
@@ -94,7 +94,8 @@ class PatchBrowser(Browser):
         self._state = Label()
         self._state.setObjectName("faint")
         folder = tool_button(
-            "Open folder", tip="Show your patches' folder; a patch dropped here is loaded; Save keeps it there"
+            "Open folder",
+            tip="Show the folder of your patches, to which Save writes. A patch file dropped here is loaded",
         )
         folder.clicked.connect(self.folder_asked)
         foot = QHBoxLayout()
@@ -125,13 +126,13 @@ class PatchBrowser(Browser):
         self._play.setToolTip("Play a note of this patch (Space)")
         self._play.clicked.connect(self._audition)
         self._star = QPushButton("☆  Favourite")
-        self._star.setToolTip("Make it a favourite, or no longer (Ctrl+D)")
+        self._star.setToolTip("Add to the favourites, or remove (Ctrl+D)")
         self._star.clicked.connect(lambda: self._tell(self.favourite_asked))
         self._rename = QPushButton("Rename …")
         self._rename.setToolTip("Give your own patch another name")
         self._rename.clicked.connect(lambda: self._tell(self.rename_asked))
         self._delete = QPushButton(DELETE)
-        self._delete.setToolTip("Delete your own patch; asks once more")
+        self._delete.setToolTip("Delete your own patch; needs a second click")
         self._delete.clicked.connect(self._ask_delete)
         hearing, own = QHBoxLayout(), QHBoxLayout()
         for row, buttons in ((hearing, (self._play, self._star)), (own, (self._rename, self._delete))):
@@ -179,7 +180,7 @@ class PatchBrowser(Browser):
         return tuple(name for row in range(self.list.count()) if (name := _name_of(self.list.item(row))))
 
     def clear_filter(self) -> None:
-        """All patches are listed again; told once."""
+        """Lists all patches again; emits `listed_changed` once."""
         parts = (self.search, self._category, self._whose, self._starred)
         for widget in parts:
             widget.blockSignals(True)
@@ -234,7 +235,7 @@ class PatchBrowser(Browser):
             if (item := self.list.item(row)) is not None and _name_of(item) == name:
                 self.list.setCurrentItem(item)
                 return
-        self.list.setCurrentRow(-1)  # it was filtered out
+        self.list.setCurrentRow(-1)  # filtered out
 
     def _show_card(self, name: str) -> None:
         entry = self._entries.get(name)
@@ -324,7 +325,7 @@ class PatchBrowser(Browser):
             self.file_dropped.emit(path)
 
     def place(self) -> None:
-        """Above the instrument, whose keys stay in sight and in reach."""
+        """Above the instrument, whose keys stay visible and can be played."""
         parent = self.parentWidget()
         if parent is not None:
             top = 52

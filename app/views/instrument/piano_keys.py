@@ -1,4 +1,4 @@
-"""A piano's keyboard on the screen: where on a key one clicks is how hard it is struck."""
+"""A piano keyboard on the screen; how far down on a key one clicks sets the velocity."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
+from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import Playable, note_name
+from app.views.instrument.playable import Playable
 
 BLACK_HEIGHT = 0.62  # of a white key's
 BLACK_WIDTH = 0.6
@@ -28,7 +29,7 @@ def is_black(key: int) -> bool:
 
 
 def shown_range(low: int, high: int) -> tuple[int, int]:
-    """Whole octaves from C to B about a range, and four of them at least."""
+    """The first and the last key of whole octaves, C to B, about a range; four octaves at least."""
     first, last = low - low % 12, high + 11 - high % 12
     while last - first + 1 < FEWEST_KEYS:
         if first >= 12 and (low - first <= last - high or last > 115):
@@ -48,7 +49,7 @@ class PianoKeys(Playable):
         self._set_cursor(60)
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
-        """The computer's keys that play, by the key that each plays."""
+        """What is printed on the computer's keys, by the MIDI key that each plays."""
         if dict(letters) != self._letters:
             self._letters = dict(letters)
             self.rest_changed()
@@ -59,12 +60,12 @@ class PianoKeys(Playable):
     # Where keys are
 
     def _white(self, key: int) -> int:
-        """How many white keys lie left of it."""
+        """The number of white keys left of a key."""
         return 7 * ((key - self._first) // 12) + _WHITE_BEFORE[key % 12]
 
     @property
     def _pitch(self) -> float:
-        """From a white key to the next, in pixels."""
+        """The distance of white keys, in pixels."""
         return self.width() / (self._white(self._last) + 1)
 
     @property
@@ -117,7 +118,7 @@ class PianoKeys(Playable):
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)
 
     def _paint_pin(self, painter: QPainter, key: int) -> None:
-        """It stays down by itself."""
+        """A dot on a key that stays down by itself."""
         rect = self.key_rect(key)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(_ink(self._filling(key))))
@@ -149,7 +150,7 @@ class PianoKeys(Playable):
             self._paint_word(painter, rect, letter, 18 if is_black(key) else 30, self._letter_size)
 
     def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
-        """`above` the foot of a key, in pixels."""
+        """A word on a key, `above` pixels above its lower edge."""
         painter.setFont(theme.small_font(size, bold=above > 16))
         place = QRectF(key.left() - 4, key.bottom() - above, key.width() + 8, 13)
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)
@@ -162,10 +163,10 @@ def _own(key: int) -> str:
 
 
 def _mute(key: int) -> QColor:
-    """Of a key without a string."""
+    """The colour of a key without a string."""
     return theme.blended(_own(key), theme.LINE, 0.3)
 
 
 def _ink(filling: QColor) -> str:
-    """What is best read on it."""
+    """The colour of text on it."""
     return max(theme.TEXT, theme.BACKGROUND, key=lambda ink: theme.contrast(ink, filling.name()))

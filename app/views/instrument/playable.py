@@ -1,4 +1,4 @@
-"""What the keys and the neck have in common: a surface of places that sound when they are touched."""
+"""Base of the piano keys and the neck: a surface of keys that are played with the mouse or with Enter."""
 
 from __future__ import annotations
 
@@ -19,21 +19,16 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from app.shared.key_names import note_name
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS
 
 LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixels
 SOFTEST, HARDEST = 16, 127  # velocities of a click at the top and at the bottom of a place
-TIP_MS = 5_000  # then it is out of the way
+TIP_MS = 5_000  # the tooltip covers keys
 TYPED = 96  # velocity of the Enter key
 LEVEL_STEPS = 24  # that can be told apart; finer changes are not painted
-NAMES = ("C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯", "A", "A♯", "B")
 _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
-
-
-def note_name(key: int) -> str:
-    """With its octave; key 60 is C4."""
-    return f"{NAMES[key % 12]}{key // 12 - 1}"
 
 
 class Playable(QWidget):
@@ -61,7 +56,7 @@ class Playable(QWidget):
         self._typed: int | None = None  # by Enter
         self._held: set[int] = set()
         self._cursor = 60
-        self._by_keys = False  # it was come to, or moved on, with the keyboard
+        self._by_keys = False  # the cursor was last reached or moved with the keyboard
         self._rest = QPixmap()
         theme.changes.face_changed.connect(self.rest_changed)
 
@@ -71,7 +66,7 @@ class Playable(QWidget):
     def minimumSizeHint(self) -> QSize:
         return QSize(480, LOWEST)
 
-    # What a surface is
+    # For subclasses
 
     @abstractmethod
     def key_at(self, at: QPointF) -> int | None:
@@ -79,7 +74,7 @@ class Playable(QWidget):
 
     @abstractmethod
     def key_rect(self, key: int) -> QRectF:
-        """All that changes when a key sounds."""
+        """The area that changes when a key sounds."""
 
     @abstractmethod
     def share_at(self, key: int, at: QPointF) -> float:
@@ -87,11 +82,11 @@ class Playable(QWidget):
 
     @abstractmethod
     def paint_rest(self, painter: QPainter) -> None:
-        """All of it as it is when nothing sounds and no hand is on it. Kept as a picture until `rest_changed`."""
+        """Paints the surface while nothing sounds and no key is down. Kept as a picture until `rest_changed`."""
 
     @abstractmethod
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
-        """What sounds, what is down, and where the keyboard's cursor is, as far as it lies in `dirty`."""
+        """Paints what sounds, what is down, and the cursor, as far as they lie in `dirty`."""
 
     # What is shown
 
@@ -105,10 +100,10 @@ class Playable(QWidget):
             self.rest_changed()
 
     def lay_out(self) -> None:
-        """Called where the range has changed."""
+        """Called when the range has changed."""
 
     def rest_changed(self) -> None:
-        """It is to be painted anew."""
+        """Discards the picture of `paint_rest`."""
         self._rest = QPixmap()
         self.update()
 
@@ -124,7 +119,7 @@ class Playable(QWidget):
         self._levels = steps
 
     def show_source(self, source: str) -> None:
-        """Who is heard: keys are lit in its colour."""
+        """The source that is heard, in whose colour keys are lit."""
         if source != self._source:
             self._source = source
             self.update()
@@ -135,7 +130,7 @@ class Playable(QWidget):
         return frozenset(self._held)
 
     def let_go(self) -> None:
-        """Releases whatever is down."""
+        """Releases all keys that are down."""
         if self._typed is not None:
             typed, self._typed = self._typed, None
             self._release(typed)
@@ -179,19 +174,21 @@ class Playable(QWidget):
         self.rest_changed()
 
     def level(self, key: int) -> float:
+        """How loud a key sounds, 0 … 1."""
         return self._levels.get(key, 0) / LEVEL_STEPS
 
     def is_down(self, key: int) -> bool:
+        """Whether a key is pressed here, or stays down by itself."""
         return key in (self._down, self._typed) or key in self._held
 
     @property
     def colour(self) -> QColor:
         return QColor(theme.SOURCE_COLOURS[theme.source_kind(self._source)])
 
-    # Hands
+    # Gestures
 
     def velocity_at(self, key: int, at: QPointF) -> int:
-        """Harder further down."""
+        """The velocity of a click there: greater further down."""
         return round(SOFTEST + min(max(self.share_at(key, at), 0.0), 1.0) * (HARDEST - SOFTEST))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -235,7 +232,7 @@ class Playable(QWidget):
                 self._release(down)
 
     def event(self, event: QEvent) -> bool:
-        """Enter plays while the surface has the keyboard, though the window has a shortcut of it."""
+        """Keeps Enter, which is a shortcut of the window, while the surface has the focus."""
         if (
             event.type() == QEvent.Type.ShortcutOverride
             and isinstance(event, QKeyEvent)
@@ -288,7 +285,7 @@ class Playable(QWidget):
 
     @property
     def shows_cursor(self) -> bool:
-        """Whether it is seen: not to those who play with the mouse."""
+        """Whether the cursor is drawn: after it was reached or moved with the keyboard, not with the mouse."""
         return self._by_keys and self.hasFocus()
 
     def _set_cursor(self, key: int) -> None:

@@ -1,27 +1,33 @@
-"""Knobs of the string itself, of how it is plucked, heard and damped; and what they make of it, in physical units."""
+"""Knobs of the string: how it is built, plucked, heard and damped; and the resulting string in physical units."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
+from app.patches.patch import (
+    A4_RANGE_HZ,
+    AMPLITUDE_RANGE_MM,
+    CURVE_RANGE,
+    GAUGE_RANGE,
+    MULTIPLIER_RANGE,
+    RELEASE_RANGE_S,
+    TRANSPOSE_RANGE,
+    Patch,
+)
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, Knob, KnobRange
 from app.views.controls.parts import faint, vertical_rule
 from app.views.controls.plain import plain_tip
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
-
-if TYPE_CHECKING:
-    from app.patches.patch import Patch
+from engine.pluck import POSITION_RANGE, WIDTH_RANGE
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 TIMES = "× {:.2f}"
-WHOLE = "tuning.transpose"  # turned by whole keys
+WHOLE = "tuning.transpose"  # an integer
 
 
 @dataclass(frozen=True)
@@ -34,8 +40,8 @@ class _Turned:
     tip: str
 
 
-def _times(low: float = 0.05, high: float = 20.0) -> KnobRange:
-    return KnobRange(low, high, 1.0, 1.03, TIMES, logarithmic=True)
+def _times(limits: tuple[float, float] = MULTIPLIER_RANGE) -> KnobRange:
+    return KnobRange(*limits, 1.0, 1.03, TIMES, logarithmic=True)
 
 
 _PLACE = "0 and 1 are the ends of the string, 0.5 its middle"
@@ -44,18 +50,19 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
         "PITCH",
         (
             _Turned(
-                "tuning.a4_hz", "A4", KnobRange(220, 880, 440, 2 ** (1 / 1200), "{:.1f} Hz", True), "Pitch of A4"
+                "tuning.a4_hz", "A4", KnobRange(*A4_RANGE_HZ, 440, 2 ** (1 / 1200), "{:.1f} Hz", True), "Pitch of A4"
             ),
-            _Turned(
-                WHOLE, "transpose", KnobRange(-48, 48, 0, 1, "{:+.0f}"), "Semitones that everything sounds higher"
-            ),
+            _Turned(WHOLE, "transpose", KnobRange(*TRANSPOSE_RANGE, 0, 1, "{:+.0f}"), "Transposition, in keys"),
         ),
     ),
     (
         "STRING",
         (
             _Turned(
-                "knobs.gauge", "gauge", _times(0.25, 4), "Thickness: thick strings are stiffer and ring otherwise"
+                "knobs.gauge",
+                "gauge",
+                _times(GAUGE_RANGE),
+                "Thickness of the string: thick strings are stiffer and decay differently",
             ),
             _Turned("knobs.density", "density", _times(), "Mass of the material: gut is light, steel heavy"),
             _Turned(
@@ -85,7 +92,7 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
             _Turned(
                 "damping.release_t60_s",
                 "release",
-                KnobRange(0.01, 60, 0.3, 1.1, "{:.2f} s", True),
+                KnobRange(*RELEASE_RANGE_S, 0.3, 1.1, "{:.2f} s", True),
                 "How long a key that is let go takes to fall by 60 dB",
             ),
         ),
@@ -111,19 +118,19 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
             _Turned(
                 "pluck.softest_mm",
                 "softest",
-                KnobRange(0.001, LARGEST_AMPLITUDE_MM, 0.1, 1.1, "{:.2f} mm", True),
+                KnobRange(*AMPLITUDE_RANGE_MM, 0.1, 1.1, "{:.2f} mm", True),
                 "How far the softest key pulls the string",
             ),
             _Turned(
                 "pluck.hardest_mm",
                 "hardest",
-                KnobRange(0.001, LARGEST_AMPLITUDE_MM, 3.0, 1.1, "{:.2f} mm", True),
+                KnobRange(*AMPLITUDE_RANGE_MM, 3.0, 1.1, "{:.2f} mm", True),
                 "How far the hardest key pulls the string",
             ),
             _Turned(
                 "pluck.curve",
                 "curve",
-                KnobRange(-1, 1, 0, 0.05, "{:+.2f}"),
+                KnobRange(*CURVE_RANGE, 0, 0.05, "{:+.2f}"),
                 "Velocity curve: above 0 middle velocities are louder, below 0 softer",
             ),
         ),
@@ -145,7 +152,7 @@ SHAPED = ("pluck.width", "pluck.width_hard")  # a triangle has no width
 
 
 class Facts(QWidget):
-    """A line of words and values; what there is no room for is left out, and in the tip."""
+    """A line of names and values; those that do not fit are in the tooltip alone."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -177,7 +184,7 @@ class Facts(QWidget):
 
 
 class StringKnobs(QWidget):
-    """Asks with `changed`, shows with `show_patch`."""
+    """Gestures emit `changed`; `show_patch` shows what became of them."""
 
     changed = Signal(str, float)  # a field of a patch and its new value
     drag_started = Signal()
@@ -201,7 +208,7 @@ class StringKnobs(QWidget):
         column.setSpacing(SPACING)
         column.addLayout(row)
         column.addWidget(self.facts)
-        self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # whatever its surroundings try
+        self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # or a low window would squeeze it
 
     def _group(self, title: str, turned: tuple[_Turned, ...]) -> QVBoxLayout:
         head = faint(title)
@@ -227,7 +234,7 @@ class StringKnobs(QWidget):
         self.changed.emit(field, float(round(value)) if field == WHOLE else value)
 
     def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
-        """`saved` is what a double click goes back to."""
+        """`saved`: the values that a double-click resets to."""
         for field, knob in self.knobs.items():
             value = _value(patch, field)
             knob.setEnabled(value is not None)
@@ -241,12 +248,12 @@ class StringKnobs(QWidget):
         self.knobs["damping.release_t60_s"].setEnabled(not patch.damping.let_ring)
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
-        """What the knobs make of a string: words and values with their units ("tension": "72.3 N"), in order."""
+        """The resulting string: names and values with their units ("tension": "72.3 N"), in order."""
         self.facts.show_facts(facts)
 
 
 def _value(patch: Patch, field: str) -> float | None:
-    """None where the patch has no such field: a second pick-up point."""
+    """None where the patch has no such field, as a second pick-up point."""
     if field.startswith("tuning."):
         return float(getattr(patch.tuning, field.removeprefix("tuning.")))
     if field == "pickup.points.1" and len(patch.pickup.points) < 2:

@@ -1,1 +1,1 @@
-"""Curves and pictures of what is measured."""
+"""Plots and tables of what is measured."""

@@ -9,10 +9,10 @@ from PySide6.QtGui import QFontMetrics
 
 from app.views import theme
 
-LABELLED_HEIGHT = 170  # pixels of a plot: where there is less, the picture needs the room of the words beneath it
+LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
 LETTER_PIXELS = 12
 AIR = 8  # of a label, at its ends together
-TICK_PIXELS = 14  # an upright axis needs them for each of its numbers
+TICK_PIXELS = 14  # the least distance of numbers on a vertical axis
 
 
 class UprightLabel:
@@ -41,12 +41,12 @@ class UprightLabel:
 
 
 def fit_foot(plot: pg.PlotWidget) -> None:
-    """Shows the words beneath a plot only where it is high enough; to be called when it is resized."""
+    """Shows the label beneath a plot only where it is high enough; to be called when it is resized."""
     plot.getPlotItem().getAxis("bottom").showLabel(plot.height() >= LABELLED_HEIGHT)
 
 
 class UprightTicks:
-    """The numbers of an upright axis: of a chosen list as many as there is room for, its ends before the others."""
+    """The numbers of a vertical axis: of a given list as many as there is room for, its ends before the others."""
 
     def __init__(self, axis: pg.AxisItem, box: pg.ViewBox) -> None:
         self._axis, self._box = axis, box

@@ -1,6 +1,6 @@
-"""Perceptually uniform colour maps (P. Kovesi's, from pyqtgraph) whose ground is that of our panels.
+"""Perceptually uniform colour maps (P. Kovesi's, from pyqtgraph) whose neutral colour is that of the panels.
 
-They are those of the present face: what draws with one takes it anew when the face changes.
+They depend on the face: a view takes its map anew when the face changes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _COLOURS = 511  # odd: one of them is zero
 
 
 def displacement_map() -> pg.ColorMap:
-    """Down blue, up red, at rest the ground."""
+    """Below 0 blue, above 0 red, at 0 the background."""
     return _grounded("CET-D4", 0.5, theme.PANEL)
 
 
@@ -27,18 +27,18 @@ def error_map() -> pg.ColorMap:
 
 
 def magnitudes_of(signed: pg.ColorMap) -> pg.ColorMap:
-    """The half of a map with two signs that is above zero."""
+    """The upper half of a map with two signs, for magnitudes."""
     upper = np.linspace(0.5, 1, _COLOURS // 2 + 1)
     return pg.ColorMap(2 * upper - 1, signed.map(upper, mode="byte"))
 
 
 def level_map() -> pg.ColorMap:
-    """From the ground by violet and amber to white; on a light ground by amber and red to dark blue."""
+    """From the background by violet and amber to white; in the light face by amber and red to dark blue."""
     return _grounded("inferno" if theme.face == theme.DARK else "CET-L17", 0.0, theme.PANEL)
 
 
 def share_map() -> pg.ColorMap:
-    """Of the ground where there is little, further from it the more there is: also without colour."""
+    """From near the background at 0 to the strongest contrast at 1; the lightness alone shows it too."""
     dark = ["#10202e", "#1d5a78", "#8a6f52", "#f0a63c", "#fff1d6"]
     light = ["#f2f6f9", "#a9cde0", "#d8b287", "#b5650b", "#4a2300"]
     return pg.ColorMap([0, 0.3, 0.55, 0.78, 1], dark if theme.face == theme.DARK else light, mapping="clip")
@@ -46,7 +46,7 @@ def share_map() -> pg.ColorMap:
 
 @lru_cache
 def _grounded(name: str, ground_at: float, panel: str) -> pg.ColorMap:
-    """A map moved in colour such that its place `ground_at` is the panels' ground; its other ends stay."""
+    """pyqtgraph's map `name`, shifted so that its colour at `ground_at` (0 … 1) is `panel`; its ends keep theirs."""
     places = np.linspace(0, 1, _COLOURS)
     source = pg.colormap.get(name)
     colours = np.asarray(source.map(places, mode="float"))[:, :3]

@@ -7,17 +7,17 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QMenu, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.analysis.comparison import ComparedRow
 from app.presets.library import PresetEntry
 from app.views.controls.parts import tool_button, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.controls.segments import SMALL
-from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
 
 
 def percent(value: float) -> str:
+    """A relative error; ∞: the model ran away."""
     if math.isinf(value):
         return "ran away"
     return f"{100 * value:.3g} %" if value < 10 else "> 1000 %"
@@ -28,25 +28,29 @@ def scientific(value: float) -> str:
 
 
 def decibels(value: float) -> str:
+    """A null depth in dB."""
     return "+∞" if math.isinf(value) else f"{value:.1f}".replace("-", "−")
 
 
 def times(value: float) -> str:
+    """A speed, as a multiple of real time."""
     return f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×"
 
 
 COLUMNS = (
     Column("Preset", "Double-click or Enter loads the preset"),
-    Column("MAE", "Relative mean absolute error over the trained horizon, all of the string", percent),
+    Column("MAE", "Relative mean absolute error over the trained time and the whole string", percent),
     Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
     Column(
         "Null, dB",
         "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck",
         decibels,
     ),
-    Column("Speed", "Seconds of sound in a second of rendering, on one core; above 1 is real time", times),
+    Column(
+        "Speed", "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time", times
+    ),
     Column("Parameters", "Trainable parameters", lambda n: f"{n:,}"),
-    Column("MSE", "Relative mean squared error over the trained horizon", scientific),
+    Column("MSE", "Relative mean squared error over the trained time and the whole string", scientific),
     Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
     Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
     Column("Model", "Model architecture"),
@@ -55,7 +59,7 @@ COLUMNS = (
 
 
 class CompareView(QWidget):
-    """See the module."""
+    """Presets are known by their names."""
 
     preset_toggled = Signal(str, bool)  # by its checkbox: in the table or not
     same_string_asked = Signal()
@@ -73,39 +77,21 @@ class CompareView(QWidget):
         presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         presets.setMenu(self._menu)
         self._words = words_label()
-        self._stop = tool_button(
-            "Stop", "Stop comparing", "Stop computing, compute missing rows, or compute all again"
-        )
+        self._stop = tool_button("Stop")
         self._stop.clicked.connect(self.stop_asked)
-        copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
         self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
         self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
-        copy.clicked.connect(self.table.copy)
         self.table.row_double_clicked.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_entered.connect(lambda name: self.preset_opened.emit(name))
         self.table.row_deleted.connect(lambda name: self.preset_toggled.emit(name, False))
         self.progress = ProgressStrip("Progress of the comparison")
-        for control in (presets, self._stop, copy):
-            control.setStyleSheet(SMALL)
-        head = QHBoxLayout()
-        head.setContentsMargins(4, 0, 4, 0)
-        head.setSpacing(8)
-        head.addWidget(presets)
-        head.addWidget(self._words, 1)
-        head.addWidget(self._stop)
-        head.addWidget(copy)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 2, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addWidget(self.progress)
-        column.addWidget(self.table, 1)
+        lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
 
     def set_presets(self, entries: Sequence[PresetEntry]) -> None:
         """What can be compared."""
         menu = self._menu
         menu.clear()
-        for text, signal in (("Presets of the present string", self.same_string_asked), ("All", self.all_asked)):
+        for text, signal in (("Presets of this string", self.same_string_asked), ("All presets", self.all_asked)):
             menu.addAction(text).triggered.connect(signal)
         menu.addSeparator()
         self._actions = {}
@@ -125,13 +111,17 @@ class CompareView(QWidget):
         self._words.setText(text)
 
     def set_computing(self, share: float | None) -> None:
-        """How far the table is; None: nothing is computed."""
+        """The share of the table that is done, 0 … 1; None: nothing is being computed."""
         self.progress.show_share(share)
-        self._stop.setText("Stop" if share is not None else "Compute again")
-        self._stop.setAccessibleName("Stop comparing" if share is not None else "Compare again")
+        stops = share is not None
+        self._stop.setText("Stop" if stops else "Compute again")
+        self._stop.setAccessibleName("Stop comparing" if stops else "Compare again")
+        self._stop.setToolTip(
+            "Stop computing" if stops else "Compute the missing rows; where none is missing, all rows"
+        )
 
     def show_rows(self, rows: Sequence[tuple[ComparedRow, bool]], present: str) -> None:
-        """Rows, and whether each is of the present pluck; the present preset's is marked."""
+        """Rows, and whether each is of the present pluck; `present`: the preset whose row is bold."""
         self.table.show_rows([self._row(row, fresh, row.name == present) for row, fresh in rows])
 
     @staticmethod

@@ -13,7 +13,7 @@ from app.views import theme
 def set_curves(
     plot: pg.PlotItem, curves: dict[str, pg.PlotDataItem], sources: Sequence[ShownSource], faint_alpha: int
 ) -> None:
-    """Makes the curves that are missing in `curves`, takes away those of other sources, and dresses all."""
+    """Adds curves that `curves` lacks, removes those of other sources, and sets the pen and the order of all."""
     shown = {source.source for source in sources}
     for gone in [name for name in curves if name not in shown]:
         plot.removeItem(curves.pop(gone))

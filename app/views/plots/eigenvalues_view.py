@@ -1,7 +1,7 @@
-"""A model's learned eigenvalues beside the string's own, on a musician's axes or in the complex plane.
+"""A model's learned eigenvalues beside the string's own: frequency and decay time, or the complex plane.
 
-Amber rings are learned, blue dots the string's: a dot within its ring is a mode well learned. A point tells what it
-is when the mouse is on it; a click, or Enter on the one chosen by the arrow keys, lets its mode be heard alone.
+Amber rings are learned, blue dots the string's: a dot within its ring is a mode well learned. The values of the point
+under the mouse are written above; a click, or Enter on the point chosen by the arrow keys, solos its mode.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from app.views.controls.parts import ENTER_KEYS, combo_box, keeps_own_keys, word
 from app.views.controls.segments import SMALL
 from app.views.plots.axis_label import UprightLabel, UprightTicks, fit_foot
 
-NEAR_PIXELS = 16
-CLOSER_PIXELS = 3  # so much nearer one of the string's must be than a learned one
-TIP_MS = 3000  # it hides what is pointed at
+NEAR_PIXELS = 16  # within which a point is pointed at
+CLOSER_PIXELS = 3  # by which a point of the string must be nearer than a learned one
+TIP_MS = 3000  # the tooltip covers what is pointed at
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 class EigenvaluesView(QWidget):
-    """See the module."""
+    """The plane of points with a line of words above it."""
 
     mode_chosen = Signal(int)
     solo_ended = Signal()
@@ -74,7 +74,7 @@ class EigenvaluesView(QWidget):
         return self._words.text()
 
     def show_figure(self, figure: PoleFigure | None, words: str = "") -> None:
-        """The eigenvalues of a preset; None, with words that say why, while there is nothing to show."""
+        """The eigenvalues of a preset; None: there is nothing to show, and `words` say why."""
         if figure is not None and (self._figure is None or self._figure.layers != figure.layers):
             self._layer.clear()
             for layer in range(figure.layers):
@@ -87,7 +87,7 @@ class EigenvaluesView(QWidget):
             self._words.say(words)
 
     def set_solo(self, mode: int) -> None:
-        """The mode that is heard alone; 0: all."""
+        """The soloed mode; 0: none, all are heard."""
         if mode != self._solo:
             self._solo = mode
             self._draw(keep_view=True)
@@ -111,14 +111,14 @@ class EigenvaluesView(QWidget):
         self._tell(-1)
 
     def _tell(self, point: int) -> None:
-        """What there is to say of a point, or of the whole where there is none."""
+        """Writes the values of a point above the plane; -1: the note of the figure."""
         figure = self._figure
         if figure is None:
             return
         if point >= 0:
             self._words.say(*self._describe(figure, point))
         elif self._solo:
-            self._words.say(f"Mode {self._solo} alone is heard; Esc: all of them")
+            self._words.say(f"Mode {self._solo} is soloed; Esc plays all modes")
         else:
             self._words.say(figure.note)
 
@@ -152,7 +152,7 @@ class EigenvaluesView(QWidget):
 
 
 def _musical_places(poles: Poles) -> Array:
-    """(points, 2): frequency in Hz, and log10 of T60 in s, held within the axis."""
+    """(points, 2): frequency in Hz, and log₁₀ of T60 in s, limited to the axis."""
     return np.stack([poles.folded_hz, np.log10(np.clip(poles.t60_s, SHORTEST_S, LONGEST_S))], axis=1)
 
 
@@ -166,9 +166,9 @@ def _t60_text(t60_s: float) -> str:
 
 
 class _Plane(pg.PlotWidget):
-    """Points that can be pointed at: wheel zooms, drag pans, double-click shows all."""
+    """The points: wheel zooms, drag pans, double-click shows all, a click takes a point."""
 
-    pointed = Signal(int)  # at a point, the learned ones first; -1: at none
+    pointed = Signal(int)  # the number of a point, the learned ones first; -1: none
     taken = Signal(int)
     escaped = Signal()
 
@@ -213,7 +213,7 @@ class _Plane(pg.PlotWidget):
     def show_points(
         self, learned: Array, first_layer: NDArray[np.bool_], string: Array, alone: NDArray[np.bool_] | None
     ) -> None:
-        """Places (points, 2) of both kinds; `alone` are those of the mode that is heard alone."""
+        """Places (points, 2) of both kinds; `alone`: which of all are of the soloed mode; None: no mode is soloed."""
         self._places, self._at = np.concatenate([learned, string]), -1
         self._learned_count = len(learned)
         self._ring.setData([], [])
@@ -289,7 +289,7 @@ class _Plane(pg.PlotWidget):
         super().leaveEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Enter and Esc are the plane's own while it has the keyboard, whatever the window's shortcuts say."""
+        """Keeps Enter and Esc, which are shortcuts of the window, while the plane has the focus."""
         return keeps_own_keys(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -1,6 +1,6 @@
-"""The error of a model over all places and amplitudes of a pluck, as a picture to listen into.
+"""The error map: a model's error over position and amplitude of the pluck.
 
-The mouse or the arrow keys say where; a click or Enter plucks there.
+The mouse or the arrow keys move a cursor; a click or Enter plucks there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from app.views.plots.axis_label import UprightLabel, UprightTicks, fit_foot
 from app.views.plots.colour_maps import share_map
 
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
-TIP_MS = 3000  # it hides what is pointed at
+TIP_MS = 3000  # the tooltip covers what is pointed at
 SMOOTHER = 4  # pixels of the picture to a step of the finest grid
 _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
@@ -32,7 +32,7 @@ Range = tuple[float, float]
 
 
 class ErrorPlaneView(QWidget):
-    """See the module."""
+    """The map with a line of words above it. Positions are shares of the string's length, amplitudes in mm."""
 
     pluck_chosen = Signal(float, float)  # position, amplitude in mm
 
@@ -60,7 +60,7 @@ class ErrorPlaneView(QWidget):
         return self._words.text()
 
     def show_picture(self, picture: PlanePicture | None) -> None:
-        """What is known of the plane so far."""
+        """The errors computed so far; None: none."""
         self._picture = picture
         self.map.show_picture(picture)
         self._tell(*(self.map.cursor or (math.nan, math.nan)))
@@ -70,11 +70,11 @@ class ErrorPlaneView(QWidget):
         self.map.set_pluck(position, amplitude_mm)
 
     def set_trained(self, position: Range | None, amplitude_mm: Range | None) -> None:
-        """What the model was trained on; None for a position: the noise that it was trained on has none."""
+        """The training range; `position` is None where the model was trained on noise, which has none."""
         self.map.set_trained(position, amplitude_mm)
 
     def set_words(self, text: str) -> None:
-        """What stands above the map while nothing is pointed at."""
+        """The line above the map while nothing is pointed at."""
         self._resting = text
         self._tell(*(self.map.cursor or (math.nan, math.nan)))
 
@@ -86,22 +86,22 @@ class ErrorPlaneView(QWidget):
         text = "runs away" if math.isinf(error) else f"error as trained about {100 * error:.2g} %"
         if self._picture.spacing > 1:
             text += ", still coarse"
-        trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the trained range"
+        trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the training range"
         self._words.setText(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
 
 class _Map(pg.PlotWidget):
     """The picture with its colour bar, the trained range, the present pluck and a cursor."""
 
-    pointed = Signal(float, float)  # position, amplitude in mm; not a number: nowhere
+    pointed = Signal(float, float)  # position, amplitude in mm; NaN: nowhere
     taken = Signal(float, float)
 
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Map of errors")
         self.setToolTip(
-            "The model's error as trained (the header's first figure) for a pluck at each place and amplitude.\n"
-            "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the trained range"
+            "The model's error as trained (the first figure in the header) for each pluck position and amplitude.\n"
+            "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the training range"
         )
         self.setToolTipDuration(TIP_MS)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -112,7 +112,7 @@ class _Map(pg.PlotWidget):
         item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)
-        item.setLabel("bottom", "position of the pluck")
+        item.setLabel("bottom", "pluck position")
         item.getAxis("bottom").enableAutoSIPrefix(False)
         self._label = UprightLabel(item, ("amplitude (mm)", "mm"))
         self._area = QRectF(
@@ -152,7 +152,7 @@ class _Map(pg.PlotWidget):
             self._image.clear()
             return
         errors_log = np.log10(np.clip(picture.error, SCALE[0] / 10, 10 * SCALE[1]))
-        # the levels are the bar's: they must not follow the picture
+        # the levels are those of the colour bar and must not follow the picture
         self._image.setImage(refine(errors_log, SMOOTHER), autoLevels=False)
         self._image.setRect(self._area)
 
@@ -201,7 +201,7 @@ class _Map(pg.PlotWidget):
         super().leaveEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Enter and Esc are the map's own while it has the keyboard, whatever the window's shortcuts say."""
+        """Keeps Enter and Esc, which are shortcuts of the window, while the map has the focus."""
         return keeps_own_keys(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -20,14 +20,14 @@ from app.views.plots.time_plot import TimePlot
 LONG_S = 10.0
 QUANTITIES = (
     ("relative", "MAE and RMSE", "Relative to the truth, over all of the string, in windows of two periods"),
-    ("level", "Level", "How much louder the model is than the truth, in dB"),
+    ("level", "Level", "Level of the model relative to the truth, in dB"),
 )
-LOWEST_DECADE, HIGHEST_DECADE = -6, 4
+LOWEST_DECADE, HIGHEST_DECADE = -9, 4  # motions are kept in single precision, about 1e-7
 LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
 class ErrorTimeView(QWidget):
-    """Curves are given whole; the axis grows with them, by decades."""
+    """Curves are given whole, as far as they are computed; the axis grows with them by decades."""
 
     longer_asked = Signal()
     quantity_changed = Signal()
@@ -76,11 +76,14 @@ class ErrorTimeView(QWidget):
         return self.quantities.key
 
     def set_seconds(self, seconds: float) -> None:
-        """How long plucks are now: the button has nothing to do from `LONG_S` on."""
+        """The present duration; from `LONG_S` on the button is disabled."""
         self.longer.setEnabled(seconds < LONG_S)
 
     def set_take(self, seconds: float, horizon_s: float, stored: dict[str, float]) -> None:
-        """`stored`: the validation errors of the preset, "rmse" and "mae", as far as it has them."""
+        """A new take, without curves yet.
+
+        `stored`: the preset's relative validation errors "rmse" and "mae", as far as it has them.
+        """
         self._horizon_s, self._stored_errors = horizon_s, stored
         self.plot.set_times(seconds, horizon_s)
         for curve in self._curves.values():

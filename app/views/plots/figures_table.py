@@ -18,16 +18,19 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QHBoxLayout,
     QHeaderView,
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableView,
+    QVBoxLayout,
     QWidget,
 )
 
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, keeps_own_keys
+from app.views.controls.parts import ENTER_KEYS, keeps_own_keys, tool_button
 from app.views.controls.plain import plain_tip
+from app.views.controls.segments import SMALL
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
@@ -38,17 +41,17 @@ LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, what it tells, how a figure is written, and whose it is."""
+    """A column: its heading, its tooltip, how a value is written, and the source whose colour it has."""
 
     title: str
     tip: str
     text: Callable[[Any], str] = str
-    source: str = ""  # of the figures, for their colour
+    source: str = ""  # a key of `theme.SOURCE_COLOURS`; "": no colour of its own
 
 
 @dataclass(frozen=True)
 class TableRow:
-    """A row: what it is known by, its values in the order of the columns, how it looks, and a tooltip."""
+    """A row: its key, its values in the order of the columns, how it looks, and its tooltip."""
 
     key: object
     values: tuple[Value, ...]
@@ -62,7 +65,7 @@ def _colour(column: Column) -> str:
 
 
 class FiguresTable(QTableView):
-    """See the module. A value of None is written as "–" and stands last in either order."""
+    """A value of None is written as "–" and sorted last in either order."""
 
     row_clicked = Signal(object)  # its key
     row_double_clicked = Signal(object)
@@ -104,17 +107,18 @@ class FiguresTable(QTableView):
         self.choose(chosen)
 
     def set_dimmed(self, dimmed: bool) -> None:
-        """Whether all figures are grey: of something earlier."""
+        """Makes all rows grey: they are of an earlier pluck."""
         self._rows.dimmed = dimmed
         self.viewport().update()
 
     @property
     def rows(self) -> list[TableRow]:
-        """As they stand, sorted."""
+        """In the order in which they are shown."""
         return [self._row(self._sorted.index(place, 0)) for place in range(self._sorted.rowCount())]
 
     @property
     def chosen_key(self) -> object:
+        """The key of the selected row; None: none is."""
         index = self.currentIndex()
         return self._key(index) if index.isValid() else None
 
@@ -138,7 +142,7 @@ class FiguresTable(QTableView):
         QGuiApplication.clipboard().setText(self.text())
 
     def event(self, event: QEvent) -> bool:
-        """Enter and Esc are the table's own while it has the keyboard, whatever the window's shortcuts say."""
+        """Keeps Enter and Esc, which are shortcuts of the window, while the table has the focus."""
         return keeps_own_keys(event) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -163,7 +167,7 @@ class FiguresTable(QTableView):
 
 
 class _Rows(QAbstractTableModel):
-    """What `FiguresTable` shows."""
+    """The model of `FiguresTable`."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
         super().__init__()
@@ -219,7 +223,7 @@ class _Rows(QAbstractTableModel):
 
 
 class _OwnColours(QStyledItemDelegate):
-    """Keeps the colours of the columns in a chosen row."""
+    """Keeps the colours of the columns in the selected row."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)
@@ -236,3 +240,32 @@ class _NoneLast(QSortFilterProxyModel):
         if one is None or other is None:
             return (one is None) == descending if (one is None) != (other is None) else False
         return bool(one < other)
+
+
+def lay_out_table(
+    view: QWidget,
+    before: Sequence[QWidget],
+    words: QWidget,
+    behind: Sequence[QWidget],
+    progress: QWidget,
+    table: FiguresTable,
+) -> None:
+    """A row of small controls with words between them and a button that copies the table; beneath, the table."""
+    copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
+    copy.clicked.connect(table.copy)
+    for control in (*before, *behind, copy):
+        control.setStyleSheet(SMALL)
+    head = QHBoxLayout()
+    head.setContentsMargins(4, 0, 4, 0)
+    head.setSpacing(8)
+    for control in before:
+        head.addWidget(control)
+    head.addWidget(words, 1)
+    for control in (*behind, copy):
+        head.addWidget(control)
+    column = QVBoxLayout(view)
+    column.setContentsMargins(0, 2, 0, 0)
+    column.setSpacing(4)
+    column.addLayout(head)
+    column.addWidget(progress)
+    column.addWidget(table, 1)

@@ -1,4 +1,4 @@
-"""Axes whose picture is kept: numbers and grid stay while curves move."""
+"""Axes that are drawn from a cache while curves move."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ import pyqtgraph as pg
 
 
 def keep_axes(plot: pg.PlotItem) -> None:
-    """Draws them anew only where they have changed: they are most of a painting, which a key may have to wait for."""
+    """Draws them anew only when they change: they are most of a painting, and a key that is played waits for it."""
     for side in ("left", "bottom"):
         plot.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)

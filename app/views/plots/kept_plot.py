@@ -1,4 +1,4 @@
-"""A plot with a line that moves over it: its picture is kept, so that a moved line costs a strip of it."""
+"""A plot with a vertical line that moves over it; its picture is cached, so that only two strips are painted then."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ STRIP = 2  # pixels to either side of the line that are painted with it
 
 
 class KeptPlot(pg.PlotWidget):
-    """`move_line` puts an upright line at a place on the horizontal axis. All else is a plot as any other.
+    """`move_line` puts a vertical line at a place on the horizontal axis. All else is a plot as any other.
 
-    What the scene asks for is painted as ever. Where only the line has moved, a kept picture of the plot is put
-    beneath its old and new places; it is made when it is first wanted after the plot has changed.
+    Where only the line has moved, its old and new strips are painted from a picture of the plot, which is made when
+    it is first wanted after the plot has changed.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self._picture: QPixmap | None = None
-        self._moved = QRegion()  # where the line has come and gone since the last painting
+        self._moved = QRegion()  # strips of the line that changed since the last painting
         self._line_at = 0.0
         self._strip = QRect()  # where it was drawn last
         self._next_strip = QRect()  # and where it is to be
@@ -29,6 +29,7 @@ class KeptPlot(pg.PlotWidget):
 
     @property
     def line_at(self) -> float:
+        """The place of the line on the horizontal axis."""
         return self._line_at
 
     def move_line(self, at: float) -> None:

@@ -1,4 +1,4 @@
-"""Which colour is which: the sources that are drawn, by slot and title, the heard one in full strength."""
+"""The legend: the sources that are drawn, by slot and title, the heard one in its full colour."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _GAP, _BETWEEN = 6, 18
 
 
 def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, middle: float, right: float) -> float:
-    """One behind the other from `x` on; titles are cut where all of them do not fit. Returns where they end."""
+    """Paints a row from `x` to `right` at most, in pixels; cuts titles that do not fit. Returns the row's end."""
     painter.setFont(theme.small_font(12, bold=True))
     metrics = painter.fontMetrics()
     for source, text in zip(sources, _texts(sources, metrics, right - x), strict=True):
@@ -35,7 +35,7 @@ def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, m
 
 
 class Legend(QWidget):
-    """Over a plot, in its upper right corner; the mouse does not notice it."""
+    """Over a plot, in its upper right corner; mouse events pass through it."""
 
     def __init__(self, plot: pg.PlotWidget) -> None:
         super().__init__(plot)
@@ -49,11 +49,11 @@ class Legend(QWidget):
 
     @property
     def text(self) -> str:
-        """What it says, whole."""
+        """All of it, uncut."""
         return "   ".join([*([self._part] if self._part else []), *map(_whole, self._sources)])
 
     def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """`part` of the sound stands before them."""
+        """`part`: which part of the sound they are of, written before them; "" for all of it."""
         self._sources, self._part = sources, part
         self.setAccessibleName(f"Drawn: {self.text}")
         self._place()
@@ -89,7 +89,7 @@ def _whole(source: ShownSource) -> str:
 
 
 def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
-    """What is said of each: all, or where that is too much without what the colour says too, or with titles cut."""
+    """The text of each: whole; where too wide without “heard”, which the colour shows; then with cut titles."""
     for told in (sources, [replace(source, heard=False) for source in sources]):
         if _width(texts := [_whole(source) for source in told], metrics) <= room:
             return texts
@@ -106,5 +106,5 @@ def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -
 
 
 def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
-    """Of all, with their samples of colour."""
+    """The width of all texts in a row, with their samples of colour, in pixels."""
     return sum(STROKE + _GAP + metrics.horizontalAdvance(text) for text in texts) + _BETWEEN * (len(texts) - 1)

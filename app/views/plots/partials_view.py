@@ -1,4 +1,4 @@
-"""A table of the string's partials: what the model makes of each, beside the truth."""
+"""A table of the string's partials, model against truth."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.analysis.take_partials import WINDOWS, PartialRow
-from app.views.controls.parts import combo_box, tool_button, words_label
+from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.controls.segments import SMALL
-from app.views.plots.figures_table import Column, FiguresTable, TableRow
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
 from engine.partials import LEAST_DECAY_DB
 
 
@@ -21,10 +20,12 @@ def hertz(value: float) -> str:
 
 
 def seconds(value: float) -> str:
+    """A T60 in s; ∞: the partial grows."""
     return "grows" if math.isinf(value) else f"{value:.3g}"
 
 
 def signed(value: float, digits: int = 1) -> str:
+    """With its sign, and so many digits after the point."""
     if math.isinf(value):
         return "+∞" if value > 0 else "−∞"
     rounded = round(value, digits) or 0.0  # no minus before a zero
@@ -36,9 +37,13 @@ COLUMNS = (
     Column("Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
     Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
     Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
-    Column("Cents", "Frequency of the model over the truth's, in hundredths of a semitone", lambda v: signed(v, 2)),
-    Column("Level, dB", "Level of the model over the truth's in dB", lambda v: signed(v, 2)),
-    Column("T60, %", "Error of the model's decay time in %", signed),
+    Column(
+        "Cents",
+        "Frequency of the model relative to the truth, in cents (hundredths of a semitone)",
+        lambda v: signed(v, 2),
+    ),
+    Column("Level, dB", "Level of the model relative to the truth, in dB", lambda v: signed(v, 2)),
+    Column("T60, %", "Error of the model's decay time T60, in %", signed),
     Column("Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
     Column("Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
     Column("Note", "Why a row is grey"),
@@ -46,7 +51,7 @@ COLUMNS = (
 
 
 class PartialsView(QWidget):
-    """See the module."""
+    """Rows are known by their mode numbers."""
 
     window_chosen = Signal(str)  # a key of `WINDOWS`
     mode_chosen = Signal(int)
@@ -62,33 +67,18 @@ class PartialsView(QWidget):
         self._words = words_label()
         self.table = FiguresTable("Partials of this pluck", COLUMNS)
         self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
-        copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
-        copy.clicked.connect(self.table.copy)
         self.table.row_clicked.connect(lambda mode: self.mode_chosen.emit(mode))
         self.table.row_entered.connect(lambda mode: self.mode_chosen.emit(mode))
         self.table.escaped.connect(self.solo_ended)
         self.progress = ProgressStrip("Progress of the partials")
-        for control in (self._window, copy):
-            control.setStyleSheet(SMALL)
-        head = QHBoxLayout()
-        head.setContentsMargins(4, 0, 4, 0)
-        head.setSpacing(8)
-        head.addWidget(self._window)
-        head.addWidget(self._words, 1)
-        head.addWidget(copy)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 2, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addWidget(self.progress)
-        column.addWidget(self.table, 1)
+        lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
 
     @property
     def window_key(self) -> str:
         return str(self._window.currentData())
 
     def set_words(self, text: str) -> None:
-        """What there is to say beside the table."""
+        """The line above the table."""
         self._words.setText(text)
 
     def show_partials(self, rows: Sequence[PartialRow]) -> None:
@@ -100,7 +90,7 @@ class PartialsView(QWidget):
         self.table.set_dimmed(True)
 
     def show_solo(self, mode: int) -> None:
-        """Marks the mode that is heard alone; 0: none."""
+        """Marks the soloed mode; 0: none."""
         self.table.choose(mode or None)
 
     @staticmethod

@@ -1,7 +1,7 @@
-"""What all plots share: their ground and axes, and how they take on another face.
+"""What all plots share: the colours of background and axes, and how all colours change with the face.
 
 A plot keeps the pens and brushes that it was made with. When the face changes, every colour of the old one is
-exchanged for the same role's in the new one, with its alpha, so that no view needs to know of it.
+exchanged for that of the same role in the new one, and keeps its alpha. So no view needs to follow the face.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from app.views import theme
 
 
 def dress_plots() -> None:
-    """For all plots that are made from now on; and they follow the face. To be called once."""
+    """Sets the options of plots made from now on, and lets all plots follow the face. To be called once."""
     pg.setConfigOptions(antialias=True, useOpenGL=False)
     _set_ground()
     theme.changes.face_changed.connect(recolour)

@@ -1,4 +1,4 @@
-"""The whole string over time: displacement, or its error, as colour over time and place."""
+"""The whole string over time: displacement, or its error, as colour over time and position."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.views.plots.time_plot import TimePlot
 
 MM = 1000.0
 GAINS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
-AUTO = 0  # the largest of them at which what is given as typical is within the scale
+AUTO = 0  # the largest of them that keeps the typical displacement within the scale
 QUANTITIES = (
     ("model", "Model", "Displacement of the model"),
     ("truth", "Truth", "Displacement of the truth"),
@@ -29,9 +29,9 @@ PLACES = (0, 0.25, 0.5, 0.75, 1)
 
 
 class SpaceTimeView(QWidget):
-    """Each of displacement and error keeps its own gain. Positions are in lengths of the string.
+    """Displacement and error keep a gain of their own. Positions are shares of the string's length.
 
-    Colours are of displacement with its sign, or of magnitudes: bar and readout say the same.
+    Colours show displacement with its sign, or its magnitude; colour bar and readout agree with them.
     """
 
     listening_point_moved = Signal(float)
@@ -62,7 +62,7 @@ class SpaceTimeView(QWidget):
         self._listen = 0.0
         item = self.plot.getPlotItem()
         item.setYRange(0, 1, padding=0)
-        self._label = UprightLabel(item, ("place",))
+        self._label = UprightLabel(item, ("position",))
         self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self._ticks.set((place, f"{place:g}") for place in PLACES)
         self._image = pg.ImageItem(axisOrder="row-major")
@@ -90,11 +90,11 @@ class SpaceTimeView(QWidget):
 
     @property
     def scale_mm(self) -> float:
-        """The displacement of the brightest colours."""
+        """The displacement at the end of the colour scale."""
         return self._full_scale_mm / (self._gain[self._kind] or self._fitting_gain)
 
     def set_take(self, seconds: float, horizon_s: float, full_scale_mm: float) -> None:
-        """`full_scale_mm`: the displacement of the brightest colours at a gain of 1."""
+        """A new take; `full_scale_mm`: the displacement at the end of the colour scale at a gain of 1."""
         self._full_scale_mm = max(full_scale_mm, 1e-3)
         self.plot.set_times(seconds, horizon_s)
         self._image.clear()
@@ -113,7 +113,7 @@ class SpaceTimeView(QWidget):
         typical_mm: float,
         signed: bool = True,
     ) -> None:
-        """Displacement (places, columns) of the times start_s … stop_s, or its magnitude where it is not `signed`.
+        """Displacement (points, columns) of the times start_s … stop_s, or its magnitude where it is not `signed`.
 
         An automatic gain fits `typical_mm`.
         """
@@ -124,14 +124,14 @@ class SpaceTimeView(QWidget):
         self._image.setRect(QRectF(start_s, -half, stop_s - start_s, 1 + 2 * half))
 
     def tell(self, time_s: float, place: float, displacement_mm: float) -> None:
-        """What is drawn there, in the bar's unit."""
+        """Writes in the readout what is drawn there, in the unit of the colour bar."""
         factor, unit = readable_unit(self.scale_mm / MM, "displacement")
         value = factor * displacement_mm / MM
         what = f"{value:+.4g} {unit}" if self._signed else f"peak {value:.4g} {unit}"
-        self.readout.tell(f"{time_s:.4f} s   place {place:.2f}   {what}", what)
+        self.readout.tell(f"{time_s:.4f} s   position {place:.2f}   {what}", what)
 
     def show_nothing(self) -> None:
-        """Nothing is there yet of the times in view."""
+        """Clears the picture: nothing is computed yet of the times in view."""
         self._image.clear()
 
     @property

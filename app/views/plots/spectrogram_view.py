@@ -1,4 +1,4 @@
-"""Level over time and frequency, one source at a time, on one locked scale for all."""
+"""Level over time and frequency, one source at a time, on the same scale for all."""
 
 from __future__ import annotations
 
@@ -16,11 +16,9 @@ from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL, Segments
 from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.colour_maps import level_map
+from app.views.plots.frequency_axis import LOWEST_HZ, RANGES_DB, frequency_ticks
 from app.views.plots.time_plot import TimePlot
 
-LOWEST_HZ = 50.0
-RANGES_DB = (60, 90, 130)
-LABELLED_HZ = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 QUANTITIES = (
     ("model", "Model", "Sound of the model"),
     ("truth", "Truth", "Sound of the truth"),
@@ -30,9 +28,9 @@ SCALES = (("log", "Log", "Octaves of equal height"), ("linear", "Linear", "Parti
 
 
 class SpectrogramView(QWidget):
-    """0 dB is a sine of full scale; what lies below the chosen range is ground."""
+    """0 dB is a sine of full scale; levels below the chosen range have the colour of the background."""
 
-    frequencies_changed = Signal()  # the rows of the picture mean other frequencies
+    frequencies_changed = Signal()  # logarithmic or linear: the rows of the picture are of other frequencies
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -84,25 +82,26 @@ class SpectrogramView(QWidget):
 
     @property
     def lowest_hz(self) -> float:
-        """At the foot of the axis."""
+        """At the lower end of the axis."""
         return LOWEST_HZ if self.logarithmic else 0.0
 
     def frequency_hz(self, height: float) -> float:
-        """At a place on the upright axis."""
+        """The frequency at a place on the vertical axis."""
         return 10**height if self.logarithmic else height
 
     def set_take(self, seconds: float, horizon_s: float, rate_hz: int) -> None:
+        """A new take; the frequency axis ends at half its rate."""
         self.plot.set_times(seconds, horizon_s)
         if rate_hz / 2 != self._highest_hz:
             self._highest_hz = rate_hz / 2
             self._label_frequencies()
 
     def set_full_scale(self, words: str) -> None:
-        """What 0 dB is the level of."""
+        """The amplitude of the sine that is 0 dB, in words."""
         self._bar_label.set(f"dB re {words}", "dB")
 
     def begin_picture(self, columns: int, rows: int, hop_s: float) -> None:
-        """Forgets what is drawn: the columns to come are other ones, the k-th at the time k·hop_s."""
+        """Clears the picture; the columns to come are `rows` high, the k-th at the time k·hop_s."""
         self._levels_db = np.zeros((columns, rows), np.float32)
         self._pixels = np.zeros((columns, rows), np.uint8)
         self._hop_s = hop_s
@@ -110,14 +109,14 @@ class SpectrogramView(QWidget):
         self._image.clear()
 
     def show_columns(self, first: int, levels_db: NDArray[np.float32]) -> None:
-        """Adds columns (columns, rows) from the `first` on."""
+        """Draws levels (columns, rows) from the column `first` on."""
         assert self._levels_db is not None
         self._drawn = first + len(levels_db)
         self._levels_db[first : self._drawn] = levels_db
         self._colour(first)
 
     def _colour(self, first: int) -> None:
-        """Levels as colours, from a column on."""
+        """Colours the levels from a column on."""
         assert self._levels_db is not None
         share = self._levels_db[first : self._drawn] / self.range_db + 1
         self._pixels[first : self._drawn] = np.clip(share, 0, 1) * 255
@@ -129,11 +128,11 @@ class SpectrogramView(QWidget):
             self._image.setRect(QRectF(-half, low, self._drawn * self._hop_s, high - low))
 
     def _tell_range(self) -> None:
-        """Says why there is nothing to be seen."""
+        """Says so where all levels are below the range, and nothing is seen."""
         assert self._levels_db is not None
         below = float(self._levels_db[: self._drawn].max()) < -self.range_db
         words = f"below −{self.range_db} dB"
-        self.readout.rest(*((f"all of it lies {words}", words) if below else ("",)))
+        self.readout.rest(*((f"all levels are {words}", words) if below else ("",)))
 
     def _take_face(self) -> None:
         self._image.setLookupTable(level_map().getLookupTable(nPts=256))
@@ -156,5 +155,4 @@ class SpectrogramView(QWidget):
     def _label_frequencies(self) -> None:
         item = self.plot.getPlotItem()
         item.setYRange(*self._heights(), padding=0)
-        ticks = [(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in LABELLED_HZ]
-        self._ticks.set(ticks if self.logarithmic else None)
+        self._ticks.set(frequency_ticks() if self.logarithmic else None)

@@ -1,4 +1,4 @@
-"""The spectrum of what is heard at the playhead: dB against log frequency."""
+"""The spectrum of what is heard at the playhead: level in dB over the logarithm of frequency."""
 
 from __future__ import annotations
 
@@ -20,16 +20,15 @@ from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
 from app.views.plots.axis_label import UprightLabel, fit_foot
 from app.views.plots.curves import set_curves
+from app.views.plots.frequency_axis import LOWEST_HZ, RANGES_DB, frequency_ticks
 from app.views.plots.kept_axes import keep_axes
 from app.views.plots.legend import Legend
 
 FLOOR_DB, CEILING_DB = -130.0, 0.0
-LOWEST_HZ = 50.0
 WINDOW_S = 0.18
 COLUMNS = 480
-PADDING = 4  # times the window
-AREA_STEP = 3  # columns
-RANGES_DB = (60, 90, 130)
+PADDING = 4  # length of the transform, in windows
+AREA_STEP = 3  # columns to a point of the filled area
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,7 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
+        """(COLUMNS,), from LOWEST_HZ to half the rate."""
         return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
 
     @cached_property
@@ -54,12 +54,12 @@ class Analyser:
 
     @cached_property
     def _bins(self) -> NDArray[np.float64]:
-        """The columns' places in the padded spectrum."""
+        """The columns' places in the padded spectrum, in bins."""
         return self.column_hz * PADDING * self.window_frames / self.rate_hz
 
     @cached_property
     def _first_bins(self) -> NDArray[np.intp]:
-        """Where columns are wider than bins: each one's first."""
+        """The first bin of each column, where columns are wider than bins."""
         return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
 
     @cached_property
@@ -82,14 +82,14 @@ class Analyser:
 
 @lru_cache(maxsize=4)
 def analyser_at(rate_hz: int) -> Analyser:
-    """The same one each time: it keeps its window and its columns."""
+    """The analyser of a rate; it is kept, with its window and columns."""
     return Analyser(rate_hz)
 
 
 class SpectrumView(QWidget):
-    """What the slots hold, on one locked pair of axes; the heard source is on top. The mouse reads a frequency."""
+    """What the slots hold, on the same axes; the heard source is on top. The mouse reads a frequency."""
 
-    hovered = Signal(float)  # a frequency in Hz; not a number where the mouse has left
+    hovered = Signal(float)  # a frequency in Hz; NaN where the mouse has left
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -113,12 +113,10 @@ class SpectrumView(QWidget):
         item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)
-        item.getAxis("bottom").setTicks(
-            [[(math.log10(f), f"{f:g}" if f < 1000 else f"{f / 1000:g}k") for f in _LABELLED_HZ]]
-        )
+        item.getAxis("bottom").setTicks([frequency_ticks()])
         item.getAxis("bottom").enableAutoSIPrefix(False)
         self._curves: dict[str, pg.PlotDataItem] = {}
-        # slot B's, an area of a third of the points, not smoothed: a fill of the curve takes longer than all else
+        # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
         self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
         self._area_of: str | None = None
         item.addItem(self._area)
@@ -146,7 +144,7 @@ class SpectrumView(QWidget):
             self._fit()
 
     def set_full_scale(self, words: str) -> None:
-        """What 0 dB is the level of."""
+        """The amplitude of the sine that is 0 dB, in words."""
         self._label.set(f"dB re {words}", "dB")
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
@@ -160,7 +158,7 @@ class SpectrumView(QWidget):
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], analyser: Analyser) -> None:
-        """A signal in units of full scale, a window of it."""
+        """Draws the spectrum of a window of signal, (frames,), in units of full scale."""
         levels = analyser.level_db(signal)
         self._levels_db[source], self._analysers[source] = levels, analyser
         self._curves[source].setData(analyser.column_hz, levels)
@@ -176,7 +174,7 @@ class SpectrumView(QWidget):
             self._area.setData([], [])
 
     def levels_db(self, frequency_hz: float) -> dict[str, float]:
-        """What is drawn at a frequency, by source; nothing of those whose rate does not reach so far."""
+        """The levels drawn at a frequency, by source, without sources whose rate does not reach it."""
         levels_db = {}
         for source, levels in self._levels_db.items():
             analyser = self._analysers[source]
@@ -186,7 +184,7 @@ class SpectrumView(QWidget):
         return levels_db
 
     def show_readout(self, text: str, partial_hz: float | None = None) -> None:
-        """Text beside the axes, and a line at a partial."""
+        """Text above the plot, and a line at a partial; None: no line."""
         self.readout.tell(text)
         self._partial.setVisible(partial_hz is not None)
         if partial_hz is not None:
@@ -216,6 +214,3 @@ class SpectrumView(QWidget):
             yRange=(CEILING_DB - self.range_db, CEILING_DB),
             padding=0,
         )
-
-
-_LABELLED_HZ = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)

@@ -24,14 +24,14 @@ _PAN_BUTTONS = Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton
 
 
 class TimePlot(KeptPlot):
-    """See the module. What is drawn in it is its owner's; the line that moves is the playhead."""
+    """The owner draws the curves; the line of `KeptPlot` is the playhead, in s."""
 
-    seek_asked = Signal(float)
-    pointed = Signal(float, float)  # a press with Shift: time in s, place on the upright axis
-    hovered = Signal(float, float)  # the same, of the mouse; not a number where it has left
+    seek_asked = Signal(float)  # a time in s
+    pointed = Signal(float, float)  # a press with Shift: time in s, place on the vertical axis
+    hovered = Signal(float, float)  # the same, of the mouse; NaN where it has left
 
     def __init__(self, name: str, tip: str, parent: QWidget | None = None, *, shaded: bool = True) -> None:
-        """`shaded`: what lies past training; not under a picture, which would hide it as far as it reaches."""
+        """`shaded`: whether the time past training is shaded; not under an image, which would hide the shade."""
         super().__init__(parent)
         self.setAccessibleName(name)
         self.setToolTip(tip)
@@ -69,9 +69,9 @@ class TimePlot(KeptPlot):
         item.setXRange(0, self._seconds, padding=0)
 
     def set_times(self, seconds: float, horizon_s: float) -> None:
-        """The whole of a take of `seconds` of a model that was trained for `horizon_s`.
+        """The length of the take, and for how long its model was trained.
 
-        What is in view stays, where the take before was as long.
+        The view is kept where the take before was as long.
         """
         item = self.getPlotItem()
         item.setLimits(xMin=0, xMax=seconds, minXRange=min(SHORTEST_VIEW_S, seconds))
@@ -82,23 +82,24 @@ class TimePlot(KeptPlot):
         self._untrained.setRegion((horizon_s, max(seconds, horizon_s)))
         self._horizon.setValue(horizon_s)
         self._edge.setValue(horizon_s)
-        self._edge.setVisible(inside and not self._shaded)  # what sets the line off from a picture
+        self._edge.setVisible(inside and not self._shaded)  # sets the line off from an image
         self._horizon.setVisible(inside)
         self._untrained.setVisible(inside and self._shaded)
 
     def show_playhead(self, position_s: float) -> None:
+        """Moves the playhead; costs nothing where it is there already."""
         if position_s != self.line_at:
             self.move_line(position_s)
 
     @property
     def times_s(self) -> tuple[float, float]:
-        """What is in view, within the take."""
+        """The start and the end of the view, within the take."""
         low, high = self.getPlotItem().vb.viewRange()[0]
         return max(low, 0.0), min(high, self._seconds)
 
     @property
     def columns(self) -> int:
-        """How many pixels there are for it."""
+        """The width of the view in pixels of the screen; 1 at least."""
         return max(round(self.getPlotItem().vb.width() * self.devicePixelRatioF()), 1)
 
     # Zoom and pan
@@ -107,7 +108,7 @@ class TimePlot(KeptPlot):
         self.show_times(0.0, self._seconds)
 
     def show_times(self, low_s: float, high_s: float) -> None:
-        """Brings a stretch of time into view, moved into the take where it lies beyond its ends."""
+        """Sets the view, moved into the take where it lies beyond its ends."""
         span = min(max(high_s - low_s, SHORTEST_VIEW_S), self._seconds)
         low_s = min(max(low_s, 0.0), self._seconds - span)
         self.getPlotItem().setXRange(low_s, low_s + span, padding=0)
@@ -120,6 +121,7 @@ class TimePlot(KeptPlot):
         self.show_times(about_s - (about_s - low) * factor, about_s + (high - about_s) * factor)
 
     def pan(self, by_s: float) -> None:
+        """Moves the view to later times; to earlier ones where `by_s` is negative."""
         low, high = self.times_s
         self.show_times(low + by_s, high + by_s)
 

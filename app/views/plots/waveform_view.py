@@ -19,13 +19,14 @@ FEW_PIXELS = 4
 
 
 def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64], around: int = 1) -> NDArray[np.float32]:
-    """An upright stroke for each column of frames, from its lowest to its highest value, as pairs of ends.
+    """A vertical stroke for each column of frames, from its lowest to its highest value: ends (2 · columns,).
 
     Each reaches as far as the next one's first sample, so that a steep flank has no gaps.
 
     Args:
-        edges: Rising, one more than there are columns: where each begins, and where the last ends.
-        around: Of how many columns, it among them, a stroke has the extremes.
+        signal: (frames,).
+        edges: (columns + 1,), rising: the frames at which each column begins, and where the last ends.
+        around: a stroke has the extremes of so many columns, centred on its own.
     """
     starts, meets = edges[:-1], signal[np.minimum(edges[1:], len(signal) - 1)]
     values = np.empty(2 * len(starts), np.float32)
@@ -37,7 +38,7 @@ def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64], around: int 
 
 
 def _neighbours(values: NDArray[np.float32], around: int) -> NDArray[np.float32]:
-    """Shape (values, around): each with those about it."""
+    """(values, around): each value with its neighbours."""
     before = (around - 1) // 2
     padded = np.pad(values, (before, around - 1 - before), mode="edge")
     return np.lib.stride_tricks.sliding_window_view(padded, around)
@@ -65,21 +66,16 @@ class WaveformView(TimePlot):
         self.set_scale(5.0, "displacement", "mm")
 
     def set_take(self, seconds: float, horizon_s: float, period_s: float = 0.0) -> None:
-        """A time axis for a take of `seconds` of a model that was trained for `horizon_s`, of a string's period."""
+        """A new take, without signals yet; `period_s`: the period of its string, 0: not known."""
         self._period_s = period_s
         self.set_times(seconds, horizon_s)
         for source in self._curves:
             self.clear_signal(source)
 
     def set_scale(self, full: float, quantity: str, unit: str) -> None:
-        """The upright axis from −full to full in `unit`, which alone is told where there is little room."""
+        """The vertical axis, from −full to full in `unit`."""
         self.getPlotItem().setYRange(-full, full, padding=0.02)
         self._label.set(f"{quantity} ({unit})", unit)
-
-    @property
-    def columns(self) -> int:
-        """How many pixels of the screen a signal over all of the axis is drawn in."""
-        return max(1, round(self.getPlotItem().vb.width() * self.devicePixelRatioF()))
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
         """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""
@@ -87,16 +83,16 @@ class WaveformView(TimePlot):
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
-        """What there is so far, from time 0, in the unit of the axis. What lies in view is drawn at full detail."""
+        """The samples so far, (frames,) from time 0, in the unit of the axis; draws those in view, none left out."""
         low_s, high_s = self.times_s
-        # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and
-        # nothing else in this process runs meanwhile, not even what feeds the loudspeaker.
+        # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and a key
+        # that is played waits for the painting.
         if (high_s - low_s) * rate_hz > self.columns:
             borders_s = np.linspace(low_s, high_s, self.columns + 1)
             edges = np.ceil(borders_s * rate_hz).astype(np.int64).clip(0, len(signal))
             there = np.flatnonzero(edges[1:] > edges[:-1])
             middles_s = (borders_s[there] + borders_s[there + 1]) / 2
-            # Where a period has but a few pixels, each is given all of it: halves of periods would beat with them.
+            # Where a period is a few pixels wide, each stroke has the extremes of a whole one, or they would beat.
             pixels = self._period_s * self.columns / (high_s - low_s)
             around = math.ceil(pixels) if 0 < pixels < FEW_PIXELS else 1
             values = extremes(signal, edges[there[0] : there[-1] + 2], around) if len(there) else signal[:0]

@@ -1,1 +1,1 @@
-"""The string under the hands."""
+"""The picture of the string: its motion, the pluck, the listening points, and the gestures on them."""

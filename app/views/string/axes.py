@@ -1,4 +1,4 @@
-"""Where things stand in the picture of the string: lengths and mm to pixels, and back."""
+"""The axes of the string's picture: positions and displacements to pixels, and back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,11 @@ MARGIN_BOTTOM = 40
 
 @dataclass(frozen=True)
 class StringAxes:
-    """The axes in a widget of `width` × `height` pixels; `span_mm` is the half height."""
+    """The axes in a widget of `width` × `height` pixels; `span_mm` is the half height.
+
+    Positions are shares of the string's length, 0 … 1. `x`, `y` and `at` give pixels of the widget, `position` and
+    `displacement_mm` are their inverses.
+    """
 
     width: int
     height: int
@@ -26,7 +30,7 @@ class StringAxes:
 
     @property
     def length(self) -> float:
-        """Of the string, in pixels."""
+        """The length of the string, in pixels."""
         return max(1.0, self.width - 2 * MARGIN_X)
 
     @property
@@ -61,7 +65,7 @@ class StringAxes:
         return (self.middle - y) / self.half_height * self.span_mm
 
     def curve(self, displacement_mm: NDArray[np.floating]) -> QPolygonF:
-        """A line through (points,) displacements from end to end."""
+        """A line through displacements (points,), evenly spaced from end to end."""
         polygon = create_qpolygonf(len(displacement_mm))
         corners = ndarray_from_qpolygonf(polygon)
         corners[:, 0] = _places(self.x(0), self.x(1), len(corners))
@@ -71,7 +75,7 @@ class StringAxes:
     def band(
         self, lowest_mm: NDArray[np.floating], highest_mm: NDArray[np.floating]
     ) -> tuple[QPolygonF, QPolygonF, QPolygonF]:
-        """The area between two lines, and both lines."""
+        """The area between two such lines, and both lines."""
         low, high = self.curve(lowest_mm), self.curve(highest_mm)
         area = create_qpolygonf(low.size() + high.size())
         corners = ndarray_from_qpolygonf(area)

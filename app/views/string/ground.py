@@ -1,4 +1,4 @@
-"""What lies behind the string: the grid, and the plucks that the model was not trained on, with a word why."""
+"""What lies behind the string: grid, scale, hatching outside the training range, and the legend above."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
 
 @dataclass(frozen=True)
 class TrainedPlucks:
-    """The positions and amplitudes that the model was trained on; None: all."""
+    """The positions and amplitudes that the model was trained on, (lowest, highest); None: all."""
 
     position: tuple[float, float] | None = None
     amplitude_mm: tuple[float, float] | None = None
 
 
 def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
-    """All of it.
+    """Paints the gradient, the grid, the scale and the hatching.
 
-    `pluck`: 0 or 1, towards which end of the string it is, while it is shown. Only then are amplitudes shaded, for a
-    string in motion crosses them all.
+    `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
+    pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
     """
     gradient = QLinearGradient(0, 0, 0, axes.height)
     gradient.setColorAt(0, QColor(theme.face.ground_top))
@@ -43,7 +43,7 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
     paint_grid(painter, axes)
     _paint_scale(painter, axes)
     if trained.position is not None:
-        _paint_untrained_positions(painter, axes, trained.position)
+        _paint_untrained_positions(painter, axes, trained.position, words=pluck is not None)
     if pluck is not None and trained.amplitude_mm is not None:
         _paint_untrained_amplitudes(painter, axes, trained, pluck)
 
@@ -74,9 +74,9 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
 
 
 def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
-    """Which colour is which, and why this pluck is silent or unknown to the model; up to `right`.
+    """Paints the sources and, beside them, the warning, as far as `right` in pixels.
 
-    What warns is whole first, as far as it leaves room for the letters of the slots.
+    Where both do not fit, the titles of the sources are cut first, but they keep LEGEND_SHARE of the line.
     """
     warned = QFontMetrics(theme.small_font(11)).horizontalAdvance(warning) + 8 if warning else 0
     room = right - MARGIN_X
@@ -97,17 +97,19 @@ def _shade(painter: QPainter, area: QRectF) -> None:
     painter.drawRect(area)
 
 
-def _paint_untrained_positions(painter: QPainter, axes: StringAxes, trained: tuple[float, float]) -> None:
+def _paint_untrained_positions(
+    painter: QPainter, axes: StringAxes, trained: tuple[float, float], words: bool
+) -> None:
     low, high = trained
     height = axes.bottom - axes.top
-    words = ("not trained here", f"only plucks at {low:g} … {high:g}")
+    lines = ("not trained here", f"only plucks at {low:g} … {high:g}") if words else ()
     for start, stop in ((0.0, low), (high, 1.0)):
         if stop <= start:
             continue
         area = QRectF(axes.x(start), axes.top, axes.x(stop) - axes.x(start), height)
         _shade(painter, area)
         painter.setFont(theme.small_font(11))
-        for row, text in enumerate(words):
+        for row, text in enumerate(lines):
             painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
             line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
             if painter.fontMetrics().horizontalAdvance(text) > line.width():

@@ -18,8 +18,8 @@ from app.views.string.ground import paint_grid
 
 HANDLE_RADIUS = 7.0
 DASH = 4  # pixels
-PIECE, EVERY = 9, 24  # pixels: of a line that another hides, so much is drawn above it, so often
-MERGED = 2.0  # pixels: two lines that are nearer are one to the eye
+PIECE, EVERY = 9, 24  # pixels: length and spacing of the pieces of a hidden line that are drawn above the other
+MERGED = 2.0  # pixels: of two lines that are nearer, one hides the other
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class ShownPluck:
 
 
 def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
-    """The sources, the heard one in front, and pieces of what it hides above it.
+    """The sources, the heard one in front, and above it pieces of the lines that it hides.
 
     Opaque fills and thin pens only: this is drawn sixty times a second.
     """
@@ -76,20 +76,20 @@ def _hidden_pieces(axes: StringAxes, below: NDArray[np.float32], above: NDArray[
 
 
 def _heights(axes: StringAxes, shape_mm: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The line's height in the picture at places along the string, both in pixels."""
+    """The y of the line at distances from the string's left end, both in pixels."""
     points = np.linspace(0, axes.length, len(shape_mm))
     return axes.middle - np.interp(at, points, shape_mm) * (axes.half_height / axes.span_mm)
 
 
 def paint_envelopes(painter: QPainter, axes: StringAxes, envelopes: Mapping[str, Band], heard: str) -> None:
-    """What lies behind the motion, and changes less often."""
+    """The envelopes, which lie behind the motion and change less often."""
     painter.setClipRect(QRectF(axes.at(0, axes.span_mm), axes.at(1, -axes.span_mm)))
     for name in sorted(envelopes, key=lambda name: name == heard):
         _paint_band(painter, axes, envelopes[name], name, 0.07)
 
 
 def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, strength: float) -> None:
-    """An area with thin edges, so that what lies behind another still tells its extent."""
+    """An opaque area with thin edges, which show its extent where another band covers it in part."""
     colour = _hue(name)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
     painter.setPen(Qt.PenStyle.NoPen)
@@ -104,7 +104,7 @@ def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, stre
 
 
 def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
-    """The string as it is pulled."""
+    """The string as it is pulled, before it is let go."""
     curve = axes.curve(pluck.shape_mm)
     area = QPolygonF(curve)
     area.append(axes.at(1, 0))
@@ -123,7 +123,7 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """The handle: `full` beside a string at rest, a ring while it moves; its words where it is full or grabbed."""
+    """The handle: `full` on a string at rest, a ring while it moves; with its values where it is full or grabbed."""
     painter.setPen(Qt.PenStyle.NoPen)
     if grabbed:
         painter.setBrush(theme.translucent(theme.TEXT, 50))
@@ -179,7 +179,7 @@ def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, 
 
 
 def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
-    """The moment, in the corner of the picture."""
+    """The time that is shown, in the corner of the picture."""
     painter.setFont(theme.small_font(12))
     painter.setPen(QColor(theme.WARNING if frame.past_horizon else theme.TEXT))
     area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)

@@ -1,8 +1,8 @@
 """The string: what the slots hold in motion, the pluck that is being drawn, and the listening points.
 
-Click on the string: where it is pulled, as far as the last time. Drag on it: where and how far; the wheel over the
-handle sets the width, with Shift the shape. Drag a marker beneath it: where it is heard. A double-click on either
-goes back to the default.
+A click on the string plucks it there with the last amplitude, a drag there with the amplitude of its end. The wheel
+over the handle sets the width, with Shift the shape. Dragging a marker beneath the string moves a listening point. A
+double-click on handle or marker resets it.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ from engine.pluck import DEFAULT_LISTEN
 SPANS_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)  # the display's half height, chosen to fit
 GRAB_PIXELS = 14  # how near a handle or a marker counts as on it
 FINE = 0.1  # with Shift
-LEAST_DRAGGED_MM = 0.5  # what ends on the string's line is meant to be heard all the same
+LEAST_DRAGGED_MM = 0.5  # so that a drag that ends on the string's line is heard
 WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
 
 MARKER_TIP = "Drag to hear the string from another point; double-click resets. Shift and arrow keys move it"
 TIPS: dict[str | None, str] = {  # by what the pointer is on
-    None: "Click or drag to pluck the string; Shift is finer. Enter plucks again, F1 shows all keys",
+    None: "Click or drag to pluck the string; with Shift the drag is finer. Enter plucks again, F1 shows all keys",
     "pluck": "Drag along the string for the position, up and down for the amplitude; double-click resets.\n"
     "The wheel sets the width, with Shift the shape. Arrow keys do the same, with Ctrl for width and shape",
     "left": MARKER_TIP,
@@ -63,13 +63,13 @@ _Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardM
 
 
 class StringView(QWidget):
-    """See the module. Positions are in lengths, displacement in mm; a `side` is "left" or "right"."""
+    """Positions are shares of the string's length, displacements in mm; a `side` is "left" or "right"."""
 
     pluck_drawn = Signal(float, float)  # position, amplitude: while dragging
     pluck_released = Signal()
     pluck_reset = Signal()
-    width_stepped = Signal(float)  # notches
-    shape_stepped = Signal(int)  # the next or the previous
+    width_stepped = Signal(float)  # notches of the wheel
+    shape_stepped = Signal(int)  # so many shapes on or back
     listening_point_moved = Signal(str, float)  # side, position
     listening_point_reset = Signal(str)
     drag_started = Signal()
@@ -97,8 +97,8 @@ class StringView(QWidget):
         self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
         self._dragged_at = QPointF()
         self._pressed_at = QPointF()
-        self._on_bare_string = False  # there, not on something to grab
-        self._far = False  # whether the drag has gone too far from there to be a click
+        self._on_bare_string = False  # the press was not on a handle or a marker
+        self._far = False  # the drag has gone too far from the press to be a click
         self._amplitude_mm = 0.0  # at its beginning
         self._hovered: str | None = None
         self._on_handle_first = False  # the last press was the first of a series, and on the handle
@@ -137,21 +137,22 @@ class StringView(QWidget):
         self.update()
 
     def set_trained(self, trained: TrainedPlucks) -> None:
+        """The training range, outside of which the picture is hatched."""
         self._trained = trained
         self.update()
 
     def set_warning(self, text: str) -> None:
-        """Why this pluck is silent, or outside what the model knows."""
+        """Why this pluck is silent, or outside the training range; "" for neither."""
         self._warning = text
         self.update()
 
     def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
-        """What the slots hold; frames should have their motions."""
+        """What the slots hold; the frames given to `show_frame` should have these motions."""
         self._sources = sources
         self.update()
 
     def set_shown(self, motion: bool, envelope: bool) -> None:
-        """What of the motion is switched on; the frames given should agree."""
+        """The state of both buttons; the frames given to `show_frame` should agree with it."""
         for button, on in zip(self._toggles, (motion, envelope), strict=True):
             button.setChecked(on)
         self._toggles[1].setEnabled(motion)
@@ -163,7 +164,7 @@ class StringView(QWidget):
         if frame is None or before is None or self._span_mm != span_mm:
             if frame is not before:
                 self.update()
-        else:  # all that moves lies in one rectangle, between the words above and those below
+        else:  # all that moves lies in one rectangle, between the legend above and the markers below
             self.update(0, WORDS_HEIGHT, self.width(), math.ceil(self._axes().bottom) - WORDS_HEIGHT)
 
     @property
@@ -198,7 +199,7 @@ class StringView(QWidget):
             self._start_drag(on, event.position())
 
     def _start_drag(self, on: str | None, at: QPointF) -> None:
-        if on is None or on == "pluck":  # on the pluck's scale, whatever has decayed meanwhile
+        if on is None or on == "pluck":  # at the scale of the pluck, not of the decayed motion
             self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         axes = self._axes()
         self.drag_started.emit()
@@ -212,7 +213,7 @@ class StringView(QWidget):
             self._dragged = (self._listening[on], 0.0)
         else:
             self._dragged = (axes.position(at.x()), axes.displacement_mm(at.y()))
-            self.pluck_drawn.emit(self._dragged[0], self._amplitude_mm)  # which is all that a click does
+            self.pluck_drawn.emit(self._dragged[0], self._amplitude_mm)  # a click does no more
         self.update()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -321,11 +322,11 @@ class StringView(QWidget):
         return StringAxes(self.width(), self.height(), self._span_mm)
 
     def _handle(self, axes: StringAxes) -> QPointF:
-        """In a decayed motion's scale the pluck lies above the picture; its handle stays at the edge."""
+        """Where the handle is; at the upper edge where the scale of a decayed motion is less than the pluck."""
         return axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
 
     def _fit_span(self) -> None:
-        """The span of the pluck at rest, or what follows the decay; while a pluck is drawn it can only grow."""
+        """Sets the span from the pluck at rest, or from the motion; while a pluck is dragged it only grows."""
         if self._drag == "pluck":
             self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         elif self._frame is None:
@@ -415,5 +416,5 @@ class StringView(QWidget):
 
 
 def _span_mm(largest_mm: float, air: float = 1.15) -> float:
-    """The least span that holds a displacement with some air."""
+    """The least of SPANS_MM that is at least `air` times a displacement."""
     return next((span for span in SPANS_MM if span >= air * largest_mm), SPANS_MM[-1])

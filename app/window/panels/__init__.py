@@ -1,6 +1,6 @@
-"""What the window shows of the motion on stage, one panel an aspect: a view, and what is told to it.
+"""The panels, one for each view: they compute what it shows of the present motion.
 
-`base.py` has the contract; the controller holds the list of panels and tells them all the same things.
+`base.py` has the contract; the controller holds the list of panels and calls all of them alike.
 """
 
 from app.window.panels.base import Moment, Panel

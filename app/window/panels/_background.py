@@ -1,10 +1,10 @@
 """A panel's own thread for what takes longer than a few milliseconds.
 
-It does the latest job alone: asking for another abandons the one under way. What it says reaches the window's thread
-through queued signals, and nothing of an abandoned job arrives any more.
+Only the latest job is done: starting another abandons the one under way. Results reach the window's thread through
+queued signals; nothing of an abandoned job arrives any more.
 
-It gives way to what is being drawn: it computes on one core, mostly without the interpreter's lock, steps back behind
-them, and rests between the pieces of a job, while a pluck is rendered, and while nobody looks at the panel.
+Jobs give way to playing and drawing: they compute on one core at a low priority, and pause between their pieces,
+while a pluck is rendered, and while the panel is hidden.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from engine.presets import PresetError
 BREATH_S = 0.001  # between pieces of a job
 LOOK_AGAIN_S = 0.02
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
-UNSEEN_S = 1.0  # a panel that has not been looked at for so long is hidden
-REPORT_EVERY_S = 0.1  # shares of progress; results are told at once
+UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
+REPORT_EVERY_S = 0.1  # shares of progress; results are reported at once
 
 Work = Callable[[Job], object]
 
 
 @dataclass(frozen=True)
 class _Task:
-    """A job that was asked for, by its number."""
+    """A job and its number. `check` and `report` raise Cancelled where it was abandoned."""
 
     number: int
     work: Work
@@ -54,7 +54,10 @@ class _Task:
 
 
 class Background(QObject):
-    """See the module. Signals arrive in the thread that made this; the thread starts with the first job."""
+    """All public methods belong to the thread that made it, where its signals arrive too.
+
+    Its own thread starts with the first job.
+    """
 
     progressed = Signal(float, object)  # share of the job, and a result so far or None
     finished = Signal(object)
@@ -78,20 +81,20 @@ class Background(QObject):
         self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
 
     def give_way_to(self, take: Take) -> None:
-        """Lets jobs rest while this take is rendered: its picture comes first."""
+        """Pauses jobs while this take is rendered."""
         self._growing = take
 
     def look(self) -> None:
-        """The panel can be seen; a job rests while this has not been said for a while."""
+        """To be called while the panel is visible; UNSEEN_S after the last call jobs pause."""
         self._seen_s = time.monotonic()
 
     @property
     def busy(self) -> bool:
-        """Whether the latest job is still under way, as far as the window has heard."""
+        """Whether the latest job has been started and its end has not arrived yet."""
         return self._busy
 
     def start(self, work: Work) -> None:
-        """Does `work` as soon as the one under way has given up. Its return value is told by `finished`."""
+        """Does `work` as soon as the job under way has given up; `finished` has its return value."""
         self.look()
         with self._mailbox:
             self._number += 1
@@ -110,7 +113,7 @@ class Background(QObject):
         self._busy = False
 
     def close(self) -> None:
-        """Ends the thread; may be called again."""
+        """Ends the thread, waiting 10 s at most; may be called again."""
         self.cancel()
         with self._mailbox:
             self._closing = True
@@ -132,7 +135,7 @@ class Background(QObject):
         return number != self._number
 
     def give_way(self, task: _Task) -> None:
-        """Returns when the panel is seen and no pluck is being rendered, or the job is abandoned."""
+        """Returns when the panel is visible and no pluck is being rendered, or the job is abandoned."""
         while time.monotonic() - self._seen_s > UNSEEN_S and not self.is_abandoned(task.number):
             time.sleep(LOOK_AGAIN_S)
         ready_frames, since_s = -1, time.monotonic()
@@ -168,13 +171,13 @@ class Background(QObject):
                 pass
             except PresetError as error:
                 self._said.emit(task.number, "failed", (str(error), ""))
-            except Exception as error:  # told to the user; the thread lives on
+            except Exception as error:  # shown to the user; the thread goes on
                 self._said.emit(task.number, "failed", (f"Computing failed: {error}", traceback.format_exc()))
             del task  # it may hold a take
 
 
 class _OneCore:
-    """While any job is under way, its thread computes on one core; then all is as it was.
+    """While any job is under way, torch computes on one core; then the usual number is set again.
 
     PyTorch's number of threads belongs partly to the calling thread and partly to the process, so whoever ends last
     puts it back.

@@ -1,9 +1,9 @@
-"""A panel: a view, and the rules by which it shows what is on stage.
+"""A panel: a view, and what decides what it shows.
 
-A view (`app/views/`) only knows how to draw what it is given and which gestures it offers. Its panel listens to the
-session and to the stage, computes what is to be drawn, and turns gestures into intents: of the session, or of the
-controller through the signals here. Everything runs in the window's thread; what takes longer than a few milliseconds
-belongs in a thread of the panel's own, ended in `close`.
+A view (`app/views/`) draws what it is given and emits signals for gestures. Its panel is called when choices change,
+when another motion is rendered, and for each frame; it computes what is to be drawn, and turns gestures into changes
+of the session or into the signals here. Everything runs in the window's thread; what takes longer than a few
+milliseconds belongs in a thread of the panel's own, ended in `close`.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from engine.metrics import ErrorSums
 
 @dataclass(frozen=True)
 class Moment:
-    """What is on stage now.
+    """What is to be shown now.
 
     Attributes:
         take: the motion, or None before the first.
-        position_s: the playhead, of what is heard now.
-        elapsed_s: of the watcher's time since the last moment.
+        position_s: the playhead, from the pluck on: what is heard now.
+        playing: whether the playhead moves.
+        elapsed_s: since the last call of `show_moment`, by the clock.
     """
 
     take: Take | None
@@ -36,12 +37,12 @@ class Moment:
     elapsed_s: float
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
-        """What a picture of the take depends on; as long as it is the same and nothing plays, so is the picture."""
+        """What a picture of the take depends on: while it is equal and nothing plays, the picture is the same."""
         return self.take, self.take.progress if self.take is not None else (), self.position_s, choices
 
 
 class Panel(QObject):
-    """See the module. Subclasses set `key`, `title`, `view` and override what concerns them."""
+    """Subclasses set `key`, `title`, `help` and `view`, and override the methods that they need."""
 
     key: ClassVar[str]  # in `Choices.left_view` or `right_view`
     title: ClassVar[str]  # on its tab
@@ -59,16 +60,16 @@ class Panel(QObject):
         self.library = library
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        """Fields of `Choices` that have new values; at the start all of them."""
+        """Called with the fields of `Choices` that have new values; at the start with all of them."""
 
     def take_started(self, take: Take) -> None:
-        """Another motion is on stage; it grows from now on."""
+        """Called with another motion, of which nothing is rendered yet; it grows from now on."""
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
-        """All of it is there."""
+        """Called when all of it is rendered, with the sums of its errors."""
 
     def show_moment(self, moment: Moment) -> None:
-        """Sixty times a second for the string, thirty for the others, while the panel can be seen."""
+        """Called while the panel is visible: for the string 60 times a second, for the others 30, less at rest."""
 
     def close(self) -> None:
-        """The window closes."""
+        """Called when the window closes: ends the panel's threads."""

@@ -1,6 +1,6 @@
-"""Several presets on the present pluck, computed one after the other while the table is looked at.
+"""Several presets on the present pluck, computed one after the other while the table is visible.
 
-What is heard comes first: the chosen preset, those in the slots, then the others.
+The chosen preset comes first, then those in the slots, then the others.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ SETTLED_S = 0.5  # a pluck that is still being moved is not computed
 class ComparePanel(Panel):
     key = "compare"
     title = "Compare"
-    help = "Several presets on the present pluck: errors, null depth and speed. Enter loads the row."
+    help = (
+        "Several presets on the present pluck: errors, null depth and speed. Enter or a double-click loads the "
+        "preset of a row."
+    )
     view: CompareView
 
     def __init__(self, session: Session, library: Library) -> None:
@@ -51,7 +54,7 @@ class ComparePanel(Panel):
                 self._background.cancel()
                 self.view.set_computing(None)
                 self._stopped = False
-            self._stale = True  # shown when it is looked at: a pluck may be waiting
+            self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
 
     def take_started(self, take: Take) -> None:
         self._background.give_way_to(take)

@@ -18,7 +18,7 @@ class EigenvaluesPanel(Panel):
     title = "Eigenvalues"
     help = (
         "The model's learned eigenvalues beside the string's own: as frequency and T60, or on the complex "
-        "plane. A click hears that mode alone, Esc all of them."
+        "plane. A click solos that mode, Esc plays all modes."
     )
     view: EigenvaluesView
 

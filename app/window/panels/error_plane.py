@@ -1,4 +1,4 @@
-"""The error of the chosen preset over all plucks of the chosen shape, computed while nothing else needs the time."""
+"""The error map: the error of the chosen preset over position and amplitude, for plucks of the chosen shape."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class ErrorPlanePanel(Panel):
     key = "error_plane"
     title = "Error map"
     help = (
-        "The model's error as trained, which is the first figure in the header, over pluck position and amplitude, "
-        "computed in the background. A click plucks there."
+        "The model's error as trained, the first figure in the header, over pluck position and amplitude, computed "
+        "in the background. A click plucks there."
     )
     view: ErrorPlaneView
 
@@ -71,7 +71,7 @@ class ErrorPlanePanel(Panel):
         self._asked = self._wanted()
         subject, pluck = subject_of(self.session.choices, entry.path), self.session.choices.pluck
         self.view.progress.show_share(0.0)
-        self.view.set_words("The model's error for every pluck: computing …")
+        self.view.set_words("Computing the model's error for plucks of this shape …")
         self._background.start(lambda job: self._planes.compute(subject, pluck, job))
 
     def close(self) -> None:
@@ -88,11 +88,11 @@ class ErrorPlanePanel(Panel):
     def _finished(self, picture: PlanePicture) -> None:
         self.view.progress.show_share(None)
         self.view.show_picture(picture)
-        self.view.set_words("Error as trained, for every pluck of this shape; click to hear one")
+        self.view.set_words("Error as trained, for plucks of this shape; a click plucks there")
 
     def _failed(self, message: str, details: str) -> None:
         self.view.progress.show_share(None)
-        self.view.set_words("There is no map of this preset")
+        self.view.set_words("The error map of this preset could not be computed")
         self.told.emit(message, details)
 
     def _audition(self, position: float, amplitude_mm: float) -> None:
@@ -101,7 +101,7 @@ class ErrorPlanePanel(Panel):
 
 
 class _Planes:
-    """The planes so far, by what is in the preset's file and the form of the pluck. Used by one thread."""
+    """The planes so far, by the preset's content, the string and the form of the pluck. Used by one thread."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[object, ...], ErrorPlane] = {}

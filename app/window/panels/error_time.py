@@ -1,4 +1,4 @@
-"""The error of this pluck over time, while it is rendered."""
+"""The error of this pluck over time, as it is rendered."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ErrorTimePanel(Panel):
     key = "error_time"
     title = "Error over time"
     help = (
-        "How far the model is from the truth in windows of two periods, within the training and past its "
-        "end. One button renders ten seconds."
+        "The model's error relative to the truth in windows of two periods, within the trained time and past it. "
+        "One button renders ten seconds."
     )
     view: ErrorTimeView
 
@@ -41,8 +41,8 @@ class ErrorTimePanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
-        self._course = None  # begun when it can be seen
-        self._shown = ()  # holds nothing of the last take
+        self._course = None  # begun when the panel is visible
+        self._shown = ()  # which would hold the last take
         stored = {
             "rmse": None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse),
             "mae": take.info.rel_mae,

@@ -1,4 +1,4 @@
-"""A thread that keeps what is computed from a take up with the take as it grows."""
+"""A thread that computes what is made from a take, as the take grows."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ LOOK_AGAIN_S = 0.03  # while the take has nothing new
 
 
 class Follower:
-    """Holds one work at a time, the latest; it ends with `close`.
+    """Does one work at a time, the latest. The thread starts at once and ends with `close`.
 
-    `on_fault` hears of a work that cannot go on (a message and its details), in the follower's thread.
+    Args:
+        on_fault: is called with a message and its details where a work fails, in the follower's thread.
     """
 
     def __init__(self, name: str, on_fault: Callable[[str, str], None]) -> None:
@@ -27,13 +28,13 @@ class Follower:
         self._thread.start()
 
     def follow(self, work: Growing | None) -> None:
-        """Takes up another work, or rests. Returns at once."""
+        """Does this work instead of the last; None: none. Returns at once."""
         with self._mailbox:
             self._work = work
             self._mailbox.notify()
 
     def close(self) -> None:
-        """Ends the thread; may be called again."""
+        """Ends the thread, waiting 10 s at most; may be called again."""
         with self._mailbox:
             self._closing = True
             self._mailbox.notify()
@@ -51,7 +52,7 @@ class Follower:
             try:
                 moved = work.advance()
                 done = work.complete
-            except Exception as error:  # told to the user; the window lives on
+            except Exception as error:  # shown to the user; the thread goes on
                 self._on_fault(f"A view cannot be computed: {error}", traceback.format_exc())
                 moved, done = False, True
             with self._mailbox:
@@ -59,4 +60,4 @@ class Follower:
                     self._work = None
                 elif work is self._work and not moved and not self._closing:
                     self._mailbox.wait(LOOK_AGAIN_S)
-            del work  # it holds a take, which nobody may want any more while this rests
+            del work  # it holds a take, which may not be needed any more

@@ -1,4 +1,4 @@
-"""The partials of the take on stage, measured when all of it is there; until then those before it are grey."""
+"""The partials of the present take, measured once it is complete; until then those of the last one are grey."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class PartialsPanel(Panel):
     key = "partials"
     title = "Partials"
     help = (
-        "Every mode of the string: frequency, decay and level, model against truth. A click on a row hears "
-        "that mode alone."
+        "Every mode of the string: frequency, decay and level, model against truth. A click on a row solos its mode, "
+        "Esc plays all modes."
     )
     view: PartialsView
 
@@ -43,14 +43,14 @@ class PartialsPanel(Panel):
         self._background.cancel()
         self.view.dim()
         self.view.progress.show_share(None)
-        self.view.set_words("After the rendering: the partials of the new pluck")
+        self.view.set_words("The partials of the new pluck follow when it is rendered")
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self._waiting = take
 
     def show_moment(self, moment: Moment) -> None:
         self._background.look()
-        if self._waiting is not None:  # only what is looked at is measured
+        if self._waiting is not None:  # measured only while the panel is visible
             take, self._waiting = self._waiting, None
             self.view.progress.show_share(0.0)
             self.view.set_words("Measuring the partials of this pluck …")
@@ -81,5 +81,5 @@ class PartialsPanel(Panel):
         self.view.show_partials(rows)
         self.view.show_solo(self.session.choices.solo)
         self.view.set_words(
-            "" if rows else f"{WINDOWS[window].capitalize()}: too short to measure; let the pluck be longer"
+            "" if rows else f"{WINDOWS[window].capitalize()}: too short to measure; increase the duration"
         )

@@ -1,4 +1,4 @@
-"""Every panel, made and put in its place in the window."""
+"""Makes every panel and puts it in its place in the window."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel,
 
 
 def fill(window: MainWindow, session: Session, library: Library) -> list[Panel]:
-    """The string's panel first, then those of both decks, each deck told and telling which one is chosen."""
+    """The panels: the string's first, then those of the left and the right deck. Connects decks and session."""
     string = StringPanel(session, library)
     window.show_string(string.view)
     panels: list[Panel] = [string]

@@ -18,8 +18,8 @@ class SpaceTimePanel(Panel):
     key = "space_time"
     title = "Space–time"
     help = (
-        "The string over time: across is time, up is the place on it. Displacement of model or truth, or "
-        "the error between them. A click moves the playhead, with Shift the listening point too."
+        "Displacement of model or truth, or the error between them, over time (across) and position on the string "
+        "(up). A click moves the playhead, with Shift the listening point too."
     )
     view: SpaceTimeView
 
@@ -41,8 +41,8 @@ class SpaceTimePanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
-        self._envelopes = None  # begun when it can be seen
-        self._shown, self._picture = (), None  # holds nothing of the last take
+        self._envelopes = None  # begun when the panel is visible
+        self._shown, self._picture = (), None  # which would hold the last take
         self.view.set_take(take.seconds, take.info.horizon_s, take.pluck.amplitude_mm)
 
     def show_moment(self, moment: Moment) -> None:
@@ -74,7 +74,7 @@ class SpaceTimePanel(Panel):
         view.readout.rest(_caption(made))
 
     def _typical_mm(self, envelopes: Envelopes, times_s: tuple[float, float]) -> float:
-        """Of the displacement in view, for model and truth alike, or of the error."""
+        """The typical displacement in view, the same for model and truth, or the typical error."""
         names = ("error",) if self.view.quantity == "error" else SOURCES
         return max(envelopes.typical_m(name, times_s) for name in names) * MM
 
@@ -89,7 +89,7 @@ class SpaceTimePanel(Panel):
 def _caption(made: Picture) -> str:
     column_ms = 1000 * (made.stop_s - made.start_s) / made.displacement_m.shape[1]
     return {
-        "frames": "every picture",
+        "frames": "every frame",
         "extremes": f"extremes of {column_ms:.2g} ms",
         "envelope": f"peaks of {column_ms:.2g} ms, without sign; zoom in for motion",
     }[made.detail]

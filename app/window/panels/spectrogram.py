@@ -15,14 +15,14 @@ from app.window.panels.follower import Follower
 
 EVERY = 3  # moments
 ROWS = 320
-MOST_COLUMNS = 600  # drawn at a time: what is there already when the panel is opened comes in a few steps
+MOST_COLUMNS = 600  # drawn in one call, so that a panel that is opened late catches up in short steps
 
 
 class SpectrogramPanel(Panel):
     key = "spectrogram"
     title = "Spectrogram"
     help = (
-        "Levels over time and frequency of what the pick-up senses at the listening point: model, truth or their "
+        "Level over time and frequency of the pick-up's signal at the listening point: model, truth or their "
         "difference, all on one scale."
     )
     view: SpectrogramView
@@ -45,8 +45,8 @@ class SpectrogramPanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._follower.follow(None)
-        self._spectrogram = None  # begun when it can be seen
-        self._drawn_of = ()  # holds nothing of the last take
+        self._spectrogram = None  # begun when the panel is visible
+        self._drawn_of = ()  # which would hold the last take
         self.view.set_take(take.seconds, take.info.horizon_s, take.info.rate_hz)
 
     def show_moment(self, moment: Moment) -> None:

@@ -22,8 +22,8 @@ class SpectrumPanel(Panel):
     title = "Spectrum"
     help = (
         "Level against frequency of what slots A and B hold, at the playhead and the listening point, on the same "
-        "axes; 0 dB is a sine of the amplitude that the axis names. A partial that is out of tune or decays wrongly "
-        "parts here first."
+        "axes; 0 dB is a sine of the amplitude that the axis names. Here a partial that is out of tune or decays "
+        "wrongly is seen first."
     )
     view: SpectrumView
 
@@ -46,7 +46,7 @@ class SpectrumPanel(Panel):
             self.view.set_full_scale(full_scale_words(choices))
 
     def take_started(self, take: Take) -> None:
-        self._shown = self._standing = ()  # holds nothing of the last take
+        self._shown = self._standing = ()  # which would hold the last take
         self._partials_hz = take.info.resonator.omega.numpy() / (2 * np.pi)
 
     def show_moment(self, moment: Moment) -> None:
@@ -76,7 +76,7 @@ class SpectrumPanel(Panel):
 
     def _draw(self, heard: HeardSignal, position_s: float) -> None:
         analyser = analyser_at(heard.rate_hz)
-        last_window = heard.ready - analyser.window_frames  # at the end of what there is it stays
+        last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
         signal = heard.read(first, first + analyser.window_frames) / heard.listened.ear.full_scale
         self.view.show_signal(heard.source, signal, analyser)
@@ -89,7 +89,7 @@ class SpectrumPanel(Panel):
             self.view.show_readout("")
 
     def _tell(self) -> None:
-        """The frequency under the mouse, its levels, and the nearest partial of the string at rest."""
+        """Writes the frequency under the mouse, its levels, and the nearest partial of a quiet pluck."""
         frequency_hz, partial_hz = self._hovered_hz, None
         levels_db = self.view.levels_db(frequency_hz)
         told = [s for s in shown_sources(self.session.choices, self.library) if s.source in levels_db]

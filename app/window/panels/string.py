@@ -1,4 +1,4 @@
-"""The string in motion, the pluck that is being drawn, and why a pluck may be silent or beyond the training."""
+"""The string in motion, the pluck that is being drawn, and why a pluck is silent or outside the training range."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class StringPanel(Panel):
     key = "string"
     title = "String"
     help = (
-        "The string seen from the side: what slots A and B hold in motion, slowed as by a stroboscope, or the pluck "
-        "while it is drawn. Drag it to pluck; drag the green marker to listen elsewhere. Hatched parts lie "
-        "outside the training."
+        "The string seen from the side: the motion of what slots A and B hold, slowed as by a stroboscope, or the "
+        "pluck while it is drawn. Drag on it to pluck; drag the green marker to listen elsewhere. Hatched parts lie "
+        "outside the training range."
     )
     view: StringView
 
@@ -56,13 +56,8 @@ class StringPanel(Panel):
         self._envelope: Envelope | None = None
         self._standing: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
-        self._take: Take | None = None  # the complete one of this pluck
-        self._judged: Listened | None = None  # what of it was last found silent or not
-
-    @property
-    def drawing(self) -> bool:
-        """Whether the string is held in the hand and not yet let go."""
-        return self.view.is_dragging_pluck
+        self._take: Take | None = None  # of this pluck, once it is complete
+        self._judged: Listened | None = None  # the signals for which the warning was last set
 
     def choices_changed(self, names: frozenset[str]) -> None:
         choices = self.session.choices
@@ -96,7 +91,7 @@ class StringPanel(Panel):
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
         there = [motion for motion in motions if motion.there]
-        # the sound may be ahead of the motion, and one motion ahead of another: all are of one moment
+        # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
         position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
         strobes = [motion.strobes(position_s) for motion in there]
         shown = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
@@ -106,11 +101,11 @@ class StringPanel(Panel):
         envelope = self._envelope if choices.envelope else None
         frame = frame_at(take, motions, position_s, choices.speed, envelope)
         if choices.solo:
-            frame = replace(frame, caption=f"all modes, though mode {choices.solo} is heard alone   {frame.caption}")
+            frame = replace(frame, caption=f"all modes, although mode {choices.solo} is soloed   {frame.caption}")
         self.view.show_frame(frame)
 
     def _judge(self) -> None:
-        """Whether the difference can be heard is known when all of it is there, at these listening points."""
+        """Sets the warning anew once the signals are complete: only then is a silent difference known."""
         take = self._take
         if take is not None and take.listened is not self._judged and take.listened.complete:
             self._judged = take.listened

@@ -16,7 +16,7 @@ from app.views.plots.waveform_view import WaveformView
 from app.window.panels.base import Moment, Panel
 
 EVERY = 2  # moments
-MOST_FRAMES = 262_144  # at a time: a millisecond
+MOST_FRAMES = 262_144  # read in one call, which takes a millisecond
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
 
@@ -34,7 +34,7 @@ class _Drawn:
         self.signal = np.empty(self.heard.frames, np.float32)
 
     def catch_up(self) -> bool:
-        """Whether there was something to read."""
+        """Reads on, MOST_FRAMES at most; whether there was something to read."""
         new = self.heard.read(self.ready, self.ready + MOST_FRAMES)
         self.signal[self.ready : self.ready + len(new)] = new
         self.ready += len(new)
@@ -46,9 +46,9 @@ class WaveformPanel(Panel):
     key = "waveform"
     title = "Waveform"
     help = (
-        "What the pick-up senses at the listening point over the whole pluck, of slots A and B: displacement or "
-        "velocity, all modes or one. Click to move the playhead; the wheel zooms. Behind the red line the model goes "
-        "on without training."
+        "The pick-up's signal at the listening point over the whole pluck, of slots A and B: displacement or "
+        "velocity, all modes or one. A click moves the playhead; the wheel zooms. After the red line, the end of the "
+        "trained time, the model extrapolates."
     )
     view: WaveformView
 
@@ -59,7 +59,7 @@ class WaveformPanel(Panel):
         self._take: Take | None = None
         self._drawn: dict[str, _Drawn] = {}
         self._full = 0.0  # of the axis, in m or m/s
-        self._caught_up: tuple[object, ...] = ()  # with what there is of the take, and what was chosen
+        self._caught_up: tuple[object, ...] = ()  # progress of the take and choices when all was read
         self._moments = 0
         self._shown: tuple[object, ...] = ()
 
@@ -71,7 +71,7 @@ class WaveformPanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._take, self._drawn, self._full = take, {}, 0.0
-        self._shown = self._caught_up = ()  # holds nothing of the last take
+        self._shown = self._caught_up = ()  # which would hold the last take
         self.view.set_take(take.seconds, take.info.horizon_s, 1 / take.fundamental_hz)
 
     def show_moment(self, moment: Moment) -> None:
@@ -91,16 +91,16 @@ class WaveformPanel(Panel):
             self._draw()
 
     def _follow(self, take: Take) -> bool:
-        """Reads on what the slots hold, each from its start where it is another signal than before.
+        """Reads on what the slots hold; a signal that is new from its start.
 
-        Whether there was anything to read: perhaps there is more.
+        Whether there was anything to read: there may be more.
         """
         choices, moved = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
             heard, known = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
             if not heard.there:
-                continue  # another preset's model is still on its way
+                continue  # another preset's model, not yet rendered
             drawn = known if known is not None and known.heard == heard else _Drawn(heard)
             moved |= drawn.catch_up()
             self._drawn[source.source] = drawn

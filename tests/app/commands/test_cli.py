@@ -68,7 +68,7 @@ def test_commands_need_neither_window_nor_sound_packages() -> None:
     # pydantic is not among them: newer versions of typer themselves need it
     done = python(
         "import sys\n"
-        "for name in ('PySide6', 'pyqtgraph', 'sounddevice', 'soundfile', 'soxr', 'psygnal'):\n"
+        "for name in ('PySide6', 'pyqtgraph', 'sounddevice', 'soundfile', 'psygnal'):\n"
         "    sys.modules[name] = None\n"
         "import app.commands.arrays, app.commands.benchmarks.render, app.commands.benchmarks.solver\n"
         "import app.commands.benchmarks.train, training.run\n"
@@ -139,7 +139,7 @@ def test_an_interruption_is_status_130(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("error", "expected"),
     [
-        (ModuleNotFoundError("No module named 'soxr'", name="soxr"), "this needs soxr"),
+        (ModuleNotFoundError("No module named 'mido'", name="mido"), "this needs mido"),
         (PermissionError(13, "Permission denied", "/x/y"), "/x/y: Permission denied; check the path"),
         (
             OSError(28, "No space left on device", "/x/y"),

@@ -15,7 +15,7 @@ import torch
 from app.presets.heard_words import heard_word
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.presets import load_preset, preset_digest, save_preset
+from engine.presets import STRINGS, load_preset, preset_digest, save_preset
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.heard_file import read_heard
@@ -157,6 +157,27 @@ def test_partials(run, preset: Path, cache: list[Any]) -> None:
     assert horizon["weighted"]["cents"] < 0.01
 
 
+def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run, folder: Path) -> None:
+    words = ["evaluate", "studio_any_string", "--string", "steel_e4", "--rate", "16000", "--partials"]
+    found = json.loads(run(*words, "--json").out)
+    assert (found["split"], found["rate_hz"], found["held_out"]["trajectories"]) == ("held_out", 16_000, 10)
+    assert 0 < found["rel_mse"] < 1e-4
+    assert found["held_out"]["by_rise"][-1]["to_rise"] < 0.51  # as hard as the family is plucked
+    first = found["held_out"]["partials"][0]["modes"][0]
+    assert first["frequency_hz"] == pytest.approx(330, abs=5)
+    assert first["glide_cents"] > 1
+    assert all(first[name] < 0.01 for name in ("level_db", "cents", "t60_error_percent", "glide_error_cents"))
+    told = run(*words)
+    assert told.err == ""
+    assert "held out: rel. MSE" in told.out
+    assert "glide error" in told.out
+    other = json.loads(run(*words[:2], "--rate", "8000", "--modes", "5", "--held-out", "11", "--json").out)
+    assert (other["rate_hz"], other["held_out"]["trajectories"]) == (8_000, 11)  # the preset's own string
+    low = folder / "low.toml"
+    low.write_text((STRINGS / "nylon_e2.toml").read_text().replace("length_m = 0.65", "length_m = 1.65"))
+    assert "pitch 32.5 Hz is outside the trained 55 … 880 Hz" in run(*words[:2], "--string", low, "--modes", "5").err
+
+
 def test_every_figure_as_a_table(run, preset: Path, cache: list[Any], folder: Path) -> None:
     path = folder / "errors.csv"
     words = ["evaluate", preset, "--past", "1", "--partials", "--split", "both", "--csv", path, *cache]
@@ -281,6 +302,8 @@ def test_all_presets_are_listened_to_and_a_broken_one_is_told(
         (["tiny", "--write"], "--write: does not go without --heard"),
         (["tiny", "--heard", "--partials"], "--partials: does not go with --heard"),
         (["tiny", "--heard", "--past", "1"], "--past: does not go with --heard"),
+        (["tiny", "--heard", "--string", "steel_e4"], "--string: does not go with --heard"),
+        (["tiny", "--on", "nylon", "--rate", "8000"], "--rate: does not go with --on"),
     ],
 )
 def test_bad_usage_of_heard(run, words: list[str], message: str) -> None:

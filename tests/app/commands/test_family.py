@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.commands.console import number
 from training.family import fit_baseline
 
 
@@ -36,6 +37,23 @@ def test_evaluate_tells_the_map_and_draws_it(run, folder: Path) -> None:
     assert "choose one of these suffixes" in run(*words[:-4], "--picture", folder / "map.bmp").failure
 
 
+def test_partials_over_the_family(run) -> None:
+    words = ("family", "partials", "studio_any_string", "--strings", 2, "--seconds", 0.25, "--rate", 8_000)
+    found = json.loads(run(*words, "--json").out)
+    for column in ("inside", "beyond"):
+        assert found[column]["quiet_first_cents"]["worst"] < 1e-4
+        assert found[column]["quiet_first_cents"]["worst"] <= found[column]["quiet_cents_largest"]["worst"]
+        for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
+            mean, largest = (found[column][f"{name}_{kind}"] for kind in ("mean", "largest"))
+            assert 0 < mean["median"] < mean["worst"] <= largest["worst"] < 1
+            assert "Hz, B " in mean["worst_at"]
+    shown = run(*words)
+    assert "quiet pluck, the first mode's pitch, cents" in shown.out
+    assert shown.out.count("glide of any, cents") == 2
+    assert "must lie in 0.25 … 10 s" in run(*words[:5], "--seconds", 0.1).usage
+    assert "learned one string" in run("family", "partials", "studio_steel_e4").failure
+
+
 def test_a_baseline_is_trained_and_stands_beside_the_preset(
     run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -44,11 +62,22 @@ def test_a_baseline_is_trained_and_stands_beside_the_preset(
     words = ("family", "baseline", "koopman_var", "--minutes", 0.01, "--train-strings", 1, "--runs", folder)
     facts = json.loads(run(*words, *few).out)
     assert (facts["baseline"], facts["minutes"]) == ("koopman_var", 0.01)
+    assert facts["parameters"] == 156_259
+    assert all(facts[name] > 0 for name in ("steps", "train", "validation"))
+    told = run(*words, *few[:-1]).out  # the training is at its end
+    assert told.startswith(f"koopman_var: 156,259 numbers, {facts['steps']:,} steps of 16 strings and 48 frames")
+    assert f"{number(facts['train'])} in training, {number(facts['validation'])} in validation" in told
     beside = json.loads(run("family", "evaluate", "studio_any_string", "--runs", folder, *few).out)
     for column in ("inside", "beyond"):
         error = facts[column]["koopman_var"]["geometric_mean"]
         assert beside[column]["koopman_var, trained"]["geometric_mean"] == error
         assert beside[column]["studio_any_string"]["geometric_mean"] < error
+    checkpoint = folder / "family_koopman_var" / "checkpoint.safetensors"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
+    for damaged in (words, ("family", "evaluate", "studio_any_string", "--runs", folder)):
+        failure = run(*damaged, *few).failure
+        assert f"{checkpoint}: damaged checkpoint" in failure
+        assert "delete it to start the run again" in failure
     assert (
         "no baseline was trained here"
         in run("family", "evaluate", "studio_any_string", "--runs", folder / "none", *few).failure

@@ -25,6 +25,7 @@ def test_a_body_that_is_not_here_is_told_and_the_rest_is_played(
     found = run("play", tmp_path / "one.mid", "--patch", tmp_path / "mine.json", "--out", out, "--seconds", "0.3")
     assert found.status == 0
     assert "is played without its body: the body a cello is not here" in found.err
+    assert found.out.startswith(f"{out}: 0.3 s of model in ")
     sound, _ = soundfile.read(out)
     assert abs(sound).max() > 0.01
 

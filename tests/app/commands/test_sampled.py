@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.commands.sampled import _keys
 from app.patches.library import find_patch
 
 PATCH = "Classical guitar"
@@ -21,7 +22,7 @@ def notes(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """What is rendered: decaying sines, in place of the instrument."""
     rendered: list[tuple] = []
 
-    def render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source):
+    def render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
         rendered.append((patch.name, preset.name, key, velocity, held_s, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-30 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
@@ -82,13 +83,16 @@ def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatc
 def test_the_size_alone(run, notes: list[tuple], folder: Path) -> None:
     found = run("sampled", PATCH, folder / "a.sfz", *SMALL, "--size-only")
     assert (found.status, found.err) == (0, "")
-    assert found.out == f"{folder / 'a.sfz'}: 6 samples (3 keys, 2 velocity layers), at most 0.3 MB\n"
+    assert (
+        found.out
+        == f"{folder / 'a.sfz'}: 6 samples (3 keys, 2 velocity layers), at most 0.3 MB, before FLAC compression\n"
+    )
     assert notes == [] and list(folder.iterdir()) == []
 
 
 def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = run("sampled", PATCH, folder / "a.sfz", "--layers", 32, "--seconds", 30).failure
-    assert "MB; take fewer --keys, --layers or --seconds, or say --yes" in told
+    assert "MB, before FLAC compression; take fewer --keys, --layers or --seconds, or say --yes" in told
     monkeypatch.setattr("app.commands.sampled.ASKED_ABOVE_BYTES", 1000)
     assert run("sampled", PATCH, folder / "a.sfz", *SMALL).status == 1
     assert notes == [] and list(folder.iterdir()) == []
@@ -101,7 +105,7 @@ def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeyp
         (("a.wav",), "must end with .sfz or .sf2"),
         (("a.sf2", "--bits", "16"), "a SoundFont holds 16 bits"),
         (("a.sf2", "--rate", 96_000), "a SoundFont's rate must lie in"),
-        (("a.sfz", "--keys", "low-high"), "must be two MIDI keys as in 40-76"),
+        (("a.sfz", "--keys", "low-high"), "must be two keys as in E2-E5 or 40-76"),
         (("a.sfz", "--keys", "0-127"), "keys must be a range within the patch's own"),
         (("a.sfz", "--layers", 0), "layers must lie in 1 … 32"),
         (("a.sfz", "--every", 99), "every must lie in 1 … 12"),
@@ -116,3 +120,11 @@ def test_bad_usage(run, notes: list[tuple], folder: Path, words: tuple, told: st
 
 def test_no_such_patch(run, folder: Path) -> None:
     assert "no-such-patch" in run("sampled", "no-such-patch", folder / "a.sfz").failure
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [("40-76", (40, 76)), (" 40 - 76 ", (40, 76)), ("60", (60, 60)), ("E2-E5", (40, 76)), ("C-1-C0", (0, 12))],
+)
+def test_keys_are_numbers_or_notes(text: str, keys: tuple[int, int]) -> None:
+    assert _keys(text) == keys

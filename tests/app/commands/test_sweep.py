@@ -184,6 +184,15 @@ def test_a_scheduler_that_is_not_there_is_told(run, words: list[Any], monkeypatc
     assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in found.err.splitlines()[-1]
 
 
+@pytest.mark.parametrize(("scheme", "warned"), [("tcp", True), ("tls", False)])
+def test_a_scheduler_that_anybody_can_reach_is_warned_of(
+    run, words: list[Any], monkeypatch: pytest.MonkeyPatch, scheme: str, warned: bool
+) -> None:
+    monkeypatch.setattr("training.sweeping.workers.on_dask.CONNECT_S", 0.2)
+    found = run(*words, "--scheduler", f"{scheme}://127.0.0.1:9")
+    assert ("can run code on its workers" in found.err) == warned
+
+
 @pytest.mark.parametrize("option", ["--workers", "--threads", "--per-device"])
 def test_no_workers_are_bad_usage(run, words: list[Any], option: str) -> None:
     assert option in run(*words, option, "0").usage

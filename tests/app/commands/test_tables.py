@@ -77,7 +77,9 @@ def test_the_tables_of_a_document_are_made_anew_in_place(run, results: Path, fol
     assert run(*words, "--into", document).status == 0
     assert document.read_text(encoding="utf-8") == made
     document.write_text("# Results\n", encoding="utf-8")
-    assert "has no line <!-- tables -->; put it where" in run(*words, "--into", document).failure
+    assert (
+        "has no line <!-- tables -->; put it where the tables are to begin" in run(*words, "--into", document).failure
+    )
     assert document.read_text(encoding="utf-8") == "# Results\n"
     assert "--into" in run(*words, "--into", document, "--output", folder / "other.md").usage
 
@@ -116,6 +118,14 @@ def test_every_figure_is_drawn(run, tiny: Path, folder: Path, kind: str) -> None
     height, width, _ = imread(path).shape
     assert min(height, width) > 1000
     assert list(folder.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("group", ["figure", "results"])
+def test_a_list_of_commands_cuts_no_summary(run, group: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    listed = run(group, "--help").out.partition("Commands:")[2].strip().splitlines()
+    assert len(listed) >= 2
+    assert all(line.endswith(".") and not line.endswith("...") for line in listed)
 
 
 def test_a_figure_stands_here_by_default(run, tiny: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

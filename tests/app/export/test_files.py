@@ -24,10 +24,10 @@ from app.export.files import (
     export_sound,
     export_sounds,
     render_sound,
-    write_wav,
 )
 from app.export.recipe import Recipe
-from app.export.wav_chunks import Marker, read_markers
+from app.export.sound import Voices
+from app.export.wav_chunks import Marker
 from app.playing.ahead import AheadVoice
 from engine.kernels.limiter import AHEAD
 from engine.pluck import FULL_SCALE_M_S, Pluck
@@ -36,6 +36,7 @@ from engine.resonators.sine_transform import listening_weights
 from engine.sources import FULL_SCALE_M, ModelSource, TruthSource, project
 from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program
 from engine.voices.voice import ATTACK_S
+from tests.app.export.markers import read_markers
 
 PLAIN = WavSettings("32f", fade_out_s=0)
 
@@ -172,17 +173,14 @@ def test_a_preset_that_vanished_is_told(request_: SoundRequest, tmp_path: Path) 
         export_sound(gone, tmp_path / "a.wav")
 
 
-def test_samples_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+def test_samples_that_are_not_finite_are_refused(
+    request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = Voices({"model": np.array([[np.inf]])})
+    monkeypatch.setattr("app.export.files.render_voices", lambda *_, **__: broken)
     with pytest.raises(ExportError, match=r"a\.wav: .*not finite"):
-        write_wav(tmp_path / "a.wav", np.array([np.inf]), 4000)
+        export_sound(request_, tmp_path / "a.wav")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_samples_can_be_written_with_several_channels(tmp_path: Path) -> None:
-    report = write_wav(tmp_path / "a.wav", np.zeros((50, 2)), 4000, PLAIN, title="two")
-    with soundfile.SoundFile(tmp_path / "a.wav") as file:
-        assert (file.channels, file.frames, file.title) == (2, 50, "two")
-    assert report.frames == 50
 
 
 @pytest.mark.parametrize(

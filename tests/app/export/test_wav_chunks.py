@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.export.wav_chunks import Marker, chunks, read_markers, with_markers
+from app.export.wav_chunks import Marker, chunks, finish
+from tests.app.export.markers import read_markers
 
 MARKERS = [Marker(0, "start"), Marker(123, "end of training"), Marker(399, "№ 3")]
 
@@ -16,6 +17,12 @@ def wav(channels: int = 1, subtype: str = "PCM_16") -> bytes:
     buffer = io.BytesIO()
     soundfile.write(buffer, np.zeros((401, channels)), 8000, subtype, format="WAV")
     return buffer.getvalue()
+
+
+def with_markers(data: bytes, markers: list[Marker]) -> bytes:
+    file = io.BytesIO(data)
+    finish(file, markers)
+    return file.getvalue()
 
 
 @pytest.mark.parametrize(("channels", "subtype"), [(1, "PCM_16"), (1, "PCM_24"), (2, "FLOAT")])
@@ -35,10 +42,3 @@ def test_every_chunk_lies_on_an_even_byte() -> None:
 
 def test_no_marker_is_no_chunk() -> None:
     assert with_markers(wav(), []) == wav()
-
-
-def test_damaged_chunks_are_no_markers() -> None:
-    marked = with_markers(wav(), MARKERS)
-    for end in range(len(wav()), len(marked)):
-        assert len(read_markers(marked[:end])) <= 3
-    assert read_markers(b"RIFF") == []

@@ -97,6 +97,13 @@ def test_its_digest_is_that_of_its_file(tmp_path: Path) -> None:
     assert body_digest(name) not in ("", first)
 
 
+def test_the_digest_of_a_file_that_stays_is_computed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = install_body(late(tmp_path / "late.wav"))
+    first = body_digest(name)
+    monkeypatch.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} is read again"))
+    assert body_digest(name) == first
+
+
 def test_one_that_is_gone_is_told_in_a_line_and_left_out(patch: Patch, preset: Preset, tmp_path: Path) -> None:
     name = install_body(late(tmp_path / "late.wav"))
     wooden = on(patch, name)

@@ -251,6 +251,19 @@ def test_velocity_pick_ups_and_two_points_are_heard(patch: Patch, preset: Preset
     assert np.abs(sound[:, 0] - sound[:, 1]).max() > 1e-3
 
 
+def test_a_note_can_be_stopped_while_it_is_rendered(patch: Patch, preset: Preset) -> None:
+    reached_s: list[float] = []
+
+    def advanced(seconds: float) -> None:
+        reached_s.append(seconds)
+        if seconds > 0.5:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        render_note(patch, preset, 50, 100, 60.0, 60.0, RATE_HZ, "model", advanced)
+    assert len(reached_s) > 1 and reached_s[-1] < 1.0
+
+
 def test_a_preset_of_one_string_is_refused(patch: Patch) -> None:
     with pytest.raises(ValueError, match="knows one string only"):
         Player(patch, load_preset(SHIPPED / "studio_nylon_b3.safetensors"), RATE_HZ, lambda struck: None)

@@ -72,6 +72,7 @@ def test_they_are_set_once_and_go_with_the_patch(stage: Stage, patch: Patch, wai
 def test_they_are_off_while_models_are_compared(stage: Stage, patch: Patch, wait: Wait) -> None:
     stage.live.set_patch(patch, EAR)
     wait(lambda: stage.live.ready)
+    stage.settle(wait)
     for dry in (True, False):
         stage.live.hear_dry(dry)
         stage.settle(wait)

@@ -268,14 +268,12 @@ def test_levels_are_matched_once_they_are_known(
     wait(lambda: notes.have(stroke))
     note = notes.strike(stroke)
     assert note.match is None
-    assert notes.match_of(stroke) is None
     notes.set_mix(Mix("model", matched=True))  # while it rings
     wait(lambda: note.match is not None)
     assert note.match is not None
     assert note.match["truth"] == 1.0
     assert note.match["model"] == pytest.approx(1 / 12, rel=0.02)
     assert gains(note) == {"model": note.match["model"], "truth": 0.0}
-    assert notes.match_of(stroke) == note.match
     again = notes.strike(stroke)
     assert again.match == note.match, "it is known from the start"
     assert gains(again) == gains(note)

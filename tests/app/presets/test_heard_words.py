@@ -25,6 +25,9 @@ TRUE = Heard("x", "0" * 64, 4.0, 0.2, 0.5, 0.0, 1.0)
         ({"pitch_cents": None}, []),
         ({"split_cents": 22.2, "pitch_cents": 7.0}, ["two pitches, 22 cents apart", "pitch +7 cents"]),
         ({"pitch_cents": 12.0, "level_db": -3.0}, ["pitch +12 cents", "dies early, −3 dB"]),
+        ({"hum_db": -66.0}, ["hums on at −66 dB"]),
+        ({"hum_db": -66.0, "level_db": 3.0}, ["hums on at −66 dB", "fades too slowly, +3 dB"]),
+        ({"hum_db": -90.0}, []),
         ({"runs_away_s": 3.21, "pitch_cents": 400.0}, ["runs away after 3.2 s", "pitch +400 cents"]),
     ],
 )

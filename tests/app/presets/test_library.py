@@ -151,7 +151,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
 
 def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Path) -> None:
     for name, words in (
-        ("a.txt", "cannot be taken in"),
+        ("a.txt", "not a file that is used here"),
         ("a.wav", "no sound file that can be read"),
         ("a.safetensors", "no such preset file"),
     ):

@@ -86,7 +86,7 @@ def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, output: F
     show(control, output.present)
     notices = control._window.notices
     assert "Playback continues on “Speakers”" in notices.text
-    assert notices.kept[-1][1] == "code"
+    assert notices.notices[-1].details == "code"
     assert (control.device, control.sound) == (None, SoundChoice())
     assert "refuses" in control._dialog._problem_label.text()
     control._dialog.rescan_asked.emit()

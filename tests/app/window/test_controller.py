@@ -293,7 +293,7 @@ def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller)
 
 def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: Controller) -> None:
     qtbot.waitUntil(lambda: "without sound" in controller.window.notices.text, timeout=5_000)
-    assert len(controller.window.notices.kept) == 1
+    assert len(controller.window.notices.notices) == 1
     wait_for_take(qtbot, controller)
     controller.pluck()
     qtbot.waitUntil(lambda: controller.performance.position_s > 0.1, timeout=5_000)
@@ -335,7 +335,7 @@ def test_settings_that_cannot_be_saved_do_not_hinder_closing(
     qtbot.addWidget(window)
     made = Controller(window, Settings(choices=Choices(seconds=0.5)), blocked / "settings.json")
     window.close()
-    assert "cannot be written" in made.window.notices.kept[-1][0]
+    assert "cannot be written" in made.window.notices.notices[-1].message
 
 
 def test_every_control_has_a_name(controller: Controller) -> None:
@@ -494,7 +494,7 @@ def test_a_slot_whose_preset_is_gone_falls_back(qtbot: QtBot, preset_folder: Pat
     qtbot.addWidget(window)
     made = Controller(window, Settings(choices=Choices(seconds=0.5, b="preset:gone")), tmp_path / "settings.json")
     assert made.session.choices.b == "truth"
-    assert any("gone" in text for text, _ in window.notices.kept)
+    assert any("gone" in each.message for each in window.notices.notices)
     window.close()
 
 

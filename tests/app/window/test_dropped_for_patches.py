@@ -123,7 +123,7 @@ def test_a_dropped_sound_without_a_recipe_is_a_body_and_the_patch_stands_on_it(
     patch = patched.patches.patch
     assert patch is not None
     assert patch.body.name == "knock" and patch.body.mix > 0
-    assert "stands on the body knock" in patched.window.notices.text
+    assert "now has the body knock" in patched.window.notices.text
     patched.history.undo()
     assert patched.patches.patch == before
 

@@ -151,14 +151,26 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     played.take_file(harp)
     assert played.session.choices.patch == read_patch(harp)
     told: list[str] = []
+    informed: list[str] = []
     played.patches.told.connect(told.append)
+    played.patches.informed.connect(informed.append)
     played.take_file(STRINGS / "steel_g3.toml")
     assert played.session.choices.string is not None
     assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
-    assert "steel_g3.toml is plucked" in told.pop()
+    assert "steel_g3.toml is plucked" in informed.pop()
+    assert not told  # it is no error
     (tmp_path / "bad.toml").write_text("length_m = -1")
     played.take_file(tmp_path / "bad.toml")
     assert "bad.toml" in told.pop()
+    (tmp_path / "heavy.toml").write_text("damping_d1_kg_m_s = 900.0")
+    played.take_file(tmp_path / "heavy.toml")
+    assert "heavy.toml: " in told[-1]
+    assert "overdamped" in told.pop()
+    assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
+    slack = (STRINGS / "steel_g3.toml").read_text().replace("tension_n = 74.173", "tension_n = 0.74173")
+    (tmp_path / "slack.toml").write_text(slack)
+    played.take_file(tmp_path / "slack.toml")
+    assert "Beyond training: pitch" in told.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
     played.take_file(tmp_path / "bad.mid")
     assert "bad.mid" in told[0]
@@ -168,7 +180,9 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
     qtbot: QtBot, played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
+    informed: list[str] = []
     played.patches.told.connect(told.append)
+    played.patches.informed.connect(informed.append)
     played.patches.record()
     played.patches.record()
     assert "Nothing was played" in told[0]
@@ -178,12 +192,16 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
     out = tmp_path / "take.wav"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(out), ""))
     played.patches.record()
-    qtbot.waitUntil(lambda: len(told) == 2, timeout=60_000)
-    assert str(out) in told[1]
+    qtbot.waitUntil(lambda: len(informed) == 1, timeout=60_000)
+    assert str(out) in informed[0]
+    assert len(told) == 1  # to have written it is no error
     sound, rate_hz = soundfile.read(out)
     assert rate_hz == 48_000
     assert 0.001 < abs(sound).max() < 1
     assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+    played.patches.write(tmp_path / "absent" / "take.wav", [TimedEvent(0.0, NoteOn(60, 100))])
+    qtbot.waitUntil(lambda: len(told) == 2, timeout=60_000)
+    assert "absent" in told[1]
 
 
 def test_a_recording_replaces_no_file_that_nobody_asked_about(
@@ -194,12 +212,14 @@ def test_a_recording_replaces_no_file_that_nobody_asked_about(
     names = iter(["song.wav", "take", "take 1.5"])
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(tmp_path / next(names)), ""))
     told: list[str] = []
+    informed: list[str] = []
     played.patches.told.connect(told.append)
+    played.patches.informed.connect(informed.append)
     played.patches.record()
     played.window.instrument.pressed.emit(60, 100)
     played.window.instrument.released.emit(60)
     played.patches.record()
-    qtbot.waitUntil(lambda: len(told) == 3, timeout=60_000)
+    qtbot.waitUntil(lambda: len(informed) == 1, timeout=60_000)
     assert "song.mid exists already" in told[0]
     assert "take.wav exists already" in told[1]
     assert (tmp_path / "song.mid").read_bytes() == (tmp_path / "take.wav").read_bytes() == b"mine"

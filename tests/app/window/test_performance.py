@@ -317,7 +317,7 @@ def test_how_long_a_model_is_waited_for_is_told_and_then_its_error(
     label = window.window.error_label
     qtbot.waitUntil(lambda: performance.settled and "error of this pluck" in label.text(), timeout=20_000)
     performance.pluck()
-    qtbot.waitUntil(lambda: label.text().startswith("KOOPMAN_VAR: buffering, starts in 0."), timeout=5_000)
+    qtbot.waitUntil(lambda: label.text().startswith("Koopman, variable: buffering, starts in 0."), timeout=5_000)
     (note,) = ringing(performance)
     assert performance.position_s == 0
     qtbot.waitUntil(lambda: not note.pending, timeout=20_000)

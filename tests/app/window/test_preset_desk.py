@@ -303,7 +303,7 @@ def test_dropped_files_are_taken_in(
     drop(controller, tmp_path / "a.wav")
     assert "its choices cannot be restored here (listen: " in controller.window.notices.text
     drop(controller, tmp_path / "foreign.txt")
-    assert "cannot be taken in" in controller.window.notices.text
+    assert "not a file that is used here" in controller.window.notices.text
     assert controller.session.choices == choices
 
 

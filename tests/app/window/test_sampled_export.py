@@ -46,7 +46,7 @@ def test_without_a_patch_it_says_so(controller: Controller) -> None:
     action = next(action for action in controller.window.menu.asked if action.text().startswith("Export instrument"))
     action.trigger()
     assert controller.sampled.dialog is None
-    assert "There is no patch to export" in controller.window.notices.kept[-1][0]
+    assert "There is no patch to export" in controller.window.notices.notices[-1].message
 
 
 def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Controller, tmp_path: Path) -> None:

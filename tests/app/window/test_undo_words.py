@@ -42,7 +42,7 @@ def test_the_key_says_what_it_has_done(qtbot: QtBot, controller: Controller) -> 
     for modifiers, told in (
         (CONTROL, "Undone: pluck width"),
         (CONTROL, "Nothing to undo"),
-        (CONTROL | SHIFT, "Done again: pluck width"),
+        (CONTROL | SHIFT, "Redone: pluck width"),
     ):
         qtbot.keyClick(controller.window, Qt.Key.Key_Z, modifiers)
         assert QToolTip.text() == told

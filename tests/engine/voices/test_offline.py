@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,8 @@ from engine.voices import (
     rendered_program,
     truth_program,
 )
+from engine.voices.programs import voice_ends_s
+from engine.voices.voice import END_FADE_S
 
 NAME, PLUCK, SECONDS = "nylon_nonlinear_gaussian_4k_koopman_integrated", Pluck(0.3), 0.2
 RATE_HZ = 44_100
@@ -91,3 +95,87 @@ def test_a_runaway_is_told_with_its_time(preset: Preset) -> None:
     with pytest.raises(Runaway) as caught:
         render_voice(program, ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), 2.0)
     assert 0.05 < caught.value.time_s < 1.0
+
+
+def undying(kind: str, preset: Preset) -> tuple[Program, ModelSource]:
+    """Of a model that does not decay, compiled or rendered ahead, whose voice ends after 0.3 s."""
+    source = ModelSource(preset)
+    if kind == "bank":
+        program = program_of("bank", preset)
+        program.memory[program.memory.view(np.int64)[at.O_SIGMA] :][: program.modes] = 1e-9
+    else:
+        program = rendered_program(preset.info, RATE_HZ)
+
+        def hum(state: object, steps: int, weights: Tensor) -> tuple[Tensor, object]:
+            wave = 1e-4 * torch.cos(torch.arange(steps) * math.pi / 4)
+            return wave[None, :, None].expand(1, steps, weights.shape[1]), state
+
+        source.advance = hum  # type: ignore[assignment, method-assign]
+    return replace(program, ends_s=0.3), source
+
+
+@pytest.mark.parametrize("kind", ["bank", "rendered"])
+@pytest.mark.parametrize("ear", [Ear((0.37,)), Ear((0.3, 0.6), "velocity", 2)])
+def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear, preset: Preset, initial_m: Initial) -> None:
+    program, source = undying(kind, preset)
+    found = render_voice(program, source, preset.info, PLUCK, ear, 1.0)
+    endless = render_voice(replace(program, ends_s=math.inf), source, preset.info, PLUCK, ear, 1.0)
+    assert np.abs(endless[-RATE_HZ // 10 :]).max() > 1e-3
+    first, faded = -(-round(0.3 * RATE_HZ) // at.QUANTUM) * at.QUANTUM, round(END_FADE_S * RATE_HZ)
+    gain = 1 - (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
+    np.testing.assert_array_equal(found[:first], endless[:first])
+    np.testing.assert_allclose(found, gain * endless, atol=1e-7)
+    cut = render_voice(program, source, preset.info, PLUCK, ear, 5.0, until_db=60.0)
+    assert first + faded < len(cut) < RATE_HZ
+
+
+@pytest.mark.parametrize("skipped_s", [0.0, 0.2, 0.4])
+def test_what_is_played_ends_as_in_a_file(skipped_s: float, preset: Preset, initial_m: Initial) -> None:
+    """Also where it begins later in its motion, or behind its end."""
+    program, source = undying("bank", preset)
+    ear = Ear((0.37,))
+    file = render_voice(program, source, preset.info, PLUCK, ear, 1.0)[:, 0]
+    voice = Voice(program, initial_m(preset.info, PLUCK), ear, 0.0 if skipped_s else 1.0)
+    mixer = Mixer(RATE_HZ, limited=False)
+    if skipped_s:
+        voice.skip(skipped_s, mixer.memory)
+        voice.set_gain(1.0)
+    mixer.add(voice)
+    first = round(skipped_s * RATE_HZ / at.QUANTUM) * at.QUANTUM
+    played = mixer.render(RATE_HZ - first)[:, 0]
+    faded_in = 2 * round(0.02 * RATE_HZ) if skipped_s else 0
+    assert voice.over
+    if skipped_s < 0.3:
+        np.testing.assert_array_equal(played[faded_in:], file[first + faded_in :])
+    else:
+        assert not played.any()
+
+
+def test_it_ends_where_its_string_is_silent_and_not_within_its_training(preset: Preset) -> None:
+    info = preset.info
+    slowest = float(info.resonator.sigma.min())
+    assert voice_ends_s(info) == pytest.approx(2 * math.log(1e3) / slowest)  # twice 60 dB
+    for program in (program_of("bank", preset), rendered_program(info, RATE_HZ)):
+        assert program.ends_s == voice_ends_s(info)
+    assert program_of("truth", preset).ends_s == math.inf
+    damped = replace(info, string=replace(info.string, damping_d1_kg_m_s=1e3 * info.string.damping_d1_kg_m_s))
+    assert voice_ends_s(damped) == info.horizon_s
+    endless = replace(info, string=replace(info.string, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0))
+    assert voice_ends_s(endless) == math.inf
+
+
+def test_a_voice_of_a_string_without_losses_rings_on(preset: Preset, initial_m: Initial) -> None:
+    program, _ = undying("bank", preset)
+    voice = Voice(replace(program, ends_s=math.inf), initial_m(preset.info, PLUCK), Ear((0.37,)))
+    mixer = Mixer(RATE_HZ, limited=False)
+    voice.skip(3600.0, mixer.memory)
+    voice.start_with_gain(1.0)
+    mixer.add(voice)
+    assert np.abs(mixer.render(RATE_HZ // 10)).max() > 1e-3
+    assert not voice.over
+
+
+def test_no_more_samples_are_wanted_than_are_heard(preset: Preset, initial_m: Initial) -> None:
+    program, _ = undying("rendered", preset)
+    voice = Voice(program, initial_m(preset.info, PLUCK), Ear((0.37,)), 1.0, 600.0, preset.info.rate_hz)
+    assert voice.room < preset.info.rate_hz

@@ -15,6 +15,7 @@ from training.family.errors import linear_string
 from training.family.fit_baseline import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
 from training.family.preset import FamilyConfiguration
 from training.family.strings import PluckedString, draw_string
+from training.fitting.checkpoint import Checkpoint
 
 RATE_HZ = 48_000
 SMALL = FamilyConfiguration("Two", "", 25, strings=2, validation_strings=1, rate_hz=8_000)
@@ -106,18 +107,34 @@ def test_a_stopped_training_goes_on_as_if_it_had_not_been(
     with pytest.raises(Stopped):
         fit_baseline(name, SMALL, path, minutes, report=stop)
     told: list[BaselineProgress] = []
-    model = fit_baseline(name, SMALL, path, minutes, report=told.append).state_dict()
+    fitted = fit_baseline(name, SMALL, path, minutes, report=told.append)
     assert told[-1].share == 1
+    assert (fitted.steps, fitted.train, fitted.validation) == (told[-1].steps, told[-1].train, told[-1].validation)
+    model = fitted.model.state_dict()
     other = checkpoint_file(tmp_path / "other", name)
     whole: list[BaselineProgress] = []
-    uninterrupted = fit_baseline(name, SMALL, other, minutes, report=whole.append).state_dict()
+    uninterrupted = fit_baseline(name, SMALL, other, minutes, report=whole.append).model.state_dict()
     assert [progress.steps for progress in told] == [progress.steps for progress in whole[1:]]
-    kept = trained_baseline(path).state_dict()
-    ended = fit_baseline(name, SMALL, path, minutes, report=stop).state_dict()
+    kept, ended = trained_baseline(path), fit_baseline(name, SMALL, path, minutes, report=stop)
+    for again in (kept, ended):
+        assert (again.steps, again.train, again.validation) == (fitted.steps, fitted.train, fitted.validation)
     for key, value in model.items():
-        assert all(torch.equal(value, found[key]) for found in (uninterrupted, kept, ended))
+        assert all(
+            torch.equal(value, f[key]) for f in (uninterrupted, kept.model.state_dict(), ended.model.state_dict())
+        )
     with pytest.raises(ValueError, match="of another run"):
         fit_baseline(name, SMALL, path, 2 * minutes)
+    checkpoint = Checkpoint.load(path)
+    fewer = dict(list(checkpoint.model.items())[1:])
+    for damaged in (
+        replace(checkpoint, model=fewer, best_model=fewer),
+        replace(checkpoint, facts={key: value for key, value in checkpoint.facts.items() if key != "steps"}),
+        replace(checkpoint, facts={**checkpoint.facts, "best": None}),
+    ):
+        damaged.save(path)
+        for read in (trained_baseline, lambda path: fit_baseline(name, SMALL, path, minutes)):
+            with pytest.raises(ValueError, match=f"{path}: .*; delete it to start the run again"):
+                read(path)
     path.write_bytes(b"?")
     with pytest.raises(ValueError, match="damaged checkpoint"):
         trained_baseline(path)

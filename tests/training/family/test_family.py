@@ -128,7 +128,7 @@ def test_a_column_tells_its_worst() -> None:
     assert told.share_large == 0.5
     assert math.isclose(told.geometric_mean, math.sqrt(1e-7))
     parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
-    assert [(low, high, len(part.strings)) for low, high, part in parts] == [(0, 0.2, 1), (0.3, 0.5, 1)]
+    assert [(edges, len(part.strings)) for edges, part in parts] == [((0, 0.2), 1), ((0.3, 0.5), 1)]
 
 
 def test_a_map_has_every_string_once() -> None:

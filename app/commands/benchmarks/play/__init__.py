@@ -1,1 +1,1 @@
-"""The program as its user meets it: keys from outside, and what the sound card was given, recorded."""
+"""The app measured from outside: keys are sent to its window, and what the sound card receives is recorded."""

@@ -1,8 +1,8 @@
-"""What a recording of plucked strings tells: holes, fades nobody asked for, clicks, and when a pluck began.
+"""Finds holes, unintended fades, clicks and the beginnings of plucks in a recording of plucked strings.
 
-The sound of strings that ring is predictable: a linear prediction fitted to a few hundredths of a second leaves next
-to nothing of it. What nobody could have predicted stands out of the rest, however loud it rings: a new pluck, after
-which the rest is louder for long, or a click, after which it is as before.
+Ringing strings are predictable: a linear prediction fitted to a few hundredths of a second leaves almost no residual.
+What is not predictable stands out of the residual, however loud the strings ring: a new pluck, after which the
+residual stays larger for long, or a click, after which it is as before.
 
 Sounds are float arrays at `rate_hz`; places are frames from their beginning.
 """
@@ -17,29 +17,29 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-ZERO = 1e-7  # nothing, as a sound card is given it
+ZERO = 1e-7  # samples below it are silence
 SHORTEST_HOLE_S = 0.001
-SOUNDS_S = 0.5  # a pluck is heard for so long at least
+SOUNDS_S = 0.5  # for how long a pluck is heard at least
 LEVEL_S = 0.002
 FADE_DB = 40.0
-ORDINARY_DB = 20.0  # so far below all levels nearby: strings have quiet moments of their own, but many
+ORDINARY_DB = 20.0  # a fade is so far below all levels nearby; strings are often quiet for a moment by themselves
 NEARBY_S = 0.025
 LONGEST_FADE_S = 0.3
 ORDER = 32  # of the prediction
 FIT_S = 0.01
 FITTED_STEPS = 4
 STEP_S = 0.00025  # places of events are searched in such steps
-STANDS_OUT = 6.0  # times what is nearby
-MOSTLY = 0.9
+STANDS_OUT = 6.0  # an event's residual is so many times the residual nearby
+MOSTLY = 0.9  # quantile of the residual nearby
 FAINTEST_CLICK = 1e-4
 FAINTEST_PLUCK = 1e-6
-LOOKED_AT = 1 << 20  # frames
+LOOKED_AT = 1 << 20  # frames of a long file at a time
 EDGE_S, AROUND_S = 0.00025, 0.03
-AT_ONCE = 0.08  # of what sounds around it: a fade, or an attack, is nowhere near that yet
+AT_ONCE = 0.08  # an edge is sharp if it reaches this share of the level around it within `EDGE_S`, as no fade does
 FAINTEST_EDGE = 1e-6
 ATTACK_S = 0.006  # of a pluck
-LATEST_S = 0.5  # after its key, for a pluck to be one
-EARLY_OR_LATE_S = 0.04  # a pluck among others, against what is usual
+LATEST_S = 0.5  # from a key to the beginning of its pluck, at most
+EARLY_OR_LATE_S = 0.04  # deviation of a pluck's latency from the usual one, at most
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Span:
 
 
 def holes(sound: NDArray[np.float32], expected: Sequence[Span], rate_hz: int) -> list[Span]:
-    """Where nothing at all is in any channel for a millisecond or more; `sound` has the shape (frames, channels)."""
+    """Silences of all channels of a millisecond or more where sound is expected. `sound`: (frames, channels)."""
     silent = np.all(np.abs(sound) < ZERO, axis=1)
     shortest = round(SHORTEST_HOLE_S * rate_hz)
     found = [_moved(run, span.start) for span in expected for run in _runs(silent[span.start : span.end])]
@@ -67,16 +67,16 @@ def holes(sound: NDArray[np.float32], expected: Sequence[Span], rate_hz: int) ->
 
 @dataclass(frozen=True)
 class Silence(Span):
-    """Nothing at all for a millisecond or more, between sounds.
+    """A silence of a millisecond or more between sounds.
 
-    `sharp`: it begins or ends at once, as nothing does that a program fades.
+    `sharp`: it begins or ends abruptly, not by a fade.
     """
 
     sharp: bool
 
 
 def silences(sound: NDArray[np.float32], rate_hz: int) -> list[Silence]:
-    """Of one channel, (frames,), which may be a file of any length: little of it is looked at at a time."""
+    """Silences of one channel, (frames,), which may be a memory-mapped file of any length."""
     runs: list[Span] = []
     for first in range(0, len(sound), LOOKED_AT):
         for run in _runs(np.abs(sound[first : first + LOOKED_AT]) < ZERO):
@@ -87,7 +87,7 @@ def silences(sound: NDArray[np.float32], rate_hz: int) -> list[Silence]:
     shortest, around = round(SHORTEST_HOLE_S * rate_hz), round(AROUND_S * rate_hz)
 
     def sharp(edge: NDArray[np.float32]) -> bool:
-        """Of what sounds nearby, the nearest first."""
+        """Whether the sound at an edge, given from the edge outwards, is loud at once."""
         level = np.abs(edge[: round(EDGE_S * rate_hz)]).max()
         return bool(level > max(AT_ONCE * np.abs(edge).max(), FAINTEST_EDGE))
 
@@ -118,10 +118,10 @@ def expected_sound(sound: NDArray[np.float32], keys: Sequence[int], rate_hz: int
 
 
 def fades(sound: NDArray[np.floating], expected: Sequence[Span], rate_hz: int) -> list[Span]:
-    """Where the level, of one channel, falls far below all that is near, and comes back.
+    """Where the level of one channel drops far below all levels nearby, and recovers.
 
-    A low string is silent between two of its pulses, too; then it is so in every period, and not all levels nearby
-    are higher. A fade down to nothing is found as well as a hole is.
+    A low string is silent between two of its pulses, too, but then in every period, so that not all levels nearby are
+    higher. A drop to silence is found as well.
     """
     size = round(LEVEL_S * rate_hz)
     hop = size // 2
@@ -152,12 +152,12 @@ def fades(sound: NDArray[np.floating], expected: Sequence[Span], rate_hz: int) -
 
 @dataclass(frozen=True)
 class Unpredicted:
-    """What linear predictions leave of one channel.
+    """Magnitudes of the residuals of linear predictions of one channel, (frames,).
 
     Attributes:
-        by_past: of the one that is fitted to what sounded just before: nothing before a pluck, much after it.
-        by_both: the lesser of that one and of one that is fitted to what sounds just after: little after a pluck too,
-            so that what stands out of it on both sides belongs to nothing that rings.
+        by_past: of a prediction fitted to the sound just before: little before a pluck, much after it.
+        by_both: the smaller of that one and of a prediction fitted to the sound just after: little after a pluck too,
+            so that what stands out of it is no ringing string.
     """
 
     by_past: NDArray[np.float64]
@@ -165,13 +165,13 @@ class Unpredicted:
 
 
 def unpredicted(sound: NDArray[np.floating], rate_hz: int) -> Unpredicted:
-    """Predictions are fitted to `FITTED_STEPS` steps of `FIT_S` each and used in the step after, or before them."""
+    """Residuals of predictions fitted to `FITTED_STEPS` steps of `FIT_S` and used in the step after, or before."""
     size = round(FIT_S * rate_hz)
     steps = -(-len(sound) // size)
     signal = np.concatenate([np.zeros(ORDER), np.asarray(sound, float), np.zeros(steps * size - len(sound))])
     rows = sliding_window_view(signal, ORDER + 1)  # the last entry of row n is frame n, the others what came before
     products = np.zeros((steps + 2 * FITTED_STEPS, ORDER + 1, ORDER + 1))  # of each step, with silence at both ends
-    with threadpool_limits(limits=1, user_api="blas"):  # products so small are no work for two
+    with threadpool_limits(limits=1, user_api="blas"):  # products as small as these are slower with more threads
         for step in range(steps):
             here = np.ascontiguousarray(rows[step * size : (step + 1) * size])
             products[FITTED_STEPS + step] = here.T @ here
@@ -195,17 +195,17 @@ def unpredicted(sound: NDArray[np.floating], rate_hz: int) -> Unpredicted:
 
 @dataclass(frozen=True)
 class Events:
-    """Where what could not be predicted stands out: of what came before (`plucks`), or of all around (`spikes`)."""
+    """Places where a residual stands out: from the residual before (`plucks`), or on both sides (`spikes`)."""
 
     plucks: tuple[int, ...]
     spikes: tuple[int, ...]
 
 
 def events(rest: Unpredicted, rate_hz: int) -> Events:
-    """Of what `unpredicted` has left. Several within 6 ms are one."""
+    """The events of residuals. Several within `ATTACK_S` count as one."""
     step = round(STEP_S * rate_hz)
     near = round(NEARBY_S / STEP_S)
-    gap = 2 + -(-ORDER // step)  # a click is unpredicted in all predictions that it is part of
+    gap = 2 + -(-ORDER // step)  # a click disturbs all predictions that it is part of
 
     def highest_of_steps(left: NDArray[np.float64]) -> NDArray[np.float64]:
         return left[: len(left) // step * step].reshape(-1, step).max(axis=1)
@@ -220,7 +220,7 @@ def events(rest: Unpredicted, rate_hz: int) -> Events:
 
     size = highest_of_steps(rest.by_both)
     spikes = (size > FAINTEST_CLICK) & (size >= _highest(size, -1, 1))
-    spikes &= size > STANDS_OUT * _quantile(size, -near, -2, MOSTLY)  # other clicks nearby are no reason
+    spikes &= size > STANDS_OUT * _quantile(size, -near, -2, MOSTLY)  # a quantile, to ignore other clicks nearby
     spikes &= size > STANDS_OUT * _quantile(size, gap, near, MOSTLY)
     size = highest_of_steps(rest.by_past)
     before = np.maximum(_highest(size, -near, -2), FAINTEST_PLUCK / STANDS_OUT)
@@ -233,9 +233,9 @@ def events(rest: Unpredicted, rate_hz: int) -> Events:
 def matched(
     keys: Sequence[int], found: Events, strength: NDArray[np.float64], usual: int, rate_hz: int
 ) -> list[int | None]:
-    """For each key the beginning of its pluck: the strongest event about `usual` frames after it.
+    """For each key the beginning of its pluck: the strongest event about `usual` frames after it; None without one.
 
-    One that came much earlier or later than is usual is not found: where its attack is sharp, it counts as a click.
+    An event that is much earlier or later is not matched, and, where it is sharp, counts as a click.
     """
     farthest = round(EARLY_OR_LATE_S * rate_hz)
     places = np.array(sorted({*found.plucks, *found.spikes}), int)
@@ -281,7 +281,7 @@ def onset(sound: NDArray[np.floating], key: int, rate_hz: int) -> int | None:
 
 
 def _begins_at_once(rest: NDArray[np.float64], place: int) -> bool:
-    """Whether there is little right before what begins here: a step, not a short tone of high partials."""
+    """Whether the residual is small right before this place: a step, and not a short tone of high partials."""
     part = rest[max(place - ORDER, 0) : place + ORDER]
     start = int(np.argmax(part > 0.2 * part.max()))
     return start > 2 and bool(STANDS_OUT * part[: start - 1].max() < part.max())
@@ -297,14 +297,14 @@ def _moved(span: Span, frames: int) -> Span:
 
 
 def _highest(values: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
-    """At each place the highest of those from `first` to `last` places further on."""
+    """At each place the maximum over the places from `first` to `last` further on."""
     padded = np.pad(values, (max(-first, 0), max(last, 0)))
     start = max(first, 0)
     return sliding_window_view(padded, last - first + 1)[start : start + values.size].max(axis=1)
 
 
 def _quantile(values: NDArray[np.float64], first: int, last: int, share: float) -> NDArray[np.float64]:
-    """The same with a quantile of them."""
+    """At each place the quantile `share` over the places from `first` to `last` further on."""
     padded = np.pad(values, (max(-first, 0), max(last, 0)))
     start = max(first, 0)
     windows = sliding_window_view(padded, last - first + 1)[start : start + values.size]

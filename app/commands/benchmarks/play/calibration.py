@@ -1,8 +1,8 @@
-"""How long the sound card itself holds what a program hands it, by clicks whose times are known.
+"""How much of the latency is the sound server's and the recorder's, measured with clicks whose times are known.
 
-A program's latency is told twice: until its sound is in the recording, and less what the device's own buffer and the
-way to the recorder take. That part is found without looking into the program: the server tells how much of its sound
-it holds, and clicks at several buffers tell how long a sound takes from a program's hand into the recording then.
+A program's latency is given twice: until its sound is in the recording, and less the time that the device's buffer
+and the way to the recorder take. That time is found from outside the program: the server tells how much of its sound
+it has buffered, and clicks at several buffer lengths tell how long a sound then takes into the recording.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from app.commands.benchmarks.play.children import child
 from app.commands.benchmarks.play.recording import Recording
 from app.commands.benchmarks.play.sound_server import RATE_HZ, SoundServer
 
-LATENCIES_S = (0.01, 0.02, 0.05, 0.1, 0.2)  # asked of the device
+LATENCIES_S = (0.01, 0.02, 0.05, 0.1, 0.2)  # requested of the device
 CLICKS = 8
 LOOK_S = 0.03
-LEAST = 0.1  # quantile of what the server holds: sound is handed over when there is least of it
+LEAST = 0.1  # quantile of what the server has buffered: programs hand over sound when that is least
 PATIENCE_S = 20.0
 
 
 @dataclass(frozen=True)
 class Handed:
-    """Clicks at one buffer: when they were handed over, and how much the server held meanwhile."""
+    """Clicks at one buffer length: when they were handed over, and how much the server had buffered, in s."""
 
     times_s: tuple[float, ...]
     held_s: float
@@ -38,7 +38,7 @@ class Handed:
 
 @dataclass
 class Holding:
-    """How much the server holds of a client, looked at again and again."""
+    """How much of a client's sound the server has buffered, in s, sampled repeatedly."""
 
     looks_s: list[float] = field(default_factory=list)
 
@@ -54,9 +54,9 @@ class Holding:
 
 @dataclass(frozen=True)
 class Transit:
-    """From a program's hand into the recording, by how much the server holds.
+    """The time from a program's handing over of sound until it is in the recording, by what the server has buffered.
 
-    `spread_s`: so far are nine of ten clicks from the median of their buffer at most, most of it a block's length.
+    `spread_s`: nine of ten clicks deviate by no more from the median of their buffer length.
     """
 
     held_s: tuple[float, ...]
@@ -99,7 +99,7 @@ def click_through(server: SoundServer) -> list[Handed]:
 
 
 def transit(clicks: Sequence[Handed], recorded: Recording) -> Transit:
-    """Of clicks that were all recorded."""
+    """The transit time of clicks, from the recording of them all."""
     clock = recorded.clock()
     sound = np.abs(recorded.sound()[:, 0])
     held_s, transit_s, apart_s = [], [], [0.0]

@@ -1,4 +1,4 @@
-"""Programs that the benchmark starts: none missing, none left over."""
+"""Programs that the benchmark needs and starts: a check that they are installed, and that none outlives it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any
 
-PATIENCE_S = 5.0  # before a child that was asked to end is killed
+PATIENCE_S = 5.0  # from terminating a child to killing it
 PACKAGES = {  # of Debian and its kin
     "pulseaudio": "pulseaudio",
     "pacat": "pulseaudio-utils",
@@ -43,7 +43,7 @@ def child(
     stdout: IO[Any] | int | None = subprocess.DEVNULL,
     stderr: IO[Any] | int | None = subprocess.DEVNULL,
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that ends with the block, whatever happens in it."""
+    """A process that is ended with the block, also where that raises."""
     process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr)
     try:
         yield process

@@ -1,4 +1,4 @@
-"""Clicks through PortAudio at known times: a process of its own, which prints when each was handed to the device."""
+"""Plays clicks through PortAudio, as a process of its own, and prints when each was handed to the device."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import sounddevice
 
 BLOCK_FRAMES = 256
 FIRST_S = 0.5
-EVERY_S = 0.107  # in no step with blocks
+EVERY_S = 0.107  # no multiple of a block
 
 
 def main(rate_hz: int, latency_s: float, count: int) -> None:
-    """`latency_s` is asked of the device; times are of `time.monotonic`, when the callback hands them over."""
+    """`latency_s`: requested of the device. Times are those of the callback, by `time.monotonic`."""
     times_s: list[float] = []
     started_s = time.monotonic()
 

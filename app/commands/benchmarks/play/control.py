@@ -1,7 +1,7 @@
-"""A steady tone that goes the same way as the app's sound, from a process that does nothing else.
+"""A steady tone, played as the app's sound is, by a process that does nothing else: the control of the measurement.
 
 Where the tone has holes too, the computer or the sound server was late, not the app. It plays into a null sink of its
-own, through PortAudio, with the buffer that the app has, by the same compiled mixer and with the same rank.
+own, through PortAudio, with the app's buffer, compiled mixer and thread priority.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[R
     with (folder / "control.log").open("wb") as log, recording(server, folder / "control", SINK) as recorded:
         command = [sys.executable, "-m", "app.commands.benchmarks.play.control", str(buffer)]
         with child(command, environment, stdout=log, stderr=log):
-            recorded.wait_for_sound(0.0, PATIENCE_S)  # its start is not to be beside the app's
+            recorded.wait_for_sound(0.0, PATIENCE_S)  # so that it does not start while the app does
             yield recorded
 
 
 def main(buffer: str) -> None:
-    """Plays for ever."""
+    """Plays until the process is ended. `buffer`: see `Buffer`."""
     from app.audio.sound import Sound
     from app.playing.pair import Pair
     from app.window.audio_control import LATENCY_S

@@ -1,4 +1,4 @@
-"""What a player's hands do: a piano's two rows of letters at random but repeatably, or a score, by keys or MIDI."""
+"""Simulated playing: random keys of the computer, repeatable by a seed, or the events of a piece by keys or MIDI."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from app.commands.benchmarks.play.screen import Screen
 from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
 
 KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
-LOWEST = 48  # that the first of them plays
+LOWEST = 48  # the MIDI key that the first of them plays
 OCTAVE_DOWN, OCTAVE_UP = "z", "x"
-DIGITS = {round(1 + (digit - 1) / 8 * 126): str(digit) for digit in range(1, 10)}  # by velocity
+DIGITS = {round(1 + (digit - 1) / 8 * 126): str(digit) for digit in range(1, 10)}  # by the velocity that they set
 HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
 
 def tap(screen: Screen, key: str) -> float:
-    """Presses a key and lets it go; returns when it was pressed."""
+    """Presses and releases a key; returns when it was pressed."""
     pressed_s = screen.key(key, True)
     time.sleep(HELD_S)
     screen.key(key, False)
@@ -28,7 +28,7 @@ def tap(screen: Screen, key: str) -> float:
 
 
 def play(screen: Screen, random: Random, steps_s: Sequence[float]) -> list[float]:
-    """Taps a random key at each of the `steps_s` after the one before; returns the times."""
+    """Taps random keys, `steps_s` apart; returns when each was pressed."""
     pressed_s = []
     due_s = time.monotonic()
     for step_s in steps_s:
@@ -39,28 +39,23 @@ def play(screen: Screen, random: Random, steps_s: Sequence[float]) -> list[float
 
 
 def steady(random: Random, rate_hz: float, seconds: float) -> list[float]:
-    """Steps of so many plucks a second, each up to a tenth of a step early or late, as hands are."""
+    """Steps in s of so many plucks per second, each up to a tenth of a step early or late, as by a player."""
     step_s = max(1 / rate_hz, SHORTEST_STEP_S)
     offsets_s = [random.uniform(-0.1, 0.1) * step_s for _ in range(round(seconds / step_s))]
     return [step_s + offset - before for before, offset in zip([0.0, *offsets_s], offsets_s, strict=False)]
 
 
-def single(random: Random, count: int, step_s: float) -> list[float]:
-    """Steps of single plucks, in no step with blocks."""
-    return [step_s + random.uniform(0, 0.1) for _ in range(count)]
-
-
 class Hand(Protocol):
-    """What plays events; `turns`: whether it has a wheel and a pedal."""
+    """Plays events; `turns`: whether it has a wheel and a pedal."""
 
     turns: bool
 
     def do(self, event: Event) -> float:
-        """Plays one, and returns when."""
+        """Plays an event; returns when (`time.monotonic`)."""
 
 
 class MidiHand:
-    """On a MIDI keyboard, at the other end of a cable."""
+    """Plays events through a MIDI cable."""
 
     turns = True
 
@@ -72,7 +67,7 @@ class MidiHand:
 
 
 class KeyHand:
-    """On the computer's keys, which stand at octave 0."""
+    """Plays notes by the computer's keys, whose octave must be 0 at the start."""
 
     turns = False
 
@@ -83,7 +78,7 @@ class KeyHand:
         self._down: dict[int, str] = {}
 
     def do(self, event: Event) -> float:
-        """Raises ValueError: the computer's keys cannot play it."""
+        """Raises ValueError for an event that the computer's keys cannot play."""
         if isinstance(event, NoteOff):
             return self._screen.key(self._down.pop(event.key), False)
         if not isinstance(event, NoteOn):
@@ -105,7 +100,7 @@ class KeyHand:
 
 
 def perform(hand: Hand, events: Sequence[TimedEvent], seconds: float) -> list[TimedEvent]:
-    """Plays events by their times; the same with the times, of `time.monotonic`, at which they were played."""
+    """Plays events at their times; returns them with the times at which they were played (`time.monotonic`)."""
     began_s, played = time.monotonic(), []
     for each in events:
         time.sleep(max(began_s + each.time_s - time.monotonic(), 0))

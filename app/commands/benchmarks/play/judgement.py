@@ -1,4 +1,4 @@
-"""What a piece sounded like, judged: all of it from what was played and when, and what then was heard."""
+"""Judges the recording of a piece by what was played and when."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from app.instrument.events import Bend, NoteOff, TimedEvent
 from app.patches.patch import Patch
 from app.patches.tuning import Tuning
 
-BEGINS_S = 0.05  # of a note, before whose first waves have been everywhere nothing need sound
-ENDS_S = 0.005
-OWN_S = 0.5  # of a note before it is let go: how fast it falls by itself
+BEGINS_S = 0.05  # at a note's beginning in which no sound is expected yet: its waves must reach the listening point
+ENDS_S = 0.005  # before its damping from which none is expected any more
+OWN_S = 0.5  # of a note before its release, in which its own decay is measured
 
 Played = Mapping[str, Sequence[TimedEvent]]  # by the name of the part
-At = Callable[[float], float]  # when something is heard, in s of the sound, that was done at a time
+At = Callable[[float], float]  # from the time of an event to the time in the recording at which it is heard, in s
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """None where nobody turned a wheel or pedal.
+    """The result; None for what needs a wheel or a pedal where there was none.
 
-    Pitch is that of the longest stretch of a note without hole or click; dampers are measured where neither is.
+    Pitch is measured in the longest part of a note without a hole or click, damping only where there is neither.
 
     Attributes:
-        melody_cents: the worst of quiet notes, from the tuning; `bend_cents` where the wheel rests, from the bent
-            pitch; `chord_cents` of the tones of chords, which are not quiet. nan where one is silent.
+        melody_cents: the largest deviation of quiet notes from the tuning; `bend_cents` from the bent pitch where the
+            wheel rests; `chord_cents` of the tones of chords, which are not quiet. NaN where one is silent.
         loudness_spread_db: between the loudest and the softest of the quiet notes.
-        release_t60_s: of the damper of each quiet note, the shortest and the longest; the patch's is `wanted_t60_s`.
+        release_t60_s: the shortest and the longest of the quiet notes' dampers; the patch's is `wanted_t60_s`.
         chord_tones, tones_heard: how many there are, and how many stand out.
-        repeats, repeats_heard: of a key that is struck twelve times a second.
-        pedal_db: how far apart the level of a note is that a finger and that the pedal holds, at most.
-        pedal_t60_s: of the damper when the pedal is let go.
+        repeats, repeats_heard: of a key that is struck twelve times per second.
+        pedal_db: the largest difference in level of a note held by a finger and the same held by the pedal.
+        pedal_t60_s: of the damper when the pedal is released.
         restrike_db: the largest fall of the level at a soft strike of a string that rings loudly.
-        holes, fades, clicks: in all that was played; times in s of the sound.
-        loudest: sample, full scale being 1.
+        holes, fades, clicks: in all that was played, see `analysis`; times in s from the beginning of the recording.
+        loudest: the largest sample, ±1 being full scale.
     """
 
     melody_cents: float
@@ -68,7 +68,7 @@ class Judgement:
 
 
 def judge(played: Played, patch: Patch, sound: Sound, at: At) -> Judgement:
-    """Of a patch without body and room, whose strings are damped when they are let go."""
+    """Judges the recording of a patch without body and room, whose strings are damped when keys are released."""
     tuning = Tuning(patch.tuning)
     faults = _faults(played, sound, at)
     gaps = [*faults.holes, *(analysis.Span(click, click + 1) for click in faults.clicks)]
@@ -118,12 +118,12 @@ def judge(played: Played, patch: Patch, sound: Sound, at: At) -> Judgement:
 
 
 def notes_of(played: Played) -> list[Sounded]:
-    """All notes in their order."""
+    """All notes, in the order in which they were struck."""
     return sorted((note for part in played.values() for note in score.sounded(part)), key=lambda note: note.pressed_s)
 
 
 def _worst(cents: Iterable[float]) -> float:
-    """The largest, whatever its sign; nan, a note that is silent, is worse than any."""
+    """The largest magnitude; NaN, a silent note, where there is one."""
     found = np.abs(np.array(list(cents)))
     return float("nan") if np.isnan(found).any() else float(found.max())
 
@@ -161,7 +161,7 @@ def _faults(played: Played, sound: Sound, at: At) -> _Faults:
 
 
 def _united(spans_s: Sequence[tuple[float, float]]) -> list[analysis.Span]:
-    """In frames, those that meet as one."""
+    """The spans in frames, with those that overlap or touch joined."""
     found: list[analysis.Span] = []
     for start_s, end_s in sorted(spans_s):
         start, end = round(start_s * RATE_HZ), round(end_s * RATE_HZ)
@@ -175,7 +175,7 @@ def _united(spans_s: Sequence[tuple[float, float]]) -> list[analysis.Span]:
 def _bends(
     part: Sequence[TimedEvent], patch: Patch, at: At, cents_of: Callable[[float, float, float], float]
 ) -> float:
-    """Cents from the bent pitch where the wheel rests, the worst of them."""
+    """The largest deviation in cents from the bent pitch while the wheel rests."""
     own_hz = Tuning(patch.tuning).hz(score.BENT)
     turned = [each for each in part if isinstance(each.event, Bend | NoteOff)]
     found = []
@@ -187,7 +187,7 @@ def _bends(
 
 
 def _pedal(part: Sequence[TimedEvent], sound: Sound, at: At) -> tuple[float, float, float]:
-    """How far a note that the pedal holds is from one that a finger holds, its release, and falls at soft strikes."""
+    """`pedal_db`, `pedal_t60_s` and `restrike_db` of a `Judgement`."""
     notes = score.sounded(part)
     finger, pedalled = (note for note in notes if note.key == score.PEDALLED)
     levels = [hearing.levels_db(sound, at(n.pressed_s) + 0.05, at(n.pressed_s) + 1.4) for n in (finger, pedalled)]

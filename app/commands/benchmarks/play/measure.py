@@ -1,6 +1,6 @@
-"""The whole measurement: a private sound card and screen, the program, the hands, and what was recorded.
+"""The whole measurement: a private sound card and screen, the program, simulated playing, and the recording.
 
-Nothing of the program is known here but what its user knows: its command, its window's title, its keys, its settings.
+The program is driven from outside: by its command, its window's title, its keys and its settings file.
 """
 
 from __future__ import annotations
@@ -48,17 +48,19 @@ PICTURES = 20
 
 @dataclass(frozen=True)
 class Phase:
-    """What was heard with or without another busy process.
+    """What was measured with or without another busy process.
 
     Attributes:
-        singles: single plucks out of silence; `unheard` of them began nothing within half a second.
+        load_before: the system's load averages.
+        singles: single plucks out of silence; `unheard` of them had no sound within half a second.
         latency_ms: from the key until the sound is in the recording.
-        beyond_device_ms: less what the device's own buffer takes, which is `device_ms`.
+        beyond_device_ms: the same less `device_ms`, the share of the device's buffer.
         plucks: at the rate of playing. What follows is of these, times in s since the first of their keys.
-        holes: nothing at all for a millisecond or more while strings ring.
-        fades: falls of the level by 40 dB that come back, other than holes.
+        holes: number of silences of a millisecond or more while strings ring.
+        fades: drops of the level by 40 dB from which it recovers, other than holes.
         clicks: steps that are no pluck's beginning.
-        cpu_cores: of the program, while it was played.
+        loudest: the largest sample, ±1 being full scale.
+        cpu_cores: processor time of the program per second while it was played.
         control_holes: of a steady tone that another process plays meanwhile in the same way.
     """
 
@@ -88,9 +90,18 @@ class Phase:
 
 @dataclass(frozen=True)
 class PlayBenchmark:
-    """`buffer` as chosen, in ms where it is a number of frames; `views` beside the string; `picture_lag_ms`: from the
-    first sound of a pluck in the recording to the first changed picture of the string; `uncertainty_ms` of the
-    recording's clock, and of the device's own buffer."""
+    """The whole measurement.
+
+    Attributes:
+        rate_hz: plucks per second.
+        buffer: as chosen; `buffer_ms`: its length where it was chosen in frames.
+        size: of the window in pixels.
+        views: those beside the string.
+        idle_cpu_cores, idle_window_cores: processor time per second while nothing sounds, of the program and of the
+            window's thread.
+        picture_lag_ms: from the first sound of a pluck in the recording to the first changed picture of the string.
+        clock_uncertainty_ms, device_uncertainty_ms: of the recording's clock, and of the device's share of latency.
+    """
 
     machine: Machine
     seed: int
@@ -112,7 +123,7 @@ class PlayBenchmark:
 
 @dataclass(frozen=True)
 class _Played:
-    """What the hands did in a phase, on `time.monotonic`."""
+    """What was played in a phase, with times by `time.monotonic`."""
 
     busy: bool
     load: tuple[float, float, float]
@@ -131,11 +142,11 @@ def measure(
     patch: Patch,
     report: Callable[..., None],
 ) -> PlayBenchmark:
-    """Plays a patch for `seconds` at `rate_hz` notes a second, once for each entry of `busy`.
+    """Plays a patch for `seconds` at `rate_hz` notes per second, once for each entry of `busy`.
 
     Raises:
-        Missing: A program or library is not there.
-        RuntimeError: The app did not open, or nothing was heard of it.
+        Missing: a program or library is not there.
+        RuntimeError: the app did not open, or no sound of it was recorded.
     """
     need_programs(*SOUND_AND_SCREEN)
     one_s = SINGLES * (RINGS_S + QUIET_S + 0.05) + seconds + 10
@@ -221,7 +232,7 @@ def _phase(
         tell(f"single plucks{beside}")
         singles_s = []
         for _ in range(SINGLES):
-            time.sleep(QUIET_S + random.uniform(0, 0.1))  # in no step with blocks
+            time.sleep(QUIET_S + random.uniform(0, 0.1))  # at random offsets from the device's blocks
             singles_s.append(hands.tap(screen, random.choice(hands.KEYS)))
             time.sleep(RINGS_S)
             hands.tap(screen, STOP)
@@ -238,7 +249,7 @@ def _phase(
 
 
 def _cpu_s(process: subprocess.Popen[bytes]) -> float:
-    """Of a process and those it has started."""
+    """Processor time of a process and all that it has started."""
     parent = psutil.Process(process.pid)
     total = 0.0
     for one in (parent, *parent.children(recursive=True)):
@@ -249,7 +260,7 @@ def _cpu_s(process: subprocess.Popen[bytes]) -> float:
 
 
 def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> tuple[float | None, float | None]:
-    """Cores of the program and of its window's thread while nothing sounds; None where it does not fall silent."""
+    """See `PlayBenchmark`; None where the program does not fall silent."""
     if not recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S):
         return None, None
     before_s, before_cpu_s, before_window_s = time.monotonic(), _cpu_s(process), _window_cpu_s(process)
@@ -259,14 +270,14 @@ def _idle(recorded: Recording, process: subprocess.Popen[bytes]) -> tuple[float 
 
 
 def _window_cpu_s(process: subprocess.Popen[bytes]) -> float:
-    """Of a process's first thread, which is the window's."""
+    """Processor time of a process's first thread, which is the window's."""
     return sum(
         each.user_time + each.system_time for each in psutil.Process(process.pid).threads() if each.id == process.pid
     )
 
 
 def _control_holes_ms(played: _Played, control: Recording) -> list[float]:
-    """Holes of the steady tone while the app was played."""
+    """Lengths of the steady tone's holes while the app was played."""
     clock, sound = control.clock(), control.sound()
     part = sound[clock.frame(played.keys_s[0]) : clock.frame(played.keys_s[-1] + analysis.SOUNDS_S), 0]
     return [silence.frames * 1000 / RATE_HZ for silence in analysis.silences(part, RATE_HZ)]

@@ -1,7 +1,7 @@
-"""A private MIDI cable: messages go through a real port from this process into the program's own MIDI input.
+"""A private MIDI cable: messages go through a real port from this process into the app's own MIDI input.
 
-A JACK server with a driver that drives nothing carries it, as it needs neither a device nor the kernel's sequencer.
-What comes out at the cable's end is heard here too: that tells how long the cable itself takes, and what it loses.
+It is carried by a JACK server with the dummy driver, which needs neither a device nor the kernel's sequencer. This
+process receives the messages too, which tells how long the cable itself takes and what it loses.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from app.instrument.midi_file import messages_of
 
 BACKEND = "mido.backends.rtmidi/UNIX_JACK"
 PORT = "hands"
-RATE_HZ, PERIOD_FRAMES = 48_000, 128  # of the cable: a message waits for a period or two
+RATE_HZ, PERIOD_FRAMES = 48_000, 128  # of the JACK server: a message takes a period or two
 START_PATIENCE_S = 10.0
 SETTLE_S = 0.3
 
 
 @dataclass
 class Cable:
-    """Both ends of it.
+    """Both ends of the cable.
 
     Attributes:
-        name: of the input that a program opens.
-        environment: of a program that is to find it.
+        name: of the input port that a program opens.
+        environment: variables for a program that is to find it.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Cable:
     _arrived_s: list[float] = field(default_factory=list)
 
     def send(self, event: Event) -> float:
-        """When it was sent."""
+        """Sends an event; returns when (`time.monotonic`)."""
         sent_s = time.monotonic()
         for message in messages_of(event):
             self._sent_s.append(time.monotonic())
@@ -51,17 +51,17 @@ class Cable:
         return sent_s
 
     def hear(self, _message: Any) -> None:
-        """In the port's thread."""
+        """Receives a message at the other end, in the port's thread."""
         self._arrived_s.append(time.monotonic())
 
     @property
     def lost(self) -> int:
-        """Messages that never came out."""
+        """How many messages have not arrived."""
         return len(self._sent_s) - len(self._arrived_s)
 
     @property
     def transits_s(self) -> list[float]:
-        """From one end to the other, of each message; empty where some were lost."""
+        """The time from one end to the other of each message; empty where some were lost."""
         if self.lost:
             return []
         return [arrived_s - sent_s for sent_s, arrived_s in zip(self._sent_s, self._arrived_s, strict=True)]
@@ -69,10 +69,10 @@ class Cable:
 
 @contextlib.contextmanager
 def cable(folder: Path) -> Iterator[Cable]:
-    """The server, with its files in `folder`, and the cable. Nothing of the user's own MIDI is touched.
+    """Starts the server, with its files in `folder`, and ends it afterwards. The user's own MIDI is left alone.
 
     Raises:
-        Missing: It did not start, or python-rtmidi knows no JACK.
+        Missing: it did not start, or python-rtmidi does not support JACK.
     """
     need_programs("jackd")
     try:
@@ -106,7 +106,7 @@ def cable(folder: Path) -> Iterator[Cable]:
 
 
 def _opened(backend: Any, process: subprocess.Popen[bytes], log: Path) -> Any:
-    """The port, as soon as the server is there."""
+    """The output port, as soon as the server is running. Raises Missing."""
     deadline_s = time.monotonic() + START_PATIENCE_S
     while True:
         try:
@@ -134,7 +134,7 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quiet(log: Path) -> Iterator[None]:
-    """What JACK's library says on standard error goes to a file."""
+    """Within, standard error, on which JACK's library prints, goes to a file."""
     sys.stderr.flush()
     kept = os.dup(2)
     try:

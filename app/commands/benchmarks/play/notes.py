@@ -1,6 +1,6 @@
-"""A piece that tries an instrument, played by MIDI and by the computer's keys into the running app, and judged.
+"""A test piece, played by MIDI and by the computer's keys in the running app, recorded and judged.
 
-The patch is played without its body and room, whose tails would hide how strings are damped.
+The patch is played without its body and room, whose tails would hide the damping of strings.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ PATIENCE_S = 20.0
 
 @dataclass(frozen=True)
 class Heard:
-    """What was heard of the piece by one kind of hand.
+    """The result for the piece as played by "midi" or "keys".
 
     Attributes:
-        lost: messages that the MIDI cable itself lost; `cable_ms` is what it takes by itself. None for keys.
-        singles: single notes; `unheard` of them began nothing.
-        latency_ms: of these, from the message or key to the sound in the recording.
-        beyond_device_ms: less what the device's own buffer takes, which is `device_ms`.
+        lost: messages that the MIDI cable lost; `cable_ms`: its own latency, the median. None for keys.
+        singles: single notes; `unheard` of them had no sound.
+        latency_ms: of these, from the message or key until the sound is in the recording.
+        beyond_device_ms: the same less `device_ms`, the share of the device's buffer.
         control_holes: of a steady tone that another process plays meanwhile in the same way.
     """
 
@@ -71,7 +71,7 @@ class Heard:
 
 @dataclass(frozen=True)
 class NotesBenchmark:
-    """`uncertainty_ms` as of `bench play`."""
+    """The whole measurement; uncertainties as in `measure.PlayBenchmark`."""
 
     machine: Machine
     seed: int
@@ -84,7 +84,7 @@ class NotesBenchmark:
 
 @dataclass(frozen=True)
 class _Played:
-    """What one kind of hand did, by the name of the part; times are of `time.monotonic`."""
+    """What was played by MIDI or keys, by the name of the part, with times by `time.monotonic`."""
 
     by: str
     load: float
@@ -98,11 +98,11 @@ class _Played:
 
 
 def measure(by: By, buffer: Buffer, seed: int, patch: Patch, report: Callable[..., None]) -> NotesBenchmark:
-    """Plays the piece by each kind of hand that is asked for.
+    """Plays the piece by MIDI, keys or both, and judges the recording.
 
     Raises:
-        Missing: A program, a library or a MIDI port is not there.
-        RuntimeError: The app did not open, or nothing was heard of it.
+        Missing: a program, a library or a MIDI port is not there.
+        RuntimeError: the app did not open, or no sound of it was recorded.
     """
     need_programs(*SOUND_AND_SCREEN, *(() if by == "keys" else ("jackd",)))
     dry = Patch.model_validate({**dict(patch), "body": Body(), "room": Room()})
@@ -208,7 +208,7 @@ def _judged(
     device_s = None if played.held_s is None else way.at(played.held_s)
 
     def at(time_s: float) -> float:
-        """When in `sound` something is heard that was done at a time."""
+        """When in `sound`, in s, an event of that time is heard."""
         return (clock.frame(time_s + usual_s) - begin) / RATE_HZ
 
     control_ms = _control_holes_ms(played, control)
@@ -229,7 +229,7 @@ def _judged(
 
 
 def _control_holes_ms(played: _Played, control: Recording) -> list[float]:
-    """Holes of the steady tone while the piece was played."""
+    """Lengths of the steady tone's holes while the piece was played."""
     clock, sound = control.clock(), control.sound()
     part = sound[clock.frame(played.began_s) : clock.frame(played.until_s), 0]
     return [silence.frames * 1000 / RATE_HZ for silence in analysis.silences(part, RATE_HZ)]

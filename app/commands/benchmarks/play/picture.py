@@ -1,7 +1,7 @@
-"""How far the picture is behind the sound, seen from outside: the first changed picture after a key into silence.
+"""How far the picture is behind the sound: the first changed picture of the screen after a key out of silence.
 
-What is looked at is a part of the window's upper half, where the string is: the knobs below it change with a key,
-too, and are no picture of the sound.
+Only a part of the window's upper half is compared, where the string is drawn, because the controls below it change
+with a key, too.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ QUIET_S = 0.6
 def picture_lags(
     screen: Screen, recorded: Recording, count: int, keys: Sequence[str], stop: str
 ) -> list[tuple[float, float]]:
-    """For plucks one by one: when the key was pressed, and when another picture was seen, within 10 ms or so.
+    """For single plucks: when the key was pressed, and when the picture had changed, to within some 10 ms.
 
-    Plucks before which the picture did not rest are left out.
+    Plucks before which the picture was still moving are left out.
     """
     found = []
     for number in range(count):

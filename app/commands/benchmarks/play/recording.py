@@ -1,9 +1,9 @@
-"""All that the sound card was given, and when.
+"""A recording of all that the sound card was given, and the time of each of its frames.
 
-The recorder's pipe brings blocks, some of them late. A frame's time is read off the straight line that lies below all
-arrivals and as close to them as it can: the sound card's clock as it would arrive if nothing were ever late. What is
-left is a constant, the way from the card to this process, that is the same for whatever is recorded in one recording:
-it is found by clicks of a known time (`calibration.py`), and a difference of two such times is free of it.
+The recorder's pipe brings blocks, some of them late. A frame's time is read from the straight line that lies below
+all arrivals and as close to them as possible: the sound card's clock as it would arrive if no block were late. What
+remains is a constant, the way from the card to this process. It is found by clicks of known times (`calibration.py`),
+and drops out of the difference of two times.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from numpy.typing import NDArray
 from app.commands.benchmarks.play.children import child
 from app.commands.benchmarks.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SINK, SoundServer
 
-LATENCY_MS = 5  # of the recorder, and by it of the sink: how much the card takes at a time
+LATENCY_MS = 5  # of the recorder, and through it of the sink: how much the card takes at a time
 FRAME_BYTES = 4 * CHANNELS
 READ_BYTES = 1 << 16
 AUDIBLE = 1e-6
-WINDOW_S = 1.0  # in each the line should nearly touch an arrival
+WINDOW_S = 1.0  # within which at least one arrival should lie close to the line
 
 
 @dataclass(frozen=True)
 class CardClock:
     """time_s = start_s + frame · frame_s, on `time.monotonic`.
 
-    `spread_s`: how far from the line the earliest arrival of a second was at most, an estimate of its error.
+    `spread_s`: the largest distance from the line to the earliest arrival of a second, an estimate of its error.
     """
 
     start_s: float
@@ -43,13 +43,13 @@ class CardClock:
 
     @classmethod
     def through(cls, frames: NDArray[np.float64], times_s: NDArray[np.float64]) -> CardClock:
-        """From arrivals: the number of frames that were there at each time."""
+        """The line below all arrivals: at `times_s` (n,) so many `frames` (n,) had arrived."""
         hull: list[int] = []
         for index in range(len(frames)):
             while len(hull) > 1 and _left_of(frames, times_s, hull[-2], hull[-1], index):
                 hull.pop()
             hull.append(index)
-        middle = float(np.mean(frames))  # the edge there has the least sum of distances of all lines below
+        middle = float(np.mean(frames))  # of all lines below, the hull's edge there has the least sum of distances
         right = next((i for i in range(1, len(hull)) if frames[hull[i]] >= middle), len(hull) - 1)
         first, second = hull[right - 1], hull[right]
         frame_s = float((times_s[second] - times_s[first]) / (frames[second] - frames[first]))
@@ -71,7 +71,7 @@ def _left_of(x: NDArray[np.float64], y: NDArray[np.float64], a: int, b: int, c: 
 
 
 class Recording:
-    """Grows in a thread of its own until the recorder ends."""
+    """A file of the recorder's samples, written by a thread until the recorder ends."""
 
     def __init__(self, pipe: IO[bytes], path: Path) -> None:
         self._pipe, self._path = pipe, path
@@ -100,6 +100,10 @@ class Recording:
         """Waits until nothing audible came for `silence_s`; False where it did not end within `seconds`."""
         return self._wait(lambda: time.monotonic() - self.sounded_s > silence_s, seconds)
 
+    def wait_for_end(self) -> None:
+        """Of the recorder, and all that it still brought."""
+        self._thread.join()
+
     def _wait(self, holds: Callable[[], bool], seconds: float) -> bool:
         deadline_s = time.monotonic() + seconds
         while not holds():
@@ -122,14 +126,17 @@ class Recording:
 def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Recording]:
     """Records what a sink is given into `path` until the block ends."""
     reading, writing = _pipe()
-    with reading, child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
-        writing.close()
-        yield Recording(reading, path)
+    with reading:
+        with child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
+            writing.close()
+            recorded = Recording(reading, path)
+            yield recorded
+        recorded.wait_for_end()
 
 
 @contextlib.contextmanager
 def recording_aside(server: SoundServer, path: Path) -> Iterator[None]:
-    """Records both channels' mean, float32 (frames,), into `path`, in which this process has no part."""
+    """Records the mean of both channels, float32 (frames,), into `path`, by another process alone."""
     with path.open("wb") as file, child(_recorder(1, SINK), server.environment, stdout=file):
         yield
 

@@ -1,6 +1,6 @@
-"""What a player plays to try an instrument: values, without any port or clock.
+"""The test piece as a list of events.
 
-Velocities are some that the computer's digits give, so that keys and MIDI can play the same.
+Its velocities are among those of the computer's digits, so that keys and MIDI can play the same.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ QUIET, MIDDLE, HARD, HARDEST = 17, 64, 96, 111  # the digits 2, 5, 7, 8
 SINGLES = 30
 LOWEST, HIGHEST = 36, 77  # of the computer's keys, an octave down and up
 MELODY = (40, 45, 52, 48, 50, 55, 57, 59, 60, 64, 62, 65, 67, 69, 72, 76)
-CHORDS = ((48, 52, 55, 59), (48, 52, 55, 57), (48, 52, 53, 57), (50, 53, 55, 59))  # no tone is another's partial
+CHORDS = ((48, 52, 55, 59), (48, 52, 55, 57), (48, 52, 53, 57), (50, 53, 55, 59))  # no tone is a partial of another
 REPEATED, REPEATS, REPEATS_A_SECOND = 52, 24, 12
 BENT, BEND_STEPS = 57, 50
 BENDS = (0.0, 1.0, -1.0, 0.5, 0.0)  # of the wheel's range; it rests at each
@@ -27,7 +27,7 @@ RESTRIKES = 6
 
 @dataclass(frozen=True)
 class Part:
-    """Events by rising time since its beginning, all over after `seconds`. `turns`: it has a wheel or a pedal."""
+    """Events of a part, in order, with times from its beginning; `seconds`: until all of it has ended."""
 
     name: str
     events: tuple[TimedEvent, ...]
@@ -35,6 +35,7 @@ class Part:
 
     @property
     def turns(self) -> bool:
+        """Whether it needs a wheel or a pedal."""
         return any(isinstance(each.event, Bend | Controller) for each in self.events)
 
 
@@ -44,7 +45,7 @@ def parts(random: Random, low: int, high: int) -> tuple[Part, ...]:
 
 
 def singles(random: Random) -> Part:
-    """Single notes out of silence, in no step with blocks."""
+    """Single notes out of silence, at random offsets from the device's blocks."""
     found, now_s = [], 0.0
     for _ in range(SINGLES):
         now_s += 0.8 + random.uniform(0, 0.1)
@@ -72,7 +73,7 @@ def chords() -> Part:
 
 
 def repeats() -> Part:
-    """One key, as fast as fingers are."""
+    """One key, repeated as fast as a player can."""
     step_s = 1 / REPEATS_A_SECOND
     found = [
         event
@@ -83,7 +84,7 @@ def repeats() -> Part:
 
 
 def bends() -> Part:
-    """One note that is held while the wheel moves and rests."""
+    """A note that is held while the wheel moves and rests."""
     found: list[TimedEvent] = []
     now_s = RESTS_S
     for before, after in itertools.pairwise(BENDS):
@@ -106,7 +107,7 @@ def pedal() -> Part:
 
 @dataclass(frozen=True)
 class Sounded:
-    """A note as it was played, in s: it is damped where neither finger nor pedal holds it any more."""
+    """A note as it was played, with times in s; it is damped when neither finger nor pedal holds it any more."""
 
     key: int
     velocity: int
@@ -116,7 +117,7 @@ class Sounded:
 
 
 def sounded(played: Sequence[TimedEvent]) -> list[Sounded]:
-    """The notes of a part, by what was done and when."""
+    """The notes of a part's events."""
     end_s = max((each.time_s for each in played), default=0.0)
     found = []
     for place, each in enumerate(played):
@@ -143,7 +144,7 @@ def sounded(played: Sequence[TimedEvent]) -> list[Sounded]:
 
 
 def _first(played: Sequence[TimedEvent], key: int, otherwise_s: float) -> float:
-    """When a key is let go."""
+    """When a key is released."""
     return next(
         (each.time_s for each in played if isinstance(each.event, NoteOff) and each.event.key == key), otherwise_s
     )
@@ -162,6 +163,6 @@ def _part(name: str, events: Sequence[TimedEvent], seconds: float) -> Part:
 
 
 def _order(each: TimedEvent) -> tuple[float, bool]:
-    """What ends comes before what begins at the same time."""
+    """A sort key: at the same time, ends come before beginnings."""
     event: Event = each.event
     return each.time_s, isinstance(event, NoteOn)

@@ -1,6 +1,6 @@
-"""A private screen: a window that is really drawn, keys that really come from outside, pictures of what is seen.
+"""A private X screen (Xvfb): windows are drawn on it, keys are sent to it, and pictures are taken of it.
 
-Xlib is spoken to directly: a key leaves this process within microseconds, and nothing has to be installed for it.
+Xlib is called directly: a key is sent within microseconds, and no Python package is needed for it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Screen:
     def __init__(self, name: str) -> None:
         self.name = name
         self._x, self._xtest = _library("X11", "libx11-6"), _library("Xtst", "libxtst6")
-        self._ignore = _ERROR_HANDLER(lambda _display, _event: 0)  # a window may vanish while it is looked at
+        self._ignore = _ERROR_HANDLER(lambda _display, _event: 0)  # a window may vanish between two calls
         self._x.XSetErrorHandler(self._ignore)
         self._display = self._x.XOpenDisplay(name.encode())
         if not self._display:
@@ -72,7 +72,7 @@ class Screen:
         self._x.XCloseDisplay(self._display)
 
     def find(self, title: str) -> int | None:
-        """The window that is to be seen whose title begins so."""
+        """The visible window whose title begins with `title`; None where there is none."""
         root, parent, count = ctypes.c_ulong(), ctypes.c_ulong(), ctypes.c_uint()
         children = ctypes.POINTER(ctypes.c_ulong)()
         self._x.XQueryTree(
@@ -102,7 +102,7 @@ class Screen:
         return found.width, found.height
 
     def key(self, name: str, down: bool) -> float:
-        """Presses or releases a key, by the name of its sign; returns the time at which it was sent."""
+        """Presses or releases a key, by the name of its keysym; returns when it was sent (`time.monotonic`)."""
         code = self._x.XKeysymToKeycode(self._display, self._x.XStringToKeysym(name.encode()))
         if not code:
             raise Missing(f"the private screen has no key {name}")
@@ -112,7 +112,7 @@ class Screen:
         return now_s
 
     def grab(self, x: int, y: int, width: int, height: int) -> NDArray[np.uint8]:
-        """What is to be seen there, shape (height, width, 4): blue, green, red, nothing."""
+        """The picture of a part of the screen, (height, width, 4): blue, green, red, unused."""
         image = self._x.XGetImage(self._display, self._root, x, y, width, height, ctypes.c_ulong(-1), Z_PIXMAP)
         if not image:
             raise Missing("the private screen gives no picture")
@@ -176,10 +176,10 @@ def _library(name: str, package: str) -> Any:
 
 @contextlib.contextmanager
 def private_screen() -> Iterator[Screen]:
-    """An X server of its own, on a display number that is free.
+    """Starts an X server on a free display number, and ends it afterwards.
 
     Raises:
-        Missing: It did not start, or there is no library for it.
+        Missing: it did not start, or libX11 or libXtst is missing.
     """
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x{DEPTH}", "-nolisten", "tcp"]
     with child(command, os.environ, stdout=subprocess.PIPE) as process:

@@ -1,4 +1,4 @@
-"""Times of many notes in three numbers."""
+"""Median, 99th percentile and maximum of times."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Spread:
-    """Of several times, in ms."""
+    """Statistics of several times, in ms."""
 
     median: float
     p99: float
@@ -17,6 +17,7 @@ class Spread:
 
     @classmethod
     def of(cls, values_s: list[float]) -> Spread | None:
+        """Of times in s; None where there are none."""
         if not values_s:
             return None
         ms = 1000 * np.array(values_s)

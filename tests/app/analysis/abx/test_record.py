@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ from pydantic import ValidationError
 
 from app.analysis.abx.record import AbxRecord, RecordError, list_records, load_record, save_record
 from app.analysis.abx.text import as_text, p_text
+from app.patches.patch import PhysicalString
 from app.shared.whole_file import WriteError
+from engine.resonators.string import StringParameters
 
 
 def edited(path: Path, **changes: Any) -> Path:
@@ -54,7 +57,7 @@ def test_a_test_that_was_stopped_claims_nothing(stopped: AbxRecord, tmp_path: Pa
         ({"seed": 6}, "not in the order of the seed"),
         ({"trials": [{"x": "A"}]}, "trials.0.answer: Field required"),
         ({"kind": "something else"}, "not the record of a listening test"),
-        ({"version": 2}, "read it with a newer Learned Strings"),
+        ({"version": 3}, "read it with a newer Learned Strings"),
         ({"date": "yesterday"}, "date: "),
         ({"more": 1}, "more: Extra inputs"),
     ],
@@ -67,6 +70,27 @@ def test_a_record_that_cannot_be_true_is_refused(
         load_record(path)
     assert str(told.value).startswith(f"{path}: ")
     assert message in str(told.value)
+
+
+def test_the_string_of_many_is_kept_and_told(record: AbxRecord, tmp_path: Path) -> None:
+    assert "\nString " not in as_text(record)
+    own = StringParameters()
+    string = PhysicalString(**{name: getattr(own, name) for name in PhysicalString.model_fields})
+    chosen = record.model_copy(update={"pluck": record.pluck.model_copy(update={"string": string})})
+    path = save_record(tmp_path, chosen)
+    assert load_record(path) == chosen
+    hz = own.undamped_frequency(1) / (2 * math.pi)
+    assert f"String    {hz:.1f} Hz: length_m {own.length_m:g}, area_m2 {own.area_m2:g}, " in as_text(chosen)
+    with pytest.raises(RecordError, match="string belongs to version 2"):
+        load_record(edited(path, version=1))
+
+
+def test_a_record_of_version_1_is_read(record: AbxRecord, tmp_path: Path) -> None:
+    path = save_record(tmp_path, record)
+    pluck = json.loads(path.read_text())["pluck"]
+    assert pluck.pop("string") is None
+    earlier = load_record(edited(path, version=1, pluck=pluck))
+    assert earlier == record.model_copy(update={"version": 1})
 
 
 @pytest.mark.parametrize(
@@ -127,6 +151,13 @@ def test_the_text_says_everything(record: AbxRecord) -> None:
     ):
         assert part in text
     assert sum("  yes  " in line for line in text.splitlines()) == 9
+
+
+def test_the_text_says_where_and_how_it_was_heard(record: AbxRecord) -> None:
+    assert "Heard     at 0.37 of the length, 2 s\n" in as_text(record)
+    pluck = record.pluck.model_copy(update={"listen_right": 0.63, "pickup": "velocity", "solo": 3})
+    text = as_text(record.model_copy(update={"pluck": pluck}))
+    assert "Heard     at 0.37 (left) and 0.63 (right) of the length, as velocity, mode 3 alone, 2 s\n" in text
 
 
 def test_two_presets_are_told_apart(record: AbxRecord) -> None:

@@ -14,11 +14,14 @@ from random import Random
 import numpy as np
 import pytest
 from PySide6.QtCore import qWarning
+from pytestqt.qtbot import QtBot
 
 from app.commands.benchmarks.random_changes import Repertoire, random_change
-from app.commands.benchmarks.soak import PROGRAMS, _holes, collected_faults
+from app.commands.benchmarks.soak import PROGRAMS, _holes, _Watch, collected_faults
+from app.commands.benchmarks.stage import Stage
 from app.patches.library import list_patches
 from app.session.choices import Choices, Session
+from app.window.main_window import MainWindow
 
 PATCHES = tuple(entry.patch for entry in list_patches()[0][:3])
 REPERTOIRE = Repertoire(("first", "second"), ("spectrum", "partials"), ("waveform", "compare"), PATCHES)
@@ -60,7 +63,8 @@ def test_a_short_soak_plays_into_the_private_card_and_reports(
     assert found["threads_left"] == []
     assert found["plucks"] > 2
     assert found["end_mib"] > 0
-    assert found["drift_mib"] >= 0
+    assert found["drift_mib"] == max(abs(mib - found["settled_mib"]) for mib in found["memory_mib"])
+    assert len(found["memory_mib"]) >= 2 and found["peak_mib"] > 0
     assert found["seed"] == 3
     assert found["holes"]["seconds"] > 1.0  # it was recorded
     assert found["holes"]["heard"] == len(found["holes"]["heard_at_s"])
@@ -80,6 +84,20 @@ def test_the_recording_is_judged_by_who_played(tmp_path: Path) -> None:
     assert playing.longest_ms == pytest.approx(20, abs=0.1)
     assert restless.a_minute == 60
     assert restless.told == {"device": 1}
+
+
+def test_one_who_plays_is_weighed_at_the_end_of_each_minute(qtbot: QtBot) -> None:
+    """Of an hour; what comes and goes within seconds does not count, nor does the first minute's growth."""
+    window = MainWindow()
+    qtbot.addWidget(window)
+    watch = _Watch(Stage(window, None, ""), 3600.0, lambda share, text: None)  # type: ignore[arg-type]
+    watch.stop()
+    watch._weights_mib = [(s, 400.0 + min(s, 30) + (300.0 if s % 20 == 5 else s / 3600)) for s in range(1, 3601)]
+    found = watch.at_each_minute()
+    assert len(found) == 60
+    assert found[0] == pytest.approx(430, abs=0.1)
+    assert found[-1] == pytest.approx(431, abs=0.1)
+    assert watch.peak_mib > 700
 
 
 def test_random_changes_are_allowed_and_touch_everything() -> None:

@@ -44,7 +44,7 @@ def render() -> Callable[..., NDArray[np.float32]]:
     """A sine of the key's pitch, and the softer the wider the pluck; a right channel is 6 dB softer."""
 
     def rendered(
-        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int
+        patch: Patch, key: int, velocity: int, held_s: float, seconds: float, rate_hz: int, **_: object
     ) -> NDArray[np.float32]:
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         decay = 10 ** (-3 * time_s / T60_S)

@@ -95,6 +95,13 @@ def test_the_digest_is_of_what_is_heard(patch: Patch) -> None:
     assert SampledPlan(patch, layers=7, every=2).digest(zone) == plan.digest(zone)  # the same note, other neighbours
 
 
+def test_the_file_of_a_body_counts_where_it_is_heard(patch_of: Callable[..., Patch]) -> None:
+    zone = Zone(50, 64, (50, 50), (1, 64))
+    for mix, digests in ((0.5, 2), (0.0, 1)):
+        patch = patch_of(body={"name": "mine", "mix": mix})
+        assert len({SampledPlan(patch, body_sha256=sha256 * 64).digest(zone) for sha256 in "01"}) == digests
+
+
 def test_keys_that_the_tuning_leaves_out_have_no_sample(patch_of: Callable[..., Patch]) -> None:
     white = ["0", "x", "2", "x", "4", "5", "x", "7", "x", "9", "x", "11"]
     keymap = "\n".join(["12", "0", "127", "60", "69", "440.0", "12", *white]) + "\n"

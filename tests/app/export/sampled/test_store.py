@@ -13,9 +13,11 @@ import pytest
 from filelock import FileLock
 
 from app.export.files import ExportCancelled, ExportError
+from app.export.sampled import sf2
 from app.export.sampled.job import export_sampled, kept_samples, sample_folder
 from app.export.sampled.plan import MOST_LAYERS, SampledPlan
 from app.export.sampled.store import INDEX, LOCK, SampleIndex, StoredSample, read_index
+from app.export.wav import quantised
 from app.patches.patch import Patch
 
 Render = Callable[..., np.ndarray]
@@ -34,7 +36,7 @@ KILLED = """
 
     notes, last = 0, sys.argv[4]
 
-    def render(patch, key, velocity, held_s, seconds, rate_hz):
+    def render(patch, key, velocity, held_s, seconds, rate_hz, advanced):
         global notes
         notes += 1
         if str(notes) == last:
@@ -161,6 +163,34 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_cancelling_ends_within_a_note(patch: Patch, render: Render, tmp_path: Path) -> None:
+    reached_s: list[float] = []
+
+    def slow(*note: object, advanced: Callable[[float], None]) -> np.ndarray:
+        for block in range(1, 31):
+            reached_s.append(block / 100)
+            advanced(block / 100)
+        return render(*note)
+
+    out = tmp_path / "a.sfz"
+    with pytest.raises(ExportCancelled):
+        export_sampled(small(patch), out, slow, cancelled=lambda: len(reached_s) == 35)
+    assert reached_s[-1] == 0.05  # of the second note
+    assert kept_samples(small(patch), out) == 1
+
+
+def test_cancelling_ends_while_a_soundfont_is_written(
+    patch: Patch, render: Render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[object] = []
+    monkeypatch.setattr(sf2, "quantised", lambda *words: written.append(1) or quantised(*words))
+    out = tmp_path / "a.sf2"
+    with pytest.raises(ExportCancelled):
+        export_sampled(small(patch), out, render, cancelled=lambda: len(written) == 2)
+    assert not out.exists()
+    assert kept_samples(small(patch), out) == 10
+
+
 @KINDS
 def test_peak_and_gain_are_those_of_the_notes(kind: str, patch_of: Callable, render: Render, tmp_path: Path) -> None:
     for level_db in (0.0, 12.0):
@@ -234,12 +264,12 @@ def test_the_index_of_the_largest_instrument_is_read(patch_of: Callable[..., Pat
 
 def test_a_note_that_is_not_finite_is_told(patch: Patch, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"key050_vel063\.flac: the note holds values that are not finite"):
-        export_sampled(small(patch), tmp_path / "a.sfz", lambda *_: np.full((100, 1), np.inf))
+        export_sampled(small(patch), tmp_path / "a.sfz", lambda *_, advanced: np.full((100, 1), np.inf))
     assert not (tmp_path / "a.sfz").exists()
 
 
 def test_a_key_without_a_note_is_told(patch: Patch, tmp_path: Path) -> None:
-    def none(*_: object) -> np.ndarray:
+    def none(*_: object, **more: object) -> np.ndarray:
         raise ValueError("key 50 has no string")
 
     with pytest.raises(ExportError, match="key 50 has no string"):

@@ -2,34 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.views.controls.note_box import NoteBox, key_named
-from app.views.instrument.playable import note_name
-
-
-def test_every_name_is_read_as_it_is_written() -> None:
-    assert [key_named(note_name(key)) for key in range(128)] == list(range(128))
-
-
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        ("e2", 40),
-        ("F#3", 54),
-        ("Gb3", 54),
-        ("G♭3", 54),
-        (" 54 ", 54),
-        ("C-1", 0),
-        ("H2", None),
-        ("E", None),
-        ("", None),
-    ],
-)
-def test_other_spellings(text: str, key: int | None) -> None:
-    assert key_named(text) == key
+from app.shared.key_names import note_name
+from app.views.controls.note_box import NoteBox
 
 
 def test_a_note_is_typed_and_one_out_of_range_is_not_taken(qtbot: QtBot) -> None:

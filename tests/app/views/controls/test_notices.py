@@ -22,7 +22,7 @@ def test_a_repeated_notice_counts_up(bar: NoticeBar) -> None:
     bar.tell("Disk full.")
     for _ in range(100):
         bar.tell("No sound.", "device 4")
-    assert bar.kept == [("Disk full.", ""), ("No sound.", "device 4")]
+    assert [(each.message, each.details) for each in bar.notices] == [("Disk full.", ""), ("No sound.", "device 4")]
     assert bar.text == "No sound."
     assert bar._label.text() == "No sound.  (×101)"
     assert bar.bell.unseen == 2
@@ -34,7 +34,7 @@ def test_a_withdrawn_notice_is_still_kept(bar: NoticeBar) -> None:
     assert bar.text == "No sound."
     bar.withdraw("No sound.")
     assert bar.text == ""
-    assert bar.kept == [("No sound.", "")]
+    assert [(each.message, each.details) for each in bar.notices] == [("No sound.", "")]
 
 
 def test_information_is_not_shown_as_a_fault(bar: NoticeBar) -> None:
@@ -79,5 +79,5 @@ def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) 
 def test_the_list_is_bounded(bar: NoticeBar) -> None:
     for number in range(MOST_KEPT + 5):
         bar.tell(f"Fault {number}.")
-    assert len(bar.kept) == MOST_KEPT
+    assert len(bar.notices) == MOST_KEPT
     assert bar.text == f"Fault {MOST_KEPT + 4}."

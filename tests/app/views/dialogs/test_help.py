@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
+from app.presets.words import model_word
 from app.shared.log import log_file
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.help_text import MODELS
 from app.window.about import about_text, library_versions
 from app.window.controller import Controller
-from app.window.main_window import KEYS
+from app.window.main_window import KEY_NAMES, KEYS
 from engine.models import MODELS as KNOWN_MODELS
 
 
@@ -24,16 +25,16 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
     assert not dialog.isModal()
     texts = {dialog.tabs.tabText(row): dialog.tabs.widget(row).toPlainText() for row in range(dialog.tabs.count())}
     for key, _, what in KEYS:
-        assert key in texts["Keys"]
+        assert KEY_NAMES.get(key, key) in texts["Keys"]
         assert what in texts["Keys"]
     for panel in controller.panels:
         assert panel.title in texts["Views"]
         assert panel.help, panel.key
         assert panel.help in texts["Views"]
-    assert len(MODELS) == len(KNOWN_MODELS)
+    assert {title for title, _ in MODELS} == {model_word(model) for model in KNOWN_MODELS}  # as presets are named
     for title, _ in MODELS:
         assert title in texts["Models"]
-    assert str(log_file()) in texts["Faults"]
+    assert str(log_file()) in texts["Errors"]
     dialog.close()
 
 

@@ -35,10 +35,11 @@ class Notes:
         self.gate.set()
         self.last = 10**6  # notes that pass before it closes by itself
 
-    def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source):
+    def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
         if len(self.rendered) >= self.last:
             self.gate.clear()
         assert self.gate.wait(20)
+        advanced(seconds)
         self.rendered.append((patch, key, velocity, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
         sound = velocity / 127 * np.exp(-40 * time_s) * np.sin(2 * np.pi * 440 * 2 ** ((key - 69) / 12) * time_s)
@@ -90,6 +91,11 @@ def made(
         dialog.abandon()
 
 
+def settle(qtbot: QtBot, dialog: SampledDialog) -> None:
+    """Until what the choices mean is shown."""
+    qtbot.waitUntil(lambda: not dialog._settled.isActive())
+
+
 def run(qtbot: QtBot, dialog: SampledDialog, words: str) -> None:
     dialog.save.click()
     qtbot.waitUntil(lambda: words in dialog.state.text(), timeout=20_000)
@@ -128,18 +134,26 @@ def test_a_soundfont_is_one_file(qtbot: QtBot, made, folder: Path) -> None:
     assert "louder than the patch" in dialog.state.text() or "softer" in dialog.state.text()
 
 
-def test_size_follows_the_choices_and_nothing_is_written(made, folder: Path, notes: Notes) -> None:
+def test_size_follows_the_choices_and_nothing_is_written(qtbot: QtBot, made, folder: Path, notes: Notes) -> None:
     dialog = made()
     before = dialog.size_text.text()
     dialog.form.layers.setValue(8)
+    settle(qtbot, dialog)
     assert "24 samples (3 keys, 8 velocity layers)" in dialog.size_text.text() != before
     dialog.form.every.setValue(3)
+    settle(qtbot, dialog)
     assert "8 samples (1 key, each for 3 keys, 8 velocity layers)" in dialog.size_text.text()
     dialog.form.highest.setValue(60)
     dialog.form.every.setValue(1)
     dialog.form.layers.setValue(1)
     dialog.form.seconds.setValue(10)
-    assert dialog.size_text.text() == "1 sample (1 key, 1 velocity layer), at most 2.9 MB"
+    settle(qtbot, dialog)
+    counted = "1 sample (1 key, 1 velocity layer)"
+    assert dialog.size_text.text() == f"{counted}, at most 2.9 MB, before FLAC compression"
+    dialog.form.form.setCurrentIndex(dialog.form.form.findData("sf2"))
+    settle(qtbot, dialog)
+    told = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
+    assert dialog.size_text.text() == told
     dialog.close_button.click()
     assert not dialog.isVisible()
     assert list(folder.iterdir()) == [] and notes.rendered == []
@@ -231,12 +245,41 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     assert dialog.close_button.text() == "Close"
 
 
+def test_what_the_choices_mean_is_computed_once_they_settle(
+    qtbot: QtBot, made, patch: Patch, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = made()
+    settle(qtbot, dialog)
+    computed: list[int] = []
+    monkeypatch.setattr(
+        "app.views.dialogs.sampled_dialog.kept_samples", lambda plan, out: computed.append(len(plan.zones)) or 0
+    )
+    for layers in (3, 4, 5):
+        dialog.form.layers.setValue(layers)
+        dialog.show_patch(patch.with_value("knobs.decay", layers), preset)
+    assert computed == []
+    settle(qtbot, dialog)
+    assert computed == [15]
+
+
+def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes: Notes) -> None:
+    dialog = made()
+    dialog.form.layers.setValue(1)
+    run(qtbot, dialog, "Saved")
+    assert len(notes.rendered) == 3
+    dialog.form.lowest.setValue(63)  # above the highest
+    dialog.save.click()
+    assert "the lowest is above the highest" in dialog.state.text()
+    assert len(notes.rendered) == 3
+
+
 def test_other_choices_have_nothing_to_go_on_from(qtbot: QtBot, made, notes: Notes) -> None:
     dialog = made()
     run(qtbot, dialog, "Saved")
     dialog.form.path.setText(str(dialog.form.out))
     assert dialog.save.text() == "Replace"
     dialog.form.source.setCurrentIndex(1)
+    settle(qtbot, dialog)
     assert dialog.state.text() == RESUMES
 
 
@@ -264,9 +307,12 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
         (lambda form, folder: broken_index(form, folder), "no index of samples"),
     ],
 )
-def test_what_cannot_be_is_told_before_it_begins(made, folder: Path, change: Callable, words: str) -> None:
+def test_what_cannot_be_is_told_before_it_begins(
+    qtbot: QtBot, made, folder: Path, change: Callable, words: str
+) -> None:
     dialog = made()
     change(dialog.form, folder)
+    settle(qtbot, dialog)
     assert words in dialog.state.text()
     assert dialog.state.objectName() == "warning"
     assert not dialog.save.isEnabled()
@@ -274,6 +320,7 @@ def test_what_cannot_be_is_told_before_it_begins(made, folder: Path, change: Cal
     edit(dialog.form, str(folder / f"y{dialog.form._suffix}"))
     dialog.form.rate.setCurrentIndex(1)
     dialog.form.lowest.setValue(60)
+    settle(qtbot, dialog)
     assert dialog.save.isEnabled()
 
 

@@ -38,6 +38,12 @@ def test_the_hint_goes_with_the_first_note(qtbot: QtBot, panel: InstrumentPanel)
     assert not panel._hint.isVisible()
 
 
+def test_the_hint_is_not_cut_when_the_theme_changes(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    before = panel._hint.size()
+    panel.setStyleSheet("QLabel#hint { padding: 3px 30px; font-size: 20px; }")
+    qtbot.waitUntil(lambda: panel._hint.size() == panel._hint.sizeHint() != before)
+
+
 def test_a_note_of_the_other_surface_ends_when_it_is_hidden(qtbot: QtBot, panel: InstrumentPanel) -> None:
     qtbot.mouseClick(panel.keys, Qt.MouseButton.RightButton, pos=panel.keys.key_rect(60).center().toPoint())
     with qtbot.waitSignal(panel.released):

@@ -63,6 +63,16 @@ def test_macros_are_those_of_the_patch(qtbot: QtBot, bar: PatchBar, guitar: Patc
     assert not any(knob.isVisible() for knob in bar.macros)
 
 
+def test_the_tip_of_a_macro_says_in_words_what_it_changes(bar: PatchBar, guitar: Patch) -> None:
+    def tip(*fields: str) -> str:
+        macro = Macro(name="Tone", targets=tuple(Target(field=field, low=0.2, high=0.4) for field in fields))
+        bar.show_patch(guitar.model_copy(update={"macros": (macro,)}), own=True)
+        return bar.macros[0].toolTip().splitlines()[0]
+
+    assert tip("pluck.position", "knobs.brightness_decay") == "Tone: changes pluck position, dulling"
+    assert tip("pickup.points.0") == "Tone: changes listening point"  # of the same name, with other targets
+
+
 def test_body_and_mixes(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
     assert bar.body.currentText() == "Guitar"
     with qtbot.waitSignal(bar.body_chosen) as told:

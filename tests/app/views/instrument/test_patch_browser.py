@@ -143,3 +143,8 @@ def test_a_dropped_patch_is_told_and_left_where_it_is(qtbot: QtBot, browser: Pat
         browser.dropEvent(event)
     assert told.args == ["/x/a.json"]
     assert event.dropAction() == Qt.DropAction.CopyAction
+
+
+def test_it_is_named_after_what_it_lists(browser: PatchBrowser) -> None:
+    assert browser.accessibleName() == "Browser of patches"
+    assert browser.search.placeholderText() == browser.search.accessibleName() == "Search patches"

@@ -8,9 +8,10 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.shared.key_names import note_name
 from app.views import theme
 from app.views.instrument.piano_keys import PianoKeys, is_black, shown_range
-from app.views.instrument.playable import HARDEST, SOFTEST, note_name
+from app.views.instrument.playable import HARDEST, SOFTEST
 
 LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
 SHIFT = Qt.KeyboardModifier.ShiftModifier
@@ -188,7 +189,3 @@ def test_enter_is_the_keys_own_and_not_the_windows(keys: PianoKeys) -> None:
         event.ignore()
         QApplication.sendEvent(keys, event)
         assert event.isAccepted() == accepted
-
-
-def test_octaves_are_named_from_middle_c() -> None:
-    assert [note_name(key) for key in (60, 69, 21, 0, 66)] == ["C4", "A4", "A0", "C-1", "F♯4"]

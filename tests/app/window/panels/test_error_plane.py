@@ -75,9 +75,9 @@ def test_beyond_the_training_is_told(shown: Any) -> None:
     plane._point_at((0.5, 5.0))
     assert "outside" not in shown.words
     plane._point_at((0.1, 5.0))
-    assert "outside the trained range" in shown.words
+    assert "outside the training range" in shown.words
     plane._point_at((0.5, 15.0))
-    assert "outside the trained range" in shown.words
+    assert "outside the training range" in shown.words
 
 
 def test_any_range_of_amplitudes_is_drawn(shown: Any) -> None:

@@ -64,7 +64,7 @@ def test_eigenvalues_by_keyboard(qtbot: QtBot, controller: Controller, eigenvalu
     assert "mode 1" in eigenvalues.words.lower()
     qtbot.keyClick(plane, Qt.Key.Key_Return)
     assert session.choices.solo == 1
-    assert "Mode 1 alone" in eigenvalues.words
+    assert "Mode 1 is soloed" in eigenvalues.words
     qtbot.keyClick(plane, Qt.Key.Key_Escape)
     assert session.choices.solo == 0
 

@@ -97,7 +97,7 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
     view = panel.view
     watch(qtbot, panel, take, lambda: panel._envelopes is not None and panel._envelopes.complete)
     view.plot.show_times(0.0, 0.02)
-    watch(qtbot, panel, take, lambda: view.readout.text() == "every picture")
+    watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
     assert view._image.image.shape[0] == 101
     assert view._image.image.max() == pytest.approx(1.01 * 4, rel=1e-3)
     assert view._bar.levels() == (-4, 4)
@@ -120,7 +120,7 @@ def test_bar_colours_and_readout_agree_on_the_sign(qtbot: QtBot, make: Make, tak
     assert view.readout.text().endswith(f"peak {panel._picture.at(0.3, 0.5) * 1000:.4g} mm")
     view.plot.show_times(0.0, 0.02)
     panel._tell(float("nan"), 0.5)
-    watch(qtbot, panel, take, lambda: view.readout.text() == "every picture")
+    watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
     assert view._bar.levels() == (-view.scale_mm, view.scale_mm)
 
 
@@ -132,14 +132,14 @@ def test_small_errors_have_a_scale_of_their_own(make: Make) -> None:
     axis = view._bar.axis
     assert (axis.labelText, axis.scale) == ("µm", pytest.approx(1000))
     view.tell(0.1, 0.5, 0.0003)
-    assert view.readout.text() == "0.1000 s   place 0.50   +0.3 µm"
+    assert view.readout.text() == "0.1000 s   position 0.50   +0.3 µm"
 
 
 def test_levels_below_the_range_are_told(make: Make) -> None:
     view = make(SpectrogramPanel).view
     view.begin_picture(2, 3, 0.1)
     view.show_columns(0, np.full((2, 3), -95.0, np.float32))
-    assert view.readout.text() == "all of it lies below −90 dB"
+    assert view.readout.text() == "all levels are below −90 dB"
     view.ranges.setCurrentIndex(view.ranges.findData(130))
     view.ranges.activated.emit(0)
     assert view.readout.text() == ""
@@ -514,7 +514,7 @@ def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None
     assert "mode" not in panel.view._frame.caption
     choose(panel, solo=2)
     panel.show_moment(Moment(take, 0.5, False, 0.016))
-    assert panel.view._frame.caption.startswith("all modes, though mode 2 is heard alone")
+    assert panel.view._frame.caption.startswith("all modes, although mode 2 is soloed")
 
 
 def test_the_string_shows_both_motions_at_one_moment_however_late_they_are(make: Make, take: Take) -> None:

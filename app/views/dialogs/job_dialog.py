@@ -1,0 +1,142 @@
+"""What dialogs that export have in common: choices, then progress that can be cancelled, then the result."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
+
+from app.shared.durations import duration
+from app.views.controls.parts import label
+from app.views.dialogs.export_job import ExportJob, Work
+
+
+class JobDialog(QDialog):
+    """A subclass lays out its choices (`_lay_out`), and starts work on them (`_run`).
+
+    Args:
+        meanwhile: a sentence beside the progress.
+
+    Attributes:
+        state: a line or more on what is to come, on progress, or on the result.
+        save: the button that starts.
+    """
+
+    def __init__(self, title: str, width: int, parent: QWidget | None = None, meanwhile: str = "") -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.setMinimumWidth(width)
+        self._meanwhile = f". {meanwhile}" if meanwhile else ""
+        self._job: ExportJob | None = None
+        self._shown_folder = Path()
+        self._choosers: tuple[QWidget, ...] = ()
+
+    @abstractmethod
+    def _start(self) -> None:
+        """The button was pressed: calls `_run`."""
+
+    @abstractmethod
+    def _show_choices(self) -> None:
+        """What the choices would give. Called after each end of a job, before its result is shown."""
+
+    def _lay_out(self, parts: Sequence[QWidget], choosers: Sequence[QWidget], state_height: int) -> None:
+        """`parts` from top to bottom; `choosers` are those that cannot be changed while a job runs."""
+        self._choosers = tuple(choosers)
+        self.state = label("faint", selectable=True)
+        self.state.setMinimumHeight(state_height)
+        self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.bar = QProgressBar(maximum=1000)
+        self.bar.setAccessibleName("Progress")
+        self.show_folder = QPushButton("Show in folder")
+        self.show_folder.setToolTip("Open the folder of what was saved")
+        self.show_folder.clicked.connect(self._open_folder)
+        self.save = QPushButton("Export", default=True)
+        self.save.setObjectName("primary")
+        self.save.setToolTip("Render and save")
+        self.save.clicked.connect(self._start)
+        self.close_button = QPushButton("Close")
+        self.close_button.setToolTip("Close, or cancel the rendering (Escape)")
+        self.close_button.clicked.connect(self._cancel_or_close)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.show_folder)
+        buttons.addStretch(1)
+        buttons.addWidget(self.close_button)
+        buttons.addWidget(self.save)
+        column = QVBoxLayout(self)
+        column.setSpacing(12)
+        for part in parts:
+            column.addWidget(part)
+        column.addStretch(1)
+        column.addWidget(self.bar)
+        column.addWidget(self.state)
+        column.addLayout(buttons)
+        self.bar.hide()
+        self.show_folder.hide()
+
+    def _run(
+        self,
+        work: Work,
+        told: Callable[[Any], None],
+        cancelled: Callable[[], None],
+        folder: Path,
+        begins: str = "Rendering …",
+    ) -> None:
+        """Starts work in its thread; one of `told`, with what it returned, and `cancelled` is to call `_end`."""
+        self._shown_folder = folder
+        self._job = ExportJob(work)
+        self._job.progressed.connect(self._tell_progress)
+        self._job.finished.connect(told)
+        self._job.failed.connect(lambda message: self._end(message, failed=True))
+        self._job.cancelled.connect(cancelled)
+        for part in (*self._choosers, self.save):
+            part.setEnabled(False)
+        self.show_folder.hide()
+        self.close_button.setText("Cancel")
+        self.bar.setValue(0)
+        self.bar.show()
+        self._say(begins)
+        self._job.start()
+
+    def _tell_progress(self, share: float, text: str, left_s: float | None) -> None:
+        self.bar.setValue(round(1000 * share))
+        left = "" if left_s is None else f", about {duration(left_s)} left"
+        self._say(f"{text}{left}{self._meanwhile}")
+
+    def _wait(self) -> None:
+        if self._job is not None:
+            self._job.wait()
+            self._job = None
+
+    def _end(self, text: str, failed: bool = False, saved: bool = False) -> None:
+        """The job is over, with this result. `saved`: there are files to show."""
+        self._wait()
+        self.bar.hide()
+        for part in (*self._choosers, self.save):
+            part.setEnabled(True)
+        self.close_button.setText("Close")
+        self._show_choices()
+        self._say(text, failed)
+        self.show_folder.setVisible(saved)
+
+    def _say(self, text: str, failed: bool = False) -> None:
+        self.state.setObjectName("warning" if failed else "faint")
+        self.state.style().polish(self.state)
+        self.state.setText(text)
+
+    def _open_folder(self) -> None:
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._shown_folder))):
+            self._say(f"No file manager was found here; the folder is {self._shown_folder}.")
+
+    def _cancel_or_close(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+        else:
+            self.accept()
+
+    def reject(self) -> None:
+        self._cancel_or_close()

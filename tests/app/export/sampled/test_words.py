@@ -1,0 +1,43 @@
+"""What is told of the size before is what is written, at most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.export.sampled.job import export_sampled
+from app.export.sampled.plan import SampledPlan
+from app.export.sampled.words import instrument_bytes, needed_bytes, size_words
+
+
+@pytest.mark.parametrize("points", [(0.2,), (0.2, 0.3)])
+@pytest.mark.parametrize(
+    ("kind", "form", "bits"),
+    [("sfz", "wav", "16"), ("sfz", "wav", "24"), ("sfz", "flac", "16"), ("sfz", "flac", "24"), ("sf2", "flac", "24")],
+)
+def test_no_instrument_is_larger_than_told(
+    kind: str, form: str, bits: str, points: tuple[float, ...], patch_of: Callable, tmp_path: Path
+) -> None:
+    patch = patch_of(pickup={"points": points})
+    plan = SampledPlan(patch, (50, 52), layers=2, seconds=0.4, format=form, bits=bits)
+
+    def noise(patch, key, velocity, held_s, seconds, rate_hz, *, advanced):
+        frames = round(seconds * rate_hz)
+        return np.random.default_rng(key).uniform(-0.1, 0.1, (frames, len(points))).astype(np.float32)
+
+    soundfont = kind == "sf2"
+    told = instrument_bytes(plan, soundfont)
+    size = export_sampled(plan, tmp_path / f"a.{kind}", noise).size_bytes
+    assert size <= told
+    assert size > (0.5 if form == "flac" and not soundfont else 0.97) * told
+    assert needed_bytes(plan, soundfont) == told + (plan.largest_bytes if soundfont else 0)
+
+
+def test_a_soundfont_is_told_with_what_it_takes_meanwhile(patch_of: Callable) -> None:
+    stereo = patch_of(pickup={"points": (0.2, 0.3)})
+    told = size_words(SampledPlan(stereo, (50, 59), layers=2, seconds=10), soundfont=True)
+    assert told == "at most 38 MB (16-bit), and up to 58 MB more while it is written"
+    assert size_words(SampledPlan(stereo, (50, 59), seconds=10, format="wav", bits="16"), False) == "at most 77 MB"
