@@ -16,6 +16,7 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.modes import damped, following, glide, gliding, rest_above, row
 
 SPARE = 1.5  # of the energy at the start, as in the model
+HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 
 
@@ -122,8 +123,8 @@ def advance(
 
 
 @njit(**COMPILED)
-def prepare(voice: np.ndarray, program: np.ndarray) -> None:
-    """The rows that follow from the voice's modes: `KoopmanTension.step` once more."""
+def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
+    """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
     counts, whole = voice.view(np.int64), program.view(np.int64)
     n, rate = counts[at.MODES], program[at.S_RATE]
     squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
@@ -134,6 +135,11 @@ def prepare(voice: np.ndarray, program: np.ndarray) -> None:
     fastest = max(
         damped(squares[0], sigmas[0]) / program[at.S_NODE_PHASE], damped(squares[last], sigmas[last]) / highest
     )
+    kick = 0.0
+    for m in range(last + 1):
+        omega = damped(squares[m], sigmas[m])
+        kick += stretches[m] * couplings[m] * (q[m] * q[m] + (v[m] / omega) ** 2)
+    fastest = min(max(fastest, math.sqrt(kick) / HARDEST_KICK), MOST_NODES * fastest)
     nodes = max(1, math.ceil(fastest / rate))
     h, coefficients = 1 / (nodes * rate), whole[at.S_COEFFICIENTS]
     slowest = np.inf
@@ -243,7 +249,7 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
         q[:], v[:] = row(voice, n, 0), row(voice, n, 1)
         if gliding(voice):
             glide(voice)
-    prepare(voice, program)
+    prepare(voice, program, q, v)
     for m in range(counts[at.MOVING], n):
         q[m] = v[m] = 0.0
     set_out(voice, q, v, bool(counts[at.PREPARED]))

@@ -27,12 +27,15 @@ Stability. A is held in 0 … 2, r and p in -1 … 1, S below what the energy at
 bounded and decays to silence. A string never comes near that bound, and neither does a model that is any good.
 
 Any rate: nodes are a whole number to a frame, as many as keep ω₁h below `node_phase` and the highest mode's below
-`highest_phase` (where two modes' phases add up to 2π, kicks would pump them).
+`highest_phase` (where two modes' phases add up to 2π, kicks would pump them). A pluck that is hard and has its
+stretch in high modes takes more of them, as many as keep Σ η²κ q² at its start below `HARDEST_KICK`²: that sum is
+the square of the phase of the modes that stretch the string, times how far they raise the tension.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar, NamedTuple
@@ -46,6 +49,8 @@ SERIES = 1 / 12  # r and p of small hω
 SPARE = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
+HARDEST_KICK = 0.3  # of the root of Σ η²κ q² as a string is let go: beyond it nodes come closer
+MOST_NODES = 3  # times as many as a soft pluck has
 LEAST_PHASE = 0.02  # between nodes: a voice of more would take too much of the device's time
 
 
@@ -86,6 +91,7 @@ class KoopmanTensionState:
         largest_energy: of Σ ω² |z|², at the present, (batch,).
         largest_stretch: of S, (batch,).
         step_size: samples of the trained rate in a frame; None before the first.
+        nodes: of a frame, int64 (batch,); None before the first.
     """
 
     x: Tensor
@@ -93,6 +99,15 @@ class KoopmanTensionState:
     largest_energy: Tensor
     largest_stretch: Tensor
     step_size: Fraction | None
+    nodes: Tensor | None = None
+
+    def rows(self, index: Tensor) -> KoopmanTensionState:
+        """Of some of the strings."""
+        x, y, energy, stretch, nodes = (getattr(self, name)[index] for name in OF_STRINGS)
+        return KoopmanTensionState(x, y, energy, stretch, self.step_size, nodes)
+
+
+OF_STRINGS = ("x", "y", "largest_energy", "largest_stretch", "nodes")
 
 
 class Step(NamedTuple):
@@ -113,6 +128,9 @@ class Step(NamedTuple):
     def rows(self) -> Tensor:
         """For `engine.kernels.tension`, (8, modes)."""
         return torch.stack(self[2:])
+
+
+Run = Callable[[KoopmanTensionState, int], tuple[Tensor, KoopmanTensionState]]  # of strings with so many nodes
 
 
 class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
@@ -203,7 +221,33 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         """The next `steps` frames, or those of them with these numbers."""
         if not size > 0 or state.step_size not in (None, size):
             raise ValueError(f"step_size must be above 0 and stay the same, not {size} after {state.step_size}")
-        step = self.step(size)
+        if state.nodes is None:
+            state = replace(state, nodes=self._nodes(state, size))
+        return self._by_nodes(state, lambda part, nodes: self._frames(part, nodes, frames, steps, readout, size))
+
+    def _by_nodes(self, state: KoopmanTensionState, run: Run) -> tuple[Tensor, KoopmanTensionState]:
+        """Strings with the same number of nodes go together."""
+        assert state.nodes is not None
+        groups = [(state.nodes == count).nonzero()[:, 0] for count in state.nodes.unique()]
+        ran = [run(state.rows(rows), int(state.nodes[rows[0]])) for rows in groups]
+        if len(ran) == 1:
+            return ran[0]
+        place = torch.cat(groups).argsort()
+        joined = (torch.cat([getattr(part, name) for _, part in ran])[place] for name in OF_STRINGS)
+        x, y, energy, stretch, nodes = joined
+        state = KoopmanTensionState(x, y, energy, stretch, ran[0][1].step_size, nodes)
+        return torch.cat([out for out, _ in ran])[place], state
+
+    def _frames(
+        self,
+        state: KoopmanTensionState,
+        nodes: int,
+        frames: Tensor | None,
+        steps: int,
+        readout: Tensor | None,
+        size: Fraction,
+    ) -> tuple[Tensor, KoopmanTensionState]:
+        step = self.step(size, nodes)
         if state.step_size is None:
             state = self._let_go(state, step, size)
         to_points = self.shapes if readout is None else self.shapes @ readout.double()
@@ -221,16 +265,28 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
 
     def amplitudes(self, state: KoopmanTensionState, steps: int) -> Tensor:
         """Modal amplitudes of the next frames, float64 (batch, steps, modes), without gradients, on the CPU."""
-        step = self.step(Fraction(1))
-        if state.step_size is None:
-            state = self._let_go(state, step, Fraction(1))
-        return self._compiled(state, step, steps)[0]
+        size = Fraction(1)
+        if state.nodes is None:
+            state = replace(state, nodes=self._nodes(state, size))
 
-    def step(self, size: Fraction) -> Step:
-        """From node to node, of frames that are `size` samples of the trained rate apart."""
-        c, (sigma, omega) = self.configuration, self._rates()
+        def run(part: KoopmanTensionState, nodes: int) -> tuple[Tensor, KoopmanTensionState]:
+            step = self.step(size, nodes)
+            part = part if part.step_size is not None else self._let_go(part, step, size)
+            return self._compiled(part, step, steps)
+
+        return self._by_nodes(state, run)[0]
+
+    def _nodes(self, state: KoopmanTensionState, size: Fraction) -> Tensor:
+        """Of a frame, for strings as they are let go, (batch,)."""
+        c, (_, omega) = self.configuration, self._rates()
         fastest = max(float(omega[0]) / c.node_phase, float(omega[-1]) / c.highest_phase)
-        nodes = max(1, math.ceil(float(size) * fastest))
+        pluck = (state.x.detach().square() @ (self._stretch * self._coupling)).sqrt() / HARDEST_KICK
+        closest = pluck.clamp(min=fastest, max=MOST_NODES * fastest)
+        return (float(size) * closest).ceil().clamp(min=1).long()
+
+    def step(self, size: Fraction, nodes: int) -> Step:
+        """From node to node, of frames that are `size` samples of the trained rate apart."""
+        sigma, omega = self._rates()
         h = float(size) / nodes
         phase = h * omega
         growth, r, p = self._curves(phase)

@@ -24,13 +24,18 @@ def relative(found: NDArray[np.float64], expected: NDArray[np.float64]) -> float
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 
-@pytest.mark.parametrize("rate_hz", [44_100, 48_000])
+@pytest.mark.parametrize(
+    ("rate_hz", "pluck", "nodes"),
+    [(44_100, Pluck(0.3, 6.0), 2), (48_000, Pluck(0.3, 6.0), 2), (48_000, Pluck(0.3, 12.0, width=0.02), 3)],
+)
 def test_a_voice_is_the_model_and_the_string(
-    rate_hz: int, shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung
+    rate_hz: int, pluck: Pluck, nodes: int, shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung
 ) -> None:
     preset = of_string(shipped("studio_any_string"), rate_hz=rate_hz)
     info = preset.info
-    let_go_m = initial_m(info, Pluck(0.3, 6.0))
+    let_go_m = initial_m(info, pluck)
+    _, state = preset.model.advance(preset.model.release((let_go_m[None] / info.scale_m).float()), 1)
+    assert state.nodes.tolist() == [nodes]
     program = bank_program(preset.model, info, rate_hz)
     assert program is not None
     found = rung(rate_hz // 4, Voice(program, let_go_m, STEREO), attack=False)
@@ -39,7 +44,8 @@ def test_a_voice_is_the_model_and_the_string(
         readout = weights.float() if isinstance(source, ModelSource) else weights
         frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, readout)
         expected = torch.cat([(let_go_m @ weights)[None], frames_m[0].double()]).numpy() / FULL_SCALE_M
-        assert relative(found, expected) < 1e-5
+        hard = nodes > 2 and isinstance(source, TruthSource)
+        assert relative(found, expected) < (1e-3 if hard else 1e-5)
 
 
 def test_it_falls_silent_and_ends(shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung) -> None:

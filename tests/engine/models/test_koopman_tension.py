@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from engine.models import build_model
+from engine.models import build_model, koopman_tension
 from engine.models.base import Physics
 from engine.models.koopman_tension import SERIES, KoopmanTension
 from engine.pluck import Pluck
@@ -111,6 +111,41 @@ def test_the_compiled_loop_is_the_definition() -> None:
     torch.testing.assert_close(compiled, plain.detach(), rtol=0, atol=1e-6)
 
 
+def modes_alike_m(rise: float, modes: int = 25) -> Tensor:
+    """A displacement (1, 101) in m to which all modes of the nylon string add alike, as no soft pluck's do."""
+    resonator = NYLON.resonator(modes)
+    amplitudes = torch.ones(modes, dtype=torch.float64)
+    amplitudes[::2] = -1
+    return resonator.to_grid(amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt())[None]
+
+
+def test_a_hard_pluck_with_its_stretch_in_high_modes_takes_more_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    displacement = modes_alike_m(0.5)
+    truth = true_motion(NYLON, displacement, 25, 16_000, 1_600)
+    model = made(NYLON, 25, "series", 16_000)
+    error = relative_error(model, displacement, truth)
+    assert error < 1e-4
+    monkeypatch.setattr(koopman_tension, "HARDEST_KICK", math.inf)
+    assert relative_error(model, displacement, truth) > 30 * error
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
+    model = made(NYLON, 25, "series", 16_000)
+    plucks = torch.cat([modes_alike_m(0.5), pluck_m(NYLON, 25, 0.1), modes_alike_m(0.2), pluck_m(NYLON, 25, 0.01)])
+    released = (plucks / 1e-3).float()
+    with torch.set_grad_enabled(not compiled):
+        together, middle = model.advance(model.release(released), 30)
+        rest, state = model.advance(middle, 20)
+        alone = torch.cat([model(one[None], 50) for one in released])
+    with torch.no_grad():
+        amplitudes = model.amplitudes(model.release(released), 50)
+    torch.testing.assert_close(torch.cat([together, rest], dim=1).detach(), alone.detach(), rtol=0, atol=1e-5)
+    torch.testing.assert_close((amplitudes @ model.shapes).float(), alone.detach(), rtol=0, atol=1e-5)
+    assert state.nodes is not None
+    assert state.nodes.tolist() == [5, 2, 3, 2]
+
+
 def test_gradients_reach_every_curve() -> None:
     model = made(NYLON, 25, "series")
     motion, _ = model.advance(model.release((pluck_m(NYLON, 25, 0.4) / 1e-3).float()), 50)
@@ -141,8 +176,10 @@ def test_any_weights_stay_bounded_and_fall_silent(seed: int) -> None:
 def test_phases_are_kept_where_the_curves_were_learned() -> None:
     model = made(NYLON, 57, "series")
     for size in (Fraction(1), Fraction(3), Fraction(12), Fraction(160, 147)):
-        step = model.step(size)
-        phases = float(size) / step.nodes * model.theta_log.exp()
+        with torch.no_grad():
+            _, state = model.advance(model.release(torch.zeros(1, 101)), 1, step_size=size)
+        assert state.nodes is not None
+        phases = float(size) / int(state.nodes) * model.theta_log.exp()
         assert float(phases[0]) <= model.configuration.node_phase + 1e-12
         assert float(phases[-1]) <= model.configuration.highest_phase + 1e-12
 
