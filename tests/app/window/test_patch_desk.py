@@ -170,7 +170,7 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     slack = (STRINGS / "steel_g3.toml").read_text().replace("tension_n = 74.173", "tension_n = 0.74173")
     (tmp_path / "slack.toml").write_text(slack)
     played.take_file(tmp_path / "slack.toml")
-    assert "Beyond training: pitch" in told.pop()
+    assert "Beyond training: pitch" in informed.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
     played.take_file(tmp_path / "bad.mid")
     assert "bad.mid" in told[0]
