@@ -43,7 +43,9 @@ def child(
     stdout: IO[Any] | int | None = subprocess.DEVNULL,
     stderr: IO[Any] | int | None = subprocess.DEVNULL,
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that is ended with the block, also where that raises."""
+    """A process that is ended with the block, also where that raises; on Linux also where this process is killed."""
+    with_parent = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()
+    command = (*with_parent, *command)
     process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr)
     try:
         yield process
