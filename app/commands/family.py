@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from training.family.partials import StringPartials
     from training.family.strings import Column
 
-family = typer.Typer(help="One model of many strings.", no_args_is_help=True)
+family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
 RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
 INHARMONICITIES = (2e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)  # the first and the last range are beyond the family
@@ -33,9 +33,11 @@ PARTIALS = {  # figures of `_partials_facts`
     "glide_cents_mean": "glide by energy, cents",
     "glide_cents_largest": "glide of any, cents",
 }
-Strings = Annotated[int, typer.Option(min=1, max=10_000, help="Held-out strings of each column.")]
+Strings = Annotated[
+    int, typer.Option(min=1, max=10_000, help="Held-out strings inside the family, and as many beyond.")
+]
 Rate = Annotated[int, typer.Option(min=1_000, max=192_000, metavar="HZ", help="Sample rate.")]
-Seed = Annotated[int, typer.Option(min=0, help="Of the strings.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the strings that are drawn.")]
 
 
 @family.command()
@@ -78,21 +80,30 @@ def train(
 def evaluate(
     preset: PresetName,
     strings: Strings = 200,
-    tenth: Annotated[int, typer.Option(min=0, max=1_000, help="Of these, so many for ten seconds.")] = 0,
-    baselines: Annotated[bool, typer.Option("--baselines", help="What knows the physics alone, too.")] = False,
-    runs: Annotated[Path | None, typer.Option(help="And the baselines that `family baseline` trained there.")] = None,
+    tenth: Annotated[
+        int, typer.Option(min=0, max=1_000, help="Measure so many of these strings over ten seconds, too.")
+    ] = 0,
+    baselines: Annotated[
+        bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")
+    ] = False,
+    runs: Annotated[
+        Path | None, typer.Option(help="Measure the baselines that were trained in this folder, too.")
+    ] = None,
     error_map: Annotated[
-        bool, typer.Option("--map", help="And errors by rise of tension and inharmonicity.")
+        bool, typer.Option("--map", help="Print errors by rise of tension and inharmonicity, too.")
     ] = False,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Errors by rise and inharmonicity, a dot each string: .png, .svg or .pdf."),
+        typer.Option(
+            metavar="FILE",
+            help="Draw a dot for each string, by rise and inharmonicity: .png, .svg, .pdf.",
+        ),
     ] = None,
     rate: Rate = 48_000,
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Errors on strings that no training has seen, inside the family and beyond it."""
+    """Errors on held-out strings, inside the family and beyond it."""
     import torch
 
     from training.family.errors import Player, by_cell, by_rise, knowing_physics, measure, player
@@ -159,12 +170,12 @@ def evaluate(
 def partials(
     preset: PresetName,
     strings: Strings = 200,
-    seconds: Annotated[float, typer.Option(help="After each pluck.")] = 0.5,
+    seconds: Annotated[float, typer.Option(help="How long after each pluck.")] = 0.5,
     rate: Rate = 48_000,
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Pitch after a quiet pluck, level, T60 and glide of the partials, on the held-out strings of `evaluate`.
+    """Pitch, level, decay and glide of partials on held-out strings.
 
     Those of one string, mode by mode: `evaluate PRESET --string NAME --partials`.
     """
@@ -202,9 +213,10 @@ def partials(
 @family.command()
 def baseline(
     name: Annotated[str, typer.Argument(metavar="NAME", help="koopman_var or dmsp, made to take any string.")],
-    minutes: Annotated[float, typer.Option(min=0.01, max=10_000, help="Of one core, for the training.")] = 40.0,
+    minutes: Annotated[float, typer.Option(min=0.01, max=10_000, help="Processor minutes of one core.")] = 40.0,
     train_strings: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="To learn from; default those of studio_any_string.")
+        int | None,
+        typer.Option(min=1, max=100_000, help="Strings to learn from; default as studio_any_string."),
     ] = None,
     runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one goes on there.")] = None,
     strings: Strings = 40,
@@ -212,7 +224,10 @@ def baseline(
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Train a model by others on the family's strings, or go on, and measure it as `evaluate` does. No preset."""
+    """Train and measure a model by others on the same strings.
+
+    A stopped training goes on. It is measured as `evaluate` does, and no preset is written.
+    """
     import torch
 
     from training.family.baselines import BASELINES, baseline_player
@@ -258,7 +273,7 @@ def baseline(
 
 @family.command()
 def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any_string") -> None:
-    """Write a preset for each string that is shipped, with what PRESET learned."""
+    """Write a preset of each shipped string with what PRESET learned."""
     from engine.presets import SHIPPED
     from training.family.shelf import put_on_shelf
 
