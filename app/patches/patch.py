@@ -46,24 +46,8 @@ ASSIGNABLE: tuple[str, ...] = (
     "room.t60_s",
     "level_db",
 )  # what macros may turn
-WHEEL: tuple[str, ...] = (
-    "knobs.stiffness",
-    "knobs.decay",
-    "knobs.brightness_decay",
-    "knobs.modulus",
-    "knobs.density",
-    "knobs.gauge",
-    "pluck.position",
-    "pluck.width",
-    "pluck.width_hard",
-    "pluck.hardest_mm",
-    "pluck.curve",
-    "damping.release_t60_s",
-    "body.mix",
-    "body.size",
-    "room.mix",
-    "room.t60_s",
-)  # what the modulation wheel may turn
+ONLY_MACROS = ("pluck.softest_mm", "pickup.points.0", "pickup.points.1", "level_db")
+WHEEL: tuple[str, ...] = tuple(field for field in ASSIGNABLE if field not in ONLY_MACROS)  # by the modulation wheel
 
 LONGEST_NAME = 60  # characters
 LONGEST_DESCRIPTION = 400
