@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, QUrl, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QInputDialog
 
@@ -49,6 +49,7 @@ from engine.resonators.family import inharmonicity
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
+NOTE_TOLD_AFTER_MS = 150
 MANY_STRINGS = "studio_any_string"
 RECORDED = "WAV and MIDI (*.wav)"
 PLACES = "The computer's keys pluck the chosen preset at ten positions; choose a patch to play pitches"
@@ -86,6 +87,8 @@ class PatchDesk(QObject):
         self._shown_s = 0.0
         self._recording_began_s = 0.0
         self._playback = Playback(instruments.play)
+        self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
+        self._note_timer.timeout.connect(self._show_latest_note)
         self._written.connect(self.informed, Qt.ConnectionType.QueuedConnection)
         self._not_written.connect(self.told, Qt.ConnectionType.QueuedConnection)
         self.reload()
@@ -379,7 +382,11 @@ class PatchDesk(QObject):
             self._panel.show_source(self._session.source_heard)
 
     def show_played(self) -> None:
-        """Says in the bar what of the latest note, which the session knows by now, lies outside the training."""
+        """Says soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
+        if not self._note_timer.isActive():  # of a chord, or of fast notes, once: it takes milliseconds
+            self._note_timer.start()
+
+    def _show_latest_note(self) -> None:
         choices = self._session.choices
         entry = self._library.find(choices.preset)
         if entry is not None and choices.string is not None:
@@ -398,6 +405,7 @@ class PatchDesk(QObject):
 
     def close(self) -> None:
         """Ends the playback; may be called again."""
+        self._note_timer.stop()
         self._playback.stop()
 
     def _show_entries(self) -> None:

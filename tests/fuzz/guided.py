@@ -57,11 +57,14 @@ def _fuzz(name: str, seconds: int) -> None:
 
     with atheris.instrument_imports(include=["app", "engine", "training"], exclude=_compiled()):
         from engine.presets import SHIPPED, PresetError
+        from tests.fuzz.costs import Costs
         from tests.fuzz.test_attack import TARGETS, Target, in_one_line, use
 
     preset = SHIPPED / "nylon_linear_gaussian_16k_dmd.safetensors"
     targets = {each.name: each for each in TARGETS}
-    targets[PRESET] = Target(PRESET, lambda folder: preset.read_bytes(), use, (PresetError,))
+    targets[PRESET] = Target(
+        PRESET, lambda folder: preset.read_bytes(), lambda path: use(path, Costs()), (PresetError,)
+    )
     target = targets[name]
     with tempfile.TemporaryDirectory(prefix="guided") as folder:
         corpus, place = Path(folder) / "corpus", Path(folder) / "there"

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from engine.presets.file import METADATA_KEY
+from tests.fuzz.costs import MOST_MB, Costs
 
 HOSTILE: tuple[Any, ...] = (
     None, True, "", "x" * 20_000, "../../escape", "/etc/passwd", "\x1b]0;owned\x07\r\n", "<img src=x>", "\u202e\x00",
@@ -110,13 +111,20 @@ def damaged_preset(data: bytes, draw: random.Random) -> bytes:
     return struct.pack("<Q", len(written)) + written + bytes(weights)
 
 
-def attacked(name: str, rounds: int, seed: int, attack: Callable[[random.Random], None]) -> None:
-    """Runs an attack so often, each from a seed of its own, and prints how many were refused or did no harm."""
+def attacked(
+    name: str, rounds: int, seed: int, attack: Callable[[random.Random], None], costs: Costs | None = None
+) -> None:
+    """Runs an attack so often, each from a seed of its own, and prints how many were refused or did no harm.
+
+    Where `costs` of its readings are given, they are printed, and memory is held to `MOST_MB`; time is only told.
+    """
     failures = []
     for number in range(rounds):
         try:
             attack(random.Random(f"{seed}:{name}:{number}"))
         except Exception as error:
             failures.append(f"{name} {seed}:{number}: {type(error).__name__}: {error}"[:600])
-    print(f"\n{name}: refused or harmless {rounds - len(failures)} of {rounds} (seed {seed})")
+    told = f"; {costs}" if costs else ""
+    print(f"\n{name}: refused or harmless {rounds - len(failures)} of {rounds} (seed {seed}){told}")
     assert not failures, "\n".join(failures[:20])
+    assert costs is None or (costs.largest_mb or 0) <= MOST_MB, f"{name}: {costs}"

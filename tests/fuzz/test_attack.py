@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import random
@@ -48,6 +49,7 @@ from engine.presets import (
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource, Runaway, TruthSource, project
 from engine.voices import Ear, model_program, render_voice, truth_program
+from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
 from training.by_name import load
 from training.fitting.checkpoint import Checkpoint
@@ -63,9 +65,10 @@ def in_one_line(error: Exception, path: Path) -> None:
     assert len(told) <= 500 and told.isprintable() and str(path) in told, told[:700]
 
 
-def use(path: Path) -> None:
+def use(path: Path, costs: Costs) -> None:
     """Loads a preset and plays it: its model, its physics, and both as they are heard."""
-    preset = load_preset(path)
+    with costs.reading():
+        preset = load_preset(path)
     info = preset.info
     initial_m = project(Pluck().displacement(info.grid_points), info.modes)
     outside_training(info, Pluck())
@@ -98,17 +101,21 @@ def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, see
     whole = shipped.get(name, small_preset).read_bytes()
     path = tmp_path / "stranger.safetensors"
     shutil.copy(small_preset, tmp_path / "good.safetensors")
+    path.write_bytes(whole)
+    use(path, Costs())  # what is loaded once costs no later reading
+    costs = Costs()
 
     def attack(draw: random.Random) -> None:
         path.write_bytes(damaged_preset(whole, draw))
         try:
-            use(path)
+            use(path, costs)
         except PresetError as error:
             in_one_line(error, path)
-        entries, problems = list_presets(tmp_path)
+        with costs.reading():
+            entries, problems = list_presets(tmp_path)
         assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
 
-    attacked(f"presets ({name})", rounds // 4, seed, attack)
+    attacked(f"presets ({name})", rounds // 4, seed, attack, costs)
 
 
 def test_patches(tmp_path: Path, rounds: int, seed: int) -> None:
@@ -117,15 +124,18 @@ def test_patches(tmp_path: Path, rounds: int, seed: int) -> None:
     facts = {**json.loads(PATCH.read_bytes()), "tuning": tuning}
     whole, path = json.dumps(facts).encode(), tmp_path / "stranger.json"
     (tmp_path / "good.json").write_bytes(whole)
+    list_patches(tmp_path)
+    costs = Costs()
 
     def attack(draw: random.Random) -> None:
         path.write_bytes(json_or_bytes(whole, draw))
-        entries, problems = list_patches(tmp_path)
+        with costs.reading():
+            entries, problems = list_patches(tmp_path)
         assert "good" in [entry.name for entry in entries] and len(entries) + len(problems) == 2
         for problem in problems:
             in_one_line(ValueError(problem), path)
 
-    attacked("patches", rounds // 4, seed, attack)
+    attacked("patches", rounds // 4, seed, attack, costs)
 
 
 @dataclass(frozen=True)
@@ -328,16 +338,21 @@ def test_readers(target: Target, tmp_path: Path, rounds: int, seed: int) -> None
     folder = tmp_path / "there"
     folder.mkdir()
     whole, path = target.whole(tmp_path), folder / target.name
+    path.write_bytes(whole)
+    with contextlib.suppress(*target.errors):  # what is loaded once costs no later reading
+        target.read(path)
+    costs = Costs()
 
     def attack(draw: random.Random) -> None:
         path.write_bytes(target.damaged(whole, draw))
         try:
-            target.read(path)
+            with costs.reading():
+                target.read(path)
         except target.errors as error:
             in_one_line(error, path)
         assert {each.name for each in folder.iterdir()} <= {target.name}
 
-    attacked(target.name, rounds // len(TARGETS), seed, attack)
+    attacked(target.name, rounds // len(TARGETS), seed, attack, costs)
 
 
 @pytest.mark.parametrize("of", ["one string", "many strings"])
@@ -345,17 +360,21 @@ def test_recipes(of: str, small_preset: Path, tmp_path: Path, rounds: int, seed:
     file = small_preset if of == "one string" else SHIPPED / "studio_any_string.safetensors"
     preset = load_preset(file)
     whole, path = wav(tmp_path, recipe_text(file)), tmp_path / "stranger.wav"
+    path.write_bytes(whole)
+    read_recipe(path)
+    costs = Costs()
 
     def attack(draw: random.Random) -> None:
         path.write_bytes(damaged_wav(whole, draw))
         try:
-            recipe = read_recipe(path)
+            with costs.reading():
+                recipe = read_recipe(path)
             request_of(recipe, preset, path)
             assert recipe.settings.fade_out_s <= 600
         except RecipeError as error:
             in_one_line(error, path)
 
-    attacked(f"recipes of {of}", rounds // 4, seed, attack)
+    attacked(f"recipes of {of}", rounds // 4, seed, attack, costs)
 
 
 def test_what_is_dropped(
@@ -394,5 +413,33 @@ def test_a_whole_file_of_each_kind_is_read(small_preset: Path, tmp_path: Path) -
         target.read(path)
     (tmp_path / "whole.wav").write_bytes(wav(tmp_path, recipe_text(small_preset)))
     read_recipe(tmp_path / "whole.wav")
-    use(small_preset)
+    use(small_preset, Costs())
     assert write(load(str(tmp_path / "run.toml")).data)["modes"] == 10
+
+
+HUGE_BYTES = 3 * 2**30
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_a_huge_file_costs_little(target: Target, tmp_path: Path) -> None:
+    """Its first bytes are those of a whole one; the rest, which takes no place on the disk, is zero."""
+    folder = tmp_path / "there"
+    folder.mkdir()
+    path = folder / target.name
+    path.write_bytes(target.whole(tmp_path))
+    with contextlib.suppress(*target.errors):
+        target.read(path)
+    with path.open("r+b") as file:
+        file.truncate(HUGE_BYTES)
+    costs = Costs()
+    with contextlib.suppress(*target.errors), costs.reading():
+        target.read(path)
+    assert (costs.largest_mb or 0) <= MOST_MB, costs
+
+
+def test_what_a_reading_costs_is_measured() -> None:
+    """Or the attack would show nothing of it."""
+    costs = Costs()
+    with costs.reading():
+        np.ones(10_000_000)
+    assert costs.largest_mb is None or 70 <= costs.largest_mb <= 100
