@@ -350,6 +350,7 @@ def play(
         ("the longest of these, ms", *(phase.control_longest_ms for phase in found.phases)),
         ("fades", *(phase.fades for phase in found.phases)),
         ("clicks", *(phase.clicks for phase in found.phases)),
+        ("plucks 40 ms or more from a key's usual time", *(phase.untimely for phase in found.phases)),
         ("single plucks that were not heard", *(phase.unheard for phase in found.phases)),
         *_spread_rows("key to sound", [phase.latency_ms for phase in found.phases]),
         *_spread_rows("key to sound, beyond the device", [phase.beyond_device_ms for phase in found.phases]),

@@ -235,7 +235,7 @@ def matched(
 ) -> list[int | None]:
     """For each key the beginning of its pluck: the strongest event about `usual` frames after it; None without one.
 
-    An event that is much earlier or later is not matched, and, where it is sharp, counts as a click.
+    An event that is much earlier or later is not matched; `untimely` finds it.
     """
     farthest = round(EARLY_OR_LATE_S * rate_hz)
     places = np.array(sorted({*found.plucks, *found.spikes}), int)
@@ -246,6 +246,16 @@ def matched(
         return max((int(p) for p in places[first:last]), key=lambda p: strength[p : p + reach].max(), default=None)
 
     return [strongest(key + usual - farthest, key + usual + farthest) for key in keys]
+
+
+def untimely(found: Events, plucked: Sequence[int | None], rate_hz: int) -> list[int]:
+    """Beginnings of plucks that are no key's: of a window that was kept from its core, as a rule, which plucks late.
+
+    They are no clicks, after which a residual is as small as before.
+    """
+    apart = round(ATTACK_S * rate_hz)
+    taken = [place for place in plucked if place is not None]
+    return [place for place in found.plucks if all(abs(place - other) > apart for other in taken)]
 
 
 def clicks(

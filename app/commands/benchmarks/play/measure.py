@@ -58,6 +58,7 @@ class Phase:
         plucks: at the rate of playing. What follows is of these, times in s since the first of their keys.
         holes: number of silences of a millisecond or more while strings ring.
         fades: drops of the level by 40 dB from which it recovers, other than holes.
+        untimely: plucks that began 40 ms or more before or after a key's usual time.
         clicks: steps that are no pluck's beginning.
         loudest: the largest sample, ±1 being full scale.
         cpu_cores: processor time of the program per second while it was played.
@@ -77,6 +78,7 @@ class Phase:
     holes_ms: float
     longest_hole_ms: float
     fades: int
+    untimely: int
     clicks: int
     hole_times_s: tuple[float, ...]
     fade_times_s: tuple[float, ...]
@@ -306,7 +308,8 @@ def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, 
     events = analysis.events(rest, RATE_HZ)
     usual = round(np.median(latencies_s) * RATE_HZ) if latencies_s else 0
     plucked = analysis.matched(keys, events, rest.by_past, usual, RATE_HZ)
-    clicks = analysis.clicks(events, plucked, [*holes, *gaps], expected, RATE_HZ)
+    untimely = analysis.untimely(events, plucked, RATE_HZ)
+    clicks = analysis.clicks(events, [*plucked, *untimely], [*holes, *gaps], expected, RATE_HZ)
 
     def since_s(frame: int) -> float:
         return round((frame - keys[0]) / RATE_HZ, 4)
@@ -325,6 +328,7 @@ def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, 
         sum(hole.frames for hole in holes) * 1000 / RATE_HZ,
         max((hole.frames for hole in holes), default=0) * 1000 / RATE_HZ,
         len(gaps),
+        len(untimely),
         len(clicks),
         tuple(since_s(hole.start) for hole in holes),
         tuple(since_s(fade.start) for fade in gaps),

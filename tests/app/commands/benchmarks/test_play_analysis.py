@@ -123,6 +123,22 @@ def test_clicks_are_found_and_attacks_are_not(clean: NDArray[np.float32], keys: 
     assert all(min(abs(click - place) for place in known) <= 48 for click in clicks)
 
 
+def test_a_pluck_at_no_keys_time_is_no_click(clean: NDArray[np.float32], keys: list[int]) -> None:
+    sound, late = clean[:, 0].copy(), keys[12] + LATE + STEP // 2
+    click = keys[20] + LATE + STEP // 2
+    sound[late:] += pluck(SECONDS, 123.0, 0.25)[: sound.size - late].astype(np.float32)
+    sound[click : click + 300] += 0.02
+    rest = analysis.unpredicted(sound, RATE_HZ)
+    events = analysis.events(rest, RATE_HZ)
+    plucked = analysis.matched(keys, events, rest.by_past, LATE, RATE_HZ)
+    untimely = analysis.untimely(events, plucked, RATE_HZ)
+    assert len(untimely) == 1 and abs(untimely[0] - late) <= 48
+    expected = analysis.expected_sound(sound[:, np.newaxis], keys, RATE_HZ)
+    clicks = analysis.clicks(events, [*plucked, *untimely], [], expected, RATE_HZ)
+    assert any(abs(each - edge) <= 48 for each in clicks for edge in (click, click + 300))
+    assert all(abs(each - late) > STEP for each in clicks)
+
+
 def test_the_first_frame_after_silence_is_exact() -> None:
     sound = np.zeros(RATE_HZ)
     sound[12_345:] = pluck(1.0, 196.0, 0.8)[: RATE_HZ - 12_345] + 1e-5
