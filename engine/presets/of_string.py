@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 from engine.models.base import Physics
@@ -10,7 +10,7 @@ from engine.presets.file import Preset, PresetError
 from engine.presets.finding import SHIPPED
 from engine.presets.info import PresetInfo
 from engine.resonators.string import StringParameters
-from engine.schema import read, read_toml
+from engine.schema import SchemaError, read, read_toml
 
 HIGHEST_HZ = 20_000.0  # modes above are not heard
 STRINGS = SHIPPED / "strings"
@@ -19,11 +19,21 @@ STRINGS = SHIPPED / "strings"
 def read_string(path: Path) -> StringParameters:
     """The string of a TOML file: its eight parameters at top level, as `[data.string]` of a configuration has them.
 
+    All must be given: a string that is named by its file is not that of the paper where the file is silent.
+
     Raises:
-        SchemaError: see `read_toml`; a field is unknown or impossible: the message names file, field and remedy.
+        SchemaError: see `read_toml`; a field is unknown, impossible or missing: the message names file,
+            field and remedy.
         OSError: the file cannot be read.
     """
-    return read(StringParameters, read_toml(path), str(path))
+    data = read_toml(path)
+    string = read(StringParameters, data, str(path))
+    if missing := [field.name for field in fields(string) if field.name not in data]:
+        raise SchemaError(
+            f"{path}: {', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; "
+            f"a string's file gives all of {', '.join(field.name for field in fields(string))}"
+        )
+    return string
 
 
 def find_string(name_or_path: str) -> Path:

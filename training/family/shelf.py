@@ -17,8 +17,22 @@ TITLES = {
     "steel_e4": "Electric guitar, E4",
     "steel_b3": "Electric guitar, B3",
     "steel_g3": "Electric guitar, G3",
-    "steel_ds3": "Steel wire, D sharp 3",
+    "steel_d3": "Electric guitar, D3 (wound)",
+    "steel_a2": "Electric guitar, A2 (wound)",
+    "steel_e2": "Electric guitar, E2 (wound)",
+    "bass_g2": "Electric bass, G2 (wound)",
+    "bass_d2": "Electric bass, D2 (wound)",
+    "bass_a1": "Electric bass, A1 (wound)",
+    "bass_e1": "Electric bass, E1 (wound)",
+    "harp_c6": "Concert harp, C6 (nylon)",
+    "harp_c5": "Concert harp, C5 (nylon)",
+    "harp_c4": "Concert harp, C4 (nylon)",
+    "harp_c2": "Concert harp, C2 (wire)",
+    "piano_cs5": "Piano string, C sharp 5, plucked",
     "piano_c4": "Piano string, C4, plucked",
+    "piano_f3": "Piano string, F3, plucked",
+    "piano_c2": "Piano string, C2, plucked",
+    "steel_ds3": "Steel wire, D sharp 3",
 }
 
 

@@ -14,7 +14,7 @@ from app.export import batch, sound
 from app.export.batch import BatchPlan, ExportCancelled, run_batch
 from app.export.files import SoundRequest, export_sound
 from engine.pluck import Pluck
-from engine.presets import load_preset
+from engine.presets import find_string, load_preset
 from engine.sources import Runaway
 
 
@@ -172,8 +172,9 @@ def test_two_batches_into_one_folder_lose_no_row(small_preset: Path, folder: Pat
 
 def test_a_batch_varies_strings(run, folder: Path, tmp_path: Path) -> None:
     """Each file of it is what `render` makes; a string that cannot be is a row that says so, and hinders no other."""
-    (tmp_path / "heavy.toml").write_text("damping_d1_kg_m_s = 900.0")
-    (tmp_path / "slack.toml").write_text("tension_n = 0.5")
+    text = find_string("nylon_b3").read_text()
+    (tmp_path / "heavy.toml").write_text(text.replace("d1_kg_m_s = 0.0010383", "d1_kg_m_s = 900.0"))
+    (tmp_path / "slack.toml").write_text(text.replace("tension_n = 53.4", "tension_n = 0.5"))
     strings = f"steel_g3,{tmp_path / 'slack.toml'},{tmp_path / 'heavy.toml'}"
     line = ["batch", "--presets", "studio_any_string", "--positions", "0.3", "--amplitudes", "1", "--seconds", 0.1]
     line += ["--out", folder / "out", "--strings", strings, "--rate", 44_100]

@@ -306,16 +306,19 @@ def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("old", "new", "words"),
     [
-        ("length_m = -1", "length_m must be positive"),
-        ("size = 3", "unknown field 'size'"),
-        ("damping_d1_kg_m_s = 900.0", "overdamped"),
+        ("length_m = 0.648", "length_m = -1", "length_m must be positive"),
+        ("length_m = 0.648", "size = 3", "unknown field 'size'"),
+        ("length_m = 0.648\n", "", "bad.toml: length_m is missing; "),
+        ("d1_kg_m_s = 0.00039498", "d1_kg_m_s = 900.0", "overdamped"),
     ],
 )
-def test_an_impossible_string_is_one_line(run, folder: Path, text: str, words: str) -> None:
+def test_an_impossible_string_is_one_line(run, folder: Path, old: str, new: str, words: str) -> None:
     np.save(folder / "u.npy", Pluck().displacement(101)[None].numpy())
-    (folder / "bad.toml").write_text(text)
+    text = find_string(STEEL_E4).read_text()
+    assert old in text
+    (folder / "bad.toml").write_text(text.replace(old, new))
     files = (folder / "u.npy", folder / "m.npy")
     found = run("predict", "studio_any_string", *files, "--string", folder / "bad.toml", "--steps", 9)
     assert found.status == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -94,6 +95,23 @@ def test_a_wrong_string_file_is_named(tmp_path: Path, text: str, words: str) -> 
     assert str(file) in str(caught.value)
 
 
+def test_a_string_file_without_some_parameters_names_them(tmp_path: Path) -> None:
+    """None of them is taken from the string of the paper."""
+    file = tmp_path / "short.toml"
+    file.write_text("".join(line for line in TOML.splitlines(keepends=True) if "damping" not in line))
+    with pytest.raises(SchemaError) as caught:
+        read_string(file)
+    told = str(caught.value)
+    assert told.startswith(f"{file}: damping_d1_kg_m_s, damping_d3_kg_m_s are missing; ")
+    assert "gives all of length_m, area_m2," in told
+    file.write_text(TOML.replace("tension_n = 72.2016", ""))
+    with pytest.raises(SchemaError, match=r"short\.toml: tension_n is missing"):
+        read_string(file)
+    file.write_text("")
+    with pytest.raises(SchemaError, match=r"length_m, area_m2, .*, tension_n are missing"):
+        read_string(file)
+
+
 def test_a_string_beyond_the_family_is_told() -> None:
     family = load_preset(find_preset("studio_any_string")).info.family
     assert family is not None
@@ -109,16 +127,36 @@ def test_modes_are_counted_in_closed_form() -> None:
     assert torch.isfinite(STEEL.undamped_frequencies(3)).all()
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in STRINGS.glob("*.toml")))
+BEYOND = {"bass_e1": "pitch 41.2", "harp_c6": "pitch 1.05e+03", "piano_c2": "decay time 27.6"}
+NAMES = sorted(path.stem for path in STRINGS.glob("*.toml"))
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> None:
+    """Inside the family, but for those whose files say what is beyond."""
     many = load_preset(find_preset("studio_any_string"))
     string = read_string(find_string(name))
     assert many.info.family is not None
-    assert many.info.family.outside(string) == []
+    outside = many.info.family.outside(string)
+    assert len(outside) == (name in BEYOND)
+    assert all(words.startswith(BEYOND[name]) for words in outside)
+    comment = " ".join(line.removeprefix("#").strip() for line in find_string(name).read_text().splitlines())
+    assert ("Beyond the family: " in comment) == (name in BEYOND)
     own, expected = load_preset(find_preset(f"studio_any_{name}")), of_string(many, string)
     assert own.info.string == string
     for key, tensor in expected.model.state_dict().items():
         assert torch.equal(own.model.state_dict()[key], tensor)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shipped_string_sounds_the_note_of_its_name(name: str) -> None:
+    """Its quiet first mode, by equal temperament from 440 Hz; those of two sources keep the tensions given there."""
+    step, sharp, octave = re.fullmatch(r"[a-z]+_([a-g])(s?)([1-6])", name).groups()  # type: ignore[union-attr]
+    key = 12 * (int(octave) + 1) + {"c": 0, "d": 2, "e": 4, "f": 5, "g": 7, "a": 9, "b": 11}[step] + len(sharp)
+    string = read_string(find_string(name))
+    pitch_hz = math.sqrt(string.undamped_frequency(1) ** 2 - string.decay_rate(1) ** 2) / (2 * math.pi)
+    cents = 1200 * math.log2(pitch_hz / 440) - 100 * (key - 69)
+    assert abs(cents) < (11 if name.startswith("nylon") or name == "steel_ds3" else 0.2)
 
 
 def test_an_unknown_string_lists_those_that_there_are() -> None:
