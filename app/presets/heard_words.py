@@ -16,6 +16,10 @@ NOTICED_CHANGE_DB = 2.0
 NOTICED_DISTANCE_DB = 1.0
 NOTICED_HUM_DB = -80.0  # of full scale: 40 dB below a soft pluck; a quiet room hides what is softer
 UNMEASURED = "not measured"
+HEARD_TIP = (
+    f"How true it sounds beside the solved string, rung out past its training: true, where the spectra are less than "
+    f"{NOTICED_DISTANCE_DB:g} dB apart and no fault can be heard; else the worst fault, or that distance"
+)
 
 
 def heard_word(heard: Heard | None) -> str:

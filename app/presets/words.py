@@ -51,13 +51,6 @@ def size_word(size_bytes: int) -> str:
     return f"{size_bytes / 2**20:.1f} MB" if size_bytes >= 2**20 else f"{size_bytes / 2**10:.0f} kB"
 
 
-def time_word(seconds: float) -> str:
-    minutes = round(seconds / 60)
-    if minutes < 1:
-        return f"{seconds:.0f} s"
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
-
-
 def error_word(info: PresetInfo) -> str:
     """The relative mean absolute error on validation data, in percent; "–" where it is not known."""
     return "–" if info.rel_mae is None else percent(info.rel_mae)

@@ -41,14 +41,6 @@ class History:
         session.changed.connect(self._choices_changed)
 
     @property
-    def can_undo(self) -> bool:
-        return bool(self._undo)
-
-    @property
-    def can_redo(self) -> bool:
-        return bool(self._redo)
-
-    @property
     def undo_words(self) -> str:
         """What `undo` would take back, in words; "" where there is nothing."""
         step = self._next(self._undo)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 
 
 class Look(BaseModel):
-    """`face` is the theme; `size_percent`, the UI scale, takes effect at the next start."""
+    """`size_percent`, the UI scale, takes effect at the next start. Settings of version 0.1 call the theme `face`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    face: Literal["system", "dark", "light"] = "system"
+    theme: Literal["system", "dark", "light"] = Field("system", validation_alias=AliasChoices("theme", "face"))
     size_percent: Literal[100, 115, 125, 150] = 100

@@ -1,6 +1,6 @@
-"""Colours, fonts and the style sheet. A face is the set of colours of a theme, dark or light, with the same roles.
+"""Colours, fonts and the style sheet. A theme, dark or light, has a colour for each role.
 
-Read the colours as `theme.TEXT` when painting; never import one by name, for they change with the face. Plots keep
+Read the colours as `theme.TEXT` when painting; never import one by name, for they change with the theme. Plots keep
 the pens that they were made with: `app.views.plots.plots.recolour` exchanges these.
 """
 
@@ -15,11 +15,11 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication
 
-FaceChoice = Literal["system", "dark", "light"]
+ThemeChoice = Literal["system", "dark", "light"]
 
 
 @dataclass(frozen=True)
-class Face:
+class Theme:
     """The colours of a theme, one for each role."""
 
     background: str
@@ -41,7 +41,7 @@ class Face:
     shade_alpha: int  # 0 … 255
 
 
-DARK = Face(
+DARK = Theme(
     background="#0d0f13",
     panel="#14171d",
     raised="#1d2129",
@@ -60,7 +60,7 @@ DARK = Face(
     shade="#000000",
     shade_alpha=70,
 )
-LIGHT = Face(
+LIGHT = Theme(
     background="#eceef2",
     panel="#fafbfc",
     raised="#ffffff",
@@ -80,15 +80,15 @@ LIGHT = Face(
     shade_alpha=26,
 )
 
-SIGNS = Path(__file__).parent / "signs"  # pictures for the style sheet, in the faces' colours
+SIGNS = Path(__file__).parent / "signs"  # pictures for the style sheet, in the themes' colours
 
-_SCHEMES: dict[FaceChoice, Qt.ColorScheme] = {
+_SCHEMES: dict[ThemeChoice, Qt.ColorScheme] = {
     "system": Qt.ColorScheme.Unknown,
     "dark": Qt.ColorScheme.Dark,
     "light": Qt.ColorScheme.Light,
 }
 
-face = DARK
+present = DARK
 BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT = (
     DARK.background,
     DARK.panel,
@@ -109,23 +109,23 @@ def source_kind(source: str) -> str:
 
 
 class _Changes(QObject):
-    face_changed = Signal(Face, Face)  # from, to
+    theme_changed = Signal(Theme, Theme)  # from, to
 
 
 changes = _Changes()
 
 
-def use(new: Face) -> None:
-    """Makes `new` the present face and emits `changes.face_changed`; the style sheet is set by `apply_theme`."""
-    global face, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, DISABLED
+def use(new: Theme) -> None:
+    """Makes `new` the present theme and emits `changes.theme_changed`; the style sheet is set by `apply_theme`."""
+    global present, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, DISABLED
     global MODEL, TRUTH, DIFFERENCE, OTHER, WARNING, GOOD
-    old, face = face, new
+    old, present = present, new
     BACKGROUND, PANEL, RAISED, LINE = new.background, new.panel, new.raised, new.line
     TEXT, FAINT, WARNING, GOOD, DISABLED = new.text, new.faint, new.warning, new.good, new.disabled
     MODEL, TRUTH, DIFFERENCE, OTHER = new.model, new.truth, new.difference, new.other
     SOURCE_COLOURS.update(model=MODEL, truth=TRUTH, difference=DIFFERENCE, other=OTHER)
     if new != old:
-        changes.face_changed.emit(old, new)
+        changes.theme_changed.emit(old, new)
 
 
 def contrast(one: str, other: str) -> float:
@@ -143,7 +143,7 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
-    tick = (SIGNS / f"tick_{'dark' if face == DARK else 'light'}.svg").as_posix()
+    tick = (SIGNS / f"tick_{'dark' if present == DARK else 'light'}.svg").as_posix()
     slots = "\n".join(
         f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
         f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; padding: 6px; }}"
@@ -281,8 +281,8 @@ def _palette() -> QPalette:
     return palette
 
 
-def apply_theme(app: QApplication, choice: FaceChoice = "dark") -> None:
-    """Sets Fusion with the face's palette and style sheet for the whole application; "system" follows the desktop."""
+def apply_theme(app: QApplication, choice: ThemeChoice = "dark") -> None:
+    """Sets Fusion with the theme's palette and style sheet for the application; "system" follows the desktop."""
     app.setStyleSheet("")  # replaced directly, a sheet is applied to a widget once more for each of its ancestors
     if app.style().name() != "fusion":  # while a sheet is set, the style has no name
         app.setStyle("Fusion")

@@ -24,16 +24,16 @@ class Appearance(QObject):
     def _change(self, field: str, value: object) -> None:
         self.look = Look.model_validate({**self.look.model_dump(), field: value})
         self._window.menu.show_look(self.look)
-        if field == "face":
+        if field == "theme":
             self._put_on()
         else:
             self._window.notices.inform(f"UI scale: {value} % after a restart.")
 
     def _follow(self) -> None:
-        if self.look.face == "system":
+        if self.look.theme == "system":
             self._put_on()
 
     def _put_on(self) -> None:
         application = QApplication.instance()
         assert isinstance(application, QApplication)
-        apply_theme(application, self.look.face)
+        apply_theme(application, self.look.theme)

@@ -145,7 +145,7 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("Learned Strings")
-    apply_theme(application, settings.look.face)
+    apply_theme(application, settings.look.theme)
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
     faults = Faults(window)

@@ -88,7 +88,7 @@ def opened(
     threads = torch.get_num_threads()
     return_large_blocks()
     load_engine()
-    apply_theme(application, settings.look.face)
+    apply_theme(application, settings.look.theme)
     dress_plots()
     window = MainWindow()
     window.resize(*size)

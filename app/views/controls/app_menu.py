@@ -10,7 +10,7 @@ from app.views.controls.parts import tool_button
 from app.views.look import Look
 from engine.plain_text import one_line
 
-FACES = {"system": "Follow system", "dark": "Dark", "light": "Light"}
+THEMES = {"system": "Follow system", "dark": "Dark", "light": "Light"}
 LONGEST_STEP = 60  # characters
 SIZES_PERCENT = (100, 115, 125, 150)
 
@@ -23,7 +23,7 @@ class AppMenu(QMenu):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._choices: dict[tuple[str, object], QAction] = {}
-        self._add_choices("Theme", "face", {name: face for face, name in FACES.items()})
+        self._add_choices("Theme", "theme", {name: theme for theme, name in THEMES.items()})
         self._add_choices("UI scale (after restart)", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
         self.addSeparator()
         self._undo, self._redo = self.addAction("Undo"), self.addAction("Redo")

@@ -27,7 +27,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presets.filter import PresetFilter
-from app.presets.heard_words import heard_sentence, heard_word
+from app.presets.heard_words import HEARD_TIP, heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
 from app.views.controls.browser import KEYS, MOVES, Browser
@@ -95,6 +95,9 @@ class PresetBrowser(Browser):
         made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # presets of one string differ at the end
         made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        columns = made.headerItem()
+        columns.setToolTip(_ERROR, "Relative mean absolute error of the model on validation data")
+        columns.setToolTip(_HEARD, HEARD_TIP)
         header = made.header()
         header.setStretchLastSection(False)
         header.setSectionsClickable(False)

@@ -17,8 +17,8 @@ from app.presets.words import (
     rate_word,
     size_word,
     string_word,
-    time_word,
 )
+from app.shared.durations import duration
 from engine.schema import SchemaError
 from training.by_name import load
 
@@ -77,7 +77,7 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
     facts.append(("Given", f"before training: {info.knows or 'nothing but the displacement'}"))
     facts.append(("Heard", heard_sentence(entry.heard, entry.name)))
     if info.training_seconds is not None:
-        facts.append(("Trained in", time_word(info.training_seconds)))
+        facts.append(("Trained in", duration(info.training_seconds)))
     if _can_be_remade(entry.name):
         facts.append(("To train it", f"learned-strings train {entry.name}"))
     facts += [("Licence", info.licence), ("File", f"{entry.name}, {_place(entry)}")]

@@ -157,7 +157,7 @@ class PianoKeys(Playable):
 
 
 def _own(key: int) -> str:
-    """The colour of a key at rest: white keys are light under both faces, and black ones dark."""
+    """The colour of a key at rest: white keys are light under both themes, and black ones dark."""
     pick = min if is_black(key) else max
     return pick(theme.TEXT, theme.RAISED, theme.BACKGROUND, key=lambda colour: QColor(colour).lightness())
 

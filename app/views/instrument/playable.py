@@ -58,7 +58,7 @@ class Playable(QWidget):
         self._cursor = 60
         self._by_keys = False  # the cursor was last reached or moved with the keyboard
         self._rest = QPixmap()
-        theme.changes.face_changed.connect(self.rest_changed)
+        theme.changes.theme_changed.connect(self.rest_changed)
 
     def sizeHint(self) -> QSize:
         return QSize(720, HEIGHT)

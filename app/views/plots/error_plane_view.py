@@ -133,7 +133,7 @@ class _Map(pg.PlotWidget):
         self._bar_ticks = UprightTicks(self._bar.axis, self._bar.vb)
         self._bar_ticks.set((math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS)
         self._bar.setImageItem(self._image, insert_in=item)
-        theme.changes.face_changed.connect(self._take_face)
+        theme.changes.theme_changed.connect(self._take_theme)
         dashed = pg.mkPen(theme.TEXT, width=1, style=Qt.PenStyle.DashLine)
         self._outline = item.plot(pen=dashed)
         self._pluck = pg.ScatterPlotItem(symbol="o", size=13, pen=pg.mkPen(theme.TEXT, width=2), brush=None)
@@ -144,7 +144,7 @@ class _Map(pg.PlotWidget):
         self._present = (0.35, 4.0)
         self.cursor: tuple[float, float] | None = None
 
-    def _take_face(self) -> None:
+    def _take_theme(self) -> None:
         self._bar.setColorMap(share_map())
 
     def show_picture(self, picture: PlanePicture | None) -> None:

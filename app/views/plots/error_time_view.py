@@ -65,7 +65,7 @@ class ErrorTimeView(QWidget):
         self._stored_errors: dict[str, float] = {}
         self._horizon_s = 1.0
         self._range: tuple[float, float] | None = None
-        theme.changes.face_changed.connect(self._tell_legend)
+        theme.changes.theme_changed.connect(self._tell_legend)
         self.quantities.chosen.connect(self._choose)
         lay_out_plot(self, (self.quantities, self.longer), self.readout, self.plot)
         self._choose()

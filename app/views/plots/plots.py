@@ -1,7 +1,7 @@
-"""What all plots share: the colours of background and axes, and how all colours change with the face.
+"""What all plots share: the colours of background and axes, and how all colours change with the theme.
 
-A plot keeps the pens and brushes that it was made with. When the face changes, every colour of the old one is
-exchanged for that of the same role in the new one, and keeps its alpha. So no view needs to follow the face.
+A plot keeps the pens and brushes that it was made with. When the theme changes, every colour of the old one is
+exchanged for that of the same role in the new one, and keeps its alpha. So no view needs to follow the theme.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from app.views import theme
 
 
 def dress_plots() -> None:
-    """Sets the options of plots made from now on, and lets all plots follow the face. To be called once."""
+    """Sets the options of plots made from now on, and lets all plots follow the theme. To be called once."""
     pg.setConfigOptions(antialias=True, useOpenGL=False)
     _set_ground()
-    theme.changes.face_changed.connect(recolour)
+    theme.changes.theme_changed.connect(recolour)
 
 
-def recolour(old: theme.Face, new: theme.Face) -> None:
+def recolour(old: theme.Theme, new: theme.Theme) -> None:
     """Exchanges the colours of every plot there is."""
     _set_ground()
     swap = _Swap(old, new)
@@ -39,9 +39,9 @@ def _set_ground() -> None:
 
 
 class _Swap:
-    """Colours of one face for those of another; any other colour stays."""
+    """Colours of one theme for those of another; any other colour stays."""
 
-    def __init__(self, old: theme.Face, new: theme.Face) -> None:
+    def __init__(self, old: theme.Theme, new: theme.Theme) -> None:
         pairs = zip(astuple(old), astuple(new), strict=True)
         self._colours = {QColor(a).rgb(): QColor(b) for a, b in pairs if isinstance(a, str)}
 

@@ -76,7 +76,7 @@ class SpaceTimeView(QWidget):
         self._bar.setImageItem(self._image, insert_in=item)
         self._signed = True
         self._map_shown = ("displacement", True)
-        theme.changes.face_changed.connect(self._take_face)
+        theme.changes.theme_changed.connect(self._take_theme)
         self.quantities.chosen.connect(self._choose_quantity)
         self.gains.activated.connect(self._choose_gain)
         self.plot.pointed.connect(lambda _, place: self.listening_point_moved.emit(min(max(place, 0.0), 1.0)))
@@ -142,7 +142,7 @@ class SpaceTimeView(QWidget):
     def _kind(self) -> str:
         return "error" if self.quantity == "error" else "displacement"
 
-    def _take_face(self) -> None:
+    def _take_theme(self) -> None:
         self._bar.setColorMap(_colour_map(*self._map_shown))
 
     def _choose_quantity(self) -> None:

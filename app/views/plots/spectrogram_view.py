@@ -61,7 +61,7 @@ class SpectrogramView(QWidget):
         self._bar = pg.ColorBarItem(values=(-self.range_db, 0), width=10, colorMap=level_map(), interactive=False)
         self._bar.setImageItem([], insert_in=item)
         self._bar_label = UprightLabel(self._bar, ("dB",))
-        theme.changes.face_changed.connect(self._take_face)
+        theme.changes.theme_changed.connect(self._take_theme)
         self.scales.chosen.connect(self._choose_scale)
         self.ranges.activated.connect(self._choose_range)
         self._label_frequencies()
@@ -134,7 +134,7 @@ class SpectrogramView(QWidget):
         words = f"below −{self.range_db} dB"
         self.readout.rest(*((f"all levels are {words}", words) if below else ("",)))
 
-    def _take_face(self) -> None:
+    def _take_theme(self) -> None:
         self._image.setLookupTable(level_map().getLookupTable(nPts=256))
         self._bar.setColorMap(level_map())
 

@@ -35,8 +35,8 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
     pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
     """
     gradient = QLinearGradient(0, 0, 0, axes.height)
-    gradient.setColorAt(0, QColor(theme.face.ground_top))
-    gradient.setColorAt(1, QColor(theme.face.ground_bottom))
+    gradient.setColorAt(0, QColor(theme.present.ground_top))
+    gradient.setColorAt(1, QColor(theme.present.ground_bottom))
     painter.setPen(QPen(QColor(theme.LINE), 1))
     painter.setBrush(gradient)
     painter.drawRoundedRect(QRectF(0.5, 0.5, axes.width - 1, axes.height - 1), 6, 6)
@@ -91,7 +91,7 @@ def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: s
 
 def _shade(painter: QPainter, area: QRectF) -> None:
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(theme.translucent(theme.face.shade, theme.face.shade_alpha))
+    painter.setBrush(theme.translucent(theme.present.shade, theme.present.shade_alpha))
     painter.drawRect(area)
     painter.setBrush(QBrush(theme.translucent(theme.FAINT, HATCHING), Qt.BrushStyle.BDiagPattern))
     painter.drawRect(area)

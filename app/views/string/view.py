@@ -397,7 +397,7 @@ class StringView(QWidget):
         # on which side words would be in the way of the pluck, with the words at its handle
         pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
         chosen = (self._trained, pluck, self._sources, self._warning)
-        key = (axes, self.devicePixelRatioF(), *chosen, theme.face, self.hasFocus())
+        key = (axes, self.devicePixelRatioF(), *chosen, theme.present, self.hasFocus())
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
             pixmap.setDevicePixelRatio(self.devicePixelRatioF())

@@ -23,7 +23,7 @@ def clock() -> Clock:
 
 def positions_back(history: History, session: Session) -> list[float]:
     seen = []
-    while history.can_undo:
+    while history.undo_words:
         history.undo()
         seen.append(session.choices.position)
     return seen
@@ -32,7 +32,7 @@ def positions_back(history: History, session: Session) -> list[float]:
 def test_back_and_forth_to_the_very_choices(clock: Clock) -> None:
     session = Session()
     history, start = History(session, clock), session.choices
-    assert not history.can_undo
+    assert not history.undo_words
     session.update(position=0.5, amplitude_mm=2)
     clock.now_s += 1
     session.update(shape="triangular")
@@ -91,7 +91,7 @@ def test_what_is_only_seen_or_heard_is_neither_recorded_nor_taken_back(clock: Cl
     session = Session()
     history = History(session, clock)
     session.update(volume_db=-6, heard="b", loop=True, speed=1, left_view="x", motion=False, envelope=False)
-    assert not history.can_undo
+    assert not history.undo_words
     session.update(position=0.6)
     session.update(volume_db=-9)
     history.undo()
@@ -107,7 +107,7 @@ def test_a_new_change_forgets_what_was_undone(clock: Clock) -> None:
     session.update(position=0.6)
     history.undo()
     session.update(width=0.3)
-    assert not history.can_redo
+    assert not history.redo_words
     history.undo()
     assert (session.choices.width, session.choices.position) == (0.06, 0.35)
 
@@ -125,13 +125,13 @@ def test_a_played_note_is_no_step_and_stays_when_the_step_before_it_is_undone(cl
     session = Session()
     history = History(session, clock)
     session.play(position=0.2, amplitude_mm=6)
-    assert not history.can_undo
+    assert not history.undo_words
     session.update(width=0.2)
     session.play(position=0.7, amplitude_mm=2)
     history.undo()
     choices = session.choices
     assert (choices.width, choices.position, choices.amplitude_mm) == (0.06, 0.7, 2)
-    assert not history.can_undo
+    assert not history.undo_words
     session.play(position=0.3)
     history.redo()  # a note forgets nothing of what was undone
     assert (session.choices.width, session.choices.position) == (0.2, 0.3)

@@ -1,4 +1,4 @@
-"""Both faces can be read, and a plot that was made under one takes on the other."""
+"""Both themes can be read, and a plot that was made under one takes on the other."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ def dark_again() -> Iterator[None]:
     theme.use(theme.DARK)
 
 
-@pytest.mark.parametrize("face", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
-def test_text_can_be_read_on_every_ground(face: theme.Face) -> None:
-    for ground in (face.background, face.panel, face.raised, face.ground_top, face.ground_bottom):
-        for text in (face.text, face.faint, face.model, face.truth, face.warning, face.good):
+@pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
+def test_text_can_be_read_on_every_ground(chosen: theme.Theme) -> None:
+    for ground in (chosen.background, chosen.panel, chosen.raised, chosen.ground_top, chosen.ground_bottom):
+        for text in (chosen.text, chosen.faint, chosen.model, chosen.truth, chosen.warning, chosen.good):
             assert theme.contrast(text, ground) >= 4.5, (text, ground)
-    for filled in (face.model, face.truth, face.good):  # the text of a checked button
-        assert theme.contrast(face.background, filled) >= 4.5
+    for filled in (chosen.model, chosen.truth, chosen.good):  # the text of a checked button
+        assert theme.contrast(chosen.background, filled) >= 4.5
 
 
-@pytest.mark.parametrize("face", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
-def test_no_two_roles_share_a_colour(face: theme.Face) -> None:
+@pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])
+def test_no_two_roles_share_a_colour(chosen: theme.Theme) -> None:
     """Else a plot could not know which role to take on."""
-    colours = [value for value in vars(face).values() if isinstance(value, str)]
+    colours = [value for value in vars(chosen).values() if isinstance(value, str)]
     assert len({QColor(colour).rgb() for colour in colours}) == len(colours)
 
 
 def test_a_checked_box_has_a_tick_that_is_seen(qtbot: QtBot, qapp: QApplication, dark_again: None) -> None:
     style, palette = qapp.styleSheet(), qapp.palette()
-    for choice, face in (("dark", theme.DARK), ("light", theme.LIGHT)):
+    for choice, chosen in (("dark", theme.DARK), ("light", theme.LIGHT)):
         theme.apply_theme(qapp, choice)  # type: ignore[arg-type]
         box = QCheckBox("tick")
         qtbot.addWidget(box)
@@ -54,9 +54,9 @@ def test_a_checked_box_has_a_tick_that_is_seen(qtbot: QtBot, qapp: QApplication,
         picture = box.grab().toImage()
         ratio = picture.devicePixelRatio()
         seen = {picture.pixelColor(x, y).rgb() for x in range(int(22 * ratio)) for y in range(picture.height())}
-        assert QColor(face.text).rgb() in seen  # the box is filled
-        assert QColor(face.background).rgb() in seen  # and the tick stands out from it
-        assert f'stroke="{face.background}"' in (theme.SIGNS / f"tick_{choice}.svg").read_text()
+        assert QColor(chosen.text).rgb() in seen  # the box is filled
+        assert QColor(chosen.background).rgb() in seen  # and the tick stands out from it
+        assert f'stroke="{chosen.background}"' in (theme.SIGNS / f"tick_{choice}.svg").read_text()
         box.setChecked(False)
         assert box.grab().toImage() != picture
     qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
@@ -69,7 +69,7 @@ def test_contrast_is_that_of_the_standard() -> None:
     assert theme.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
 
 
-def test_the_names_are_those_of_the_present_face(dark_again: None) -> None:
+def test_the_names_are_those_of_the_present_theme(dark_again: None) -> None:
     theme.use(theme.LIGHT)
     assert (theme.LIGHT.model, theme.LIGHT.text) == (theme.MODEL, theme.TEXT)
     light = theme.LIGHT
@@ -77,7 +77,7 @@ def test_the_names_are_those_of_the_present_face(dark_again: None) -> None:
     assert wanted == theme.SOURCE_COLOURS
 
 
-def test_plots_take_on_another_face_and_come_back(
+def test_plots_take_on_another_theme_and_come_back(
     qtbot: QtBot, dark_again: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
@@ -106,20 +106,20 @@ def test_plots_take_on_another_face_and_come_back(
         assert stranger.opts["pen"].color() == QColor("#123456")
 
 
-def test_pictures_lie_on_the_ground_of_the_face(qtbot: QtBot, dark_again: None) -> None:
+def test_pictures_lie_on_the_ground_of_the_theme(qtbot: QtBot, dark_again: None) -> None:
     """What is nothing is as light, or as dark, as the panel; what is much is not."""
     spectrogram, space_time, plane = SpectrogramView(), SpaceTimeView(), ErrorPlaneView()
     for widget in (spectrogram, space_time, plane):
         qtbot.addWidget(widget)
-    for face in (theme.LIGHT, theme.DARK):
-        theme.use(face)
+    for chosen in (theme.LIGHT, theme.DARK):
+        theme.use(chosen)
         for view, ground_at in ((spectrogram, 0.0), (space_time, 0.5), (plane.map, 0.0)):
             colours = view._bar.colorMap()
             ground, much = (colours.map(place, mode="qcolor") for place in (ground_at, 1.0))
-            assert theme.contrast(ground.name(), face.panel) < 1.25
-            assert theme.contrast(much.name(), face.panel) > 3
+            assert theme.contrast(ground.name(), chosen.panel) < 1.25
+            assert theme.contrast(much.name(), chosen.panel) > 3
         table = spectrogram._image.lut
-        assert theme.contrast(QColor(*map(int, table[0][:3])).name(), face.panel) < 1.25
+        assert theme.contrast(QColor(*map(int, table[0][:3])).name(), chosen.panel) < 1.25
 
 
 def test_the_errors_legend_has_the_colours_of_its_curves(
@@ -136,7 +136,7 @@ def test_the_errors_legend_has_the_colours_of_its_curves(
             assert f"color:{colour}'>— {name.upper()}" in view.readout.text()
 
 
-def test_a_painted_view_reads_the_face_when_it_paints(qtbot: QtBot, dark_again: None) -> None:
+def test_a_painted_view_reads_the_theme_when_it_paints(qtbot: QtBot, dark_again: None) -> None:
     view = StringView()
     qtbot.addWidget(view)
     view.resize(600, 260)
@@ -146,15 +146,15 @@ def test_a_painted_view_reads_the_face_when_it_paints(qtbot: QtBot, dark_again: 
     assert dark.lightness() < 60 < 200 < light.lightness()
 
 
-@pytest.mark.parametrize(("choice", "face"), [("light", theme.LIGHT), ("dark", theme.DARK)])
+@pytest.mark.parametrize(("choice", "chosen"), [("light", theme.LIGHT), ("dark", theme.DARK)])
 def test_the_choice_is_put_on(
-    qapp: QApplication, dark_again: None, choice: theme.FaceChoice, face: theme.Face
+    qapp: QApplication, dark_again: None, choice: theme.ThemeChoice, chosen: theme.Theme
 ) -> None:
     style, palette = qapp.styleSheet(), qapp.palette()
     theme.apply_theme(qapp, choice)
-    assert theme.face == face
-    assert face.panel in qapp.styleSheet()
-    assert qapp.palette().window().color() == QColor(face.background)
+    assert theme.present == chosen
+    assert chosen.panel in qapp.styleSheet()
+    assert qapp.palette().window().color() == QColor(chosen.background)
     qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
     qapp.setStyleSheet(style)
     qapp.setPalette(palette)

@@ -112,7 +112,7 @@ def test_the_motion_can_be_switched_off(qtbot: QtBot, controller: Controller) ->
 def test_gestures_are_undone_one_by_one(qtbot: QtBot, controller: Controller) -> None:
     window, session, string = controller.window, controller.session, view(controller, "string")
     start = session.choices
-    assert not controller.history.can_undo
+    assert not controller.history.undo_words
     at = string._handle(string._axes()).toPoint()
     qtbot.mousePress(string, LEFT, pos=at)
     for moved in range(5):
@@ -167,7 +167,7 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
         assert len(notes(controller)) == number, "it is struck before the window knows of it"
         qtbot.waitUntil(lambda number=number: len(plucks) == number, timeout=5_000)
     assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.6556])
-    assert not controller.history.can_undo
+    assert not controller.history.undo_words
     qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
     qtbot.keyClick(window, Qt.Key.Key_9)
     assert session.choices.amplitude_mm == pytest.approx(10)
@@ -192,7 +192,7 @@ def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Contr
     assert controller.session.choices.position == Choices().position, "the window has had no time yet"
     qtbot.waitUntil(lambda: controller.session.choices.position == pytest.approx(0.7), timeout=5_000)
     assert controller.session.choices.amplitude_mm == pytest.approx(10)
-    assert not controller.history.can_undo
+    assert not controller.history.undo_words
     qtbot.waitUntil(lambda: controller.performance.position_s > 0, timeout=20_000)
     midi.performed.emit({"width": 0.1})
     assert controller.session.choices.width == 0.1

@@ -191,13 +191,13 @@ def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> Non
     window = MainWindow()
     qtbot.addWidget(window)
     style, palette = qapp.styleSheet(), qapp.palette()
-    made = Appearance(window, Look(face="dark"))
+    made = Appearance(window, Look(theme="dark"))
     try:
         actions = {action.text(): action for menu in window.menu.findChildren(QMenu) for action in menu.actions()}
         assert actions["Dark"].isChecked()
         actions["Light"].trigger()
-        assert made.look.face == "light"
-        assert theme.face == theme.LIGHT
+        assert made.look.theme == "light"
+        assert theme.present == theme.LIGHT
         assert actions["Light"].isChecked()
         actions["150 %"].trigger()
         assert made.look.size_percent == 150

@@ -21,7 +21,7 @@ def test_round_trip(tmp_path: Path) -> None:
         sampled=SampledChoices(folder="/music", form="sf2", keys=(40, 76), layers=8, dry=True),
         device=DeviceChoice(name="Loud", host_api="ALSA"),
         sound=SoundChoice(rate_hz=44_100, buffer=512),
-        look=Look(face="light", size_percent=125),
+        look=Look(theme="light", size_percent=125),
         midi=MidiChoices(port="Keys", notes="preset", controllers={"width": 74}),
         window_geometry="AdnQyw==",
     )
@@ -96,3 +96,11 @@ def test_a_file_from_before_the_slots_loads_without_a_notice(tmp_path: Path) -> 
     settings, notice = load_settings(path)
     assert notice == ""
     assert settings.choices.source_heard == "truth"
+
+
+def test_a_theme_of_version_0_1_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text('{"look": {"face": "light"}}', encoding="utf-8")
+    settings, notice = load_settings(path)
+    assert (settings.look, notice) == (Look(theme="light"), "")
+    assert '"theme":"light"' in settings.model_dump_json()

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from app.audio.choices import Buffer
+from app.commands.benchmarks.play.analysis import silences
 from app.commands.benchmarks.play.children import child
 from app.commands.benchmarks.play.recording import Recording, recording
 from app.commands.benchmarks.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SoundServer
@@ -37,6 +38,13 @@ def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[R
         with child(command, environment, stdout=log, stderr=log):
             recorded.wait_for_sound(0.0, PATIENCE_S)  # so that it does not start while the app does
             yield recorded
+
+
+def holes_ms(tone: Recording, begin_s: float, end_s: float) -> list[float]:
+    """Lengths of the tone's holes between two times by `time.monotonic`."""
+    clock = tone.clock()
+    part = tone.sound()[clock.frame(begin_s) : clock.frame(end_s), 0]
+    return [silence.frames * 1000 / RATE_HZ for silence in silences(part, RATE_HZ)]
 
 
 def main(buffer: str) -> None:

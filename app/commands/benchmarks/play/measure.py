@@ -25,7 +25,7 @@ from app.commands.benchmarks.machine import Machine
 from app.commands.benchmarks.play import analysis, hands, program
 from app.commands.benchmarks.play.calibration import Holding, Transit, click_through, transit
 from app.commands.benchmarks.play.children import SOUND_AND_SCREEN, child, need_programs
-from app.commands.benchmarks.play.control import steady_tone
+from app.commands.benchmarks.play.control import holes_ms, steady_tone
 from app.commands.benchmarks.play.picture import picture_lags
 from app.commands.benchmarks.play.recording import CardClock, Recording, recording
 from app.commands.benchmarks.play.screen import Screen, private_screen
@@ -188,7 +188,7 @@ def measure(
         tell("analysis")
         clock, way = recorded.clock(), transit(clicks, recorded)
         sound = recorded.sound()
-        phases = tuple(_judged(p, sound, clock, way, _control_holes_ms(p, control)) for p in played)
+        phases = tuple(_judged(each, sound, clock, way, control) for each in played)
         first = np.flatnonzero(np.abs(sound[(start := clock.frame(started_s)) :, 0]) > analysis.FAINTEST_PLUCK)
         lags_s = [
             changed_s - clock.time_s(heard)
@@ -278,14 +278,7 @@ def _window_cpu_s(process: subprocess.Popen[bytes]) -> float:
     )
 
 
-def _control_holes_ms(played: _Played, control: Recording) -> list[float]:
-    """Lengths of the steady tone's holes while the app was played."""
-    clock, sound = control.clock(), control.sound()
-    part = sound[clock.frame(played.keys_s[0]) : clock.frame(played.keys_s[-1] + analysis.SOUNDS_S), 0]
-    return [silence.frames * 1000 / RATE_HZ for silence in analysis.silences(part, RATE_HZ)]
-
-
-def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, control_ms: list[float]) -> Phase:
+def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, control: Recording) -> Phase:
     keys = [clock.frame(key_s) for key_s in played.singles_s]
     onsets = [analysis.onset(sound[:, 0], key, RATE_HZ) for key in keys]
     latencies_s = [
@@ -310,6 +303,8 @@ def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, 
     plucked = analysis.matched(keys, events, rest.by_past, usual, RATE_HZ)
     untimely = analysis.untimely(events, plucked, RATE_HZ)
     clicks = analysis.clicks(events, [*plucked, *untimely], [*holes, *gaps], expected, RATE_HZ)
+
+    control_ms = holes_ms(control, played.keys_s[0], played.keys_s[-1] + analysis.SOUNDS_S)
 
     def since_s(frame: int) -> float:
         return round((frame - keys[0]) / RATE_HZ, 4)

@@ -22,7 +22,7 @@ from app.commands.benchmarks.machine import Machine
 from app.commands.benchmarks.play import analysis, hands, program, score
 from app.commands.benchmarks.play.calibration import Holding, Transit, click_through, transit
 from app.commands.benchmarks.play.children import SOUND_AND_SCREEN, need_programs
-from app.commands.benchmarks.play.control import steady_tone
+from app.commands.benchmarks.play.control import holes_ms, steady_tone
 from app.commands.benchmarks.play.hands import Hand, KeyHand, MidiHand
 from app.commands.benchmarks.play.judgement import Judgement, judge, notes_of
 from app.commands.benchmarks.play.midi import Cable, cable
@@ -211,7 +211,7 @@ def _judged(
         """When in `sound`, in s, an event of that time is heard."""
         return (clock.frame(time_s + usual_s) - begin) / RATE_HZ
 
-    control_ms = _control_holes_ms(played, control)
+    control_ms = holes_ms(control, played.began_s, played.until_s)
     return Heard(
         played.by,
         played.load,
@@ -226,10 +226,3 @@ def _judged(
         len(control_ms),
         sum(control_ms),
     )
-
-
-def _control_holes_ms(played: _Played, control: Recording) -> list[float]:
-    """Lengths of the steady tone's holes while the piece was played."""
-    clock, sound = control.clock(), control.sound()
-    part = sound[clock.frame(played.began_s) : clock.frame(played.until_s), 0]
-    return [silence.frames * 1000 / RATE_HZ for silence in analysis.silences(part, RATE_HZ)]
