@@ -5,12 +5,14 @@ All choices are one immutable, validated value; the session replaces it and sign
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, Literal
 
 from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from app.patches.patch import Patch, PhysicalString
+from app.session.instrument import EARS, heard_at, picked_up
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Pickup
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
 
@@ -91,13 +93,16 @@ class Session:
 
     Signals carry the set of the names of the fields that have new values. `changed` is emitted after every change,
     `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
+
+    While keys play the patch, its pick-up is what `listen`, `listen_right`, `stereo` and `pickup` say: whichever of
+    the two changes, the other follows, so that what is heard is what is saved, recorded and exported.
     """
 
     changed = Signal(frozenset)
     played = Signal(frozenset)
 
     def __init__(self, choices: Choices | None = None) -> None:
-        self._choices = choices or Choices()
+        self._choices = _with_one_ear(choices or Choices(), ())
 
     @property
     def choices(self) -> Choices:
@@ -110,7 +115,7 @@ class Session:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
         """
         if "preset" in changes and "keys_play" not in changes:
-            patch = self._choices.patch
+            patch = changes.get("patch", self._choices.patch)
             plays = "pitch" if patch is not None and patch.preset == changes["preset"] else "place"
             changes = {**changes, "keys_play": plays}
         if names := self._take(changes):
@@ -131,6 +136,7 @@ class Session:
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        new = _with_one_ear(new, changes)
         before, self._choices = self._choices, new
         return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
 
@@ -152,6 +158,25 @@ class Session:
     def switch_source(self) -> None:
         """Switches what is heard from slot A to slot B, or back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
+
+
+def _with_one_ear(choices: Choices, asked: Collection[str]) -> Choices:
+    """`choices` in which the patch that keys play is heard where its own pick-up says.
+
+    Args:
+        asked: the fields that were asked to change. Of these the patch counts before listening points and pick-up,
+            which otherwise become those of the patch.
+
+    Raises:
+        ValueError: the patch cannot be heard so.
+    """
+    patch = choices.patch
+    if patch is None or choices.keys_play != "pitch":
+        return choices
+    if "patch" not in asked and any(name in asked for name in EARS):
+        heard = picked_up(patch, choices.listen, choices.listen_right, choices.stereo, choices.pickup)
+        return choices.model_copy(update={"patch": heard})
+    return choices.model_copy(update=heard_at(patch))
 
 
 def _clamp(value: float, limits: tuple[float, float]) -> float:

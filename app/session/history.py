@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.session.choices import Choices, Session
+from app.session.instrument import EARS
 from app.session.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
 PLUCK = ("preset", "string", "patch", "position", "amplitude_mm", "shape", "width", "seconds")
-EARS = ("listen", "listen_right", "stereo", "pickup")
 RECORDED = frozenset({*PLUCK, *EARS})
 GATHER_S = 0.5
 LARGEST_STEPS = 200
@@ -34,7 +34,7 @@ class History:
         self._undo: deque[Values] = deque(maxlen=LARGEST_STEPS)
         self._redo: list[Values] = []
         self._present = _recorded(session.choices)  # all of them
-        self._held = False
+        self._held = self._restoring = False
         self._open_fields: frozenset[str] | None = None  # of the step that still gathers; None: the next is a new one
         self._changed_s = 0.0
         session.played.connect(self._choices_played)
@@ -81,9 +81,14 @@ class History:
         while source and source.pop() is not wanted:
             pass
         if wanted is not None:
-            target.append({name: self._present[name] for name in wanted})
-            self._present |= wanted
-            self._session.update(**wanted)
+            before, self._restoring = self._present, True
+            try:
+                self._session.update(**wanted)
+            finally:
+                self._restoring = False
+                self._present = _recorded(self._session.choices)
+            followed = {name for name, value in self._present.items() if value != before[name]}
+            target.append({name: before[name] for name in {*wanted, *followed}})
 
     def _choices_played(self, _: frozenset[str]) -> None:
         self._present = _recorded(self._session.choices)
@@ -91,7 +96,10 @@ class History:
     def _choices_changed(self, names: frozenset[str]) -> None:
         values = _recorded(self._session.choices)
         fields = names & RECORDED
-        if not fields or values == self._present:  # the latter while a step is restored, or a note played
+        if self._restoring or not fields or values == self._present:  # the latter where a note was played
+            return
+        if "keys_play" in names and fields <= set(EARS):  # these came with the patch that keys play now
+            self._present = values
             return
         now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
         soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S

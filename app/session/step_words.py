@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from app.patches.patch import Patch
+from app.session.instrument import EARS
 
 MOST_NAMED = 2  # fields in one step's name
 SEVERAL = "several settings"
@@ -51,6 +52,7 @@ PATCH = {  # fields of a patch, by their path; a field that is not here is named
     "room.t60_s": "reverberation time",
     "level_db": "level",
 }
+PICKUP = {"pickup.points", "pickup.kind"}  # fields of a patch that are EARS of `Choices` too
 
 
 def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
@@ -61,7 +63,7 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     """
     changed = [name for name in after if before[name] != after[name]]
     if "patch" in changed:
-        return _of_patch(before["patch"], after["patch"])
+        return _of_ears(changed, before, after) or _of_patch(before["patch"], after["patch"])
     if "preset" in changed:
         return f"preset {after['preset']}"
     return _together([words for name, words in CHOICES.items() if name in changed])
@@ -74,6 +76,14 @@ def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mappin
     if "patch" in found and old is not None and new is not None and old.name == new.name:
         found |= {f"patch.{field}" for field in _changed(old, new)}
     return frozenset(found)
+
+
+def _of_ears(changed: list[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """Where and how the patch is heard, if nothing else of it has changed; else ""."""
+    old, new, ears = before["patch"], after["patch"], [CHOICES[name] for name in EARS if name in changed]
+    if old is None or new is None or not set(_changed(old, new)) <= PICKUP:
+        return ""
+    return _together(ears) if ears else ""
 
 
 def _of_patch(before: Patch | None, after: Patch | None) -> str:

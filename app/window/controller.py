@@ -205,8 +205,10 @@ class Controller(QObject):
     def _change(self, field: str, value: object) -> None:
         try:
             self.session.update(**{field: value})
-        except ValueError:  # a knob at its end asks for slightly more than the bound
+        except ValueError as error:
             self._choices_shown(frozenset({field}))
+            if not isinstance(value, float):  # else a knob at its end, which asks for slightly more than the bound
+                self.window.notices.tell(str(error))
 
     # Intents
 

@@ -215,7 +215,7 @@ class Performance(QObject):
         choices, entry = self._session.choices, self.entry
         if names & MIX_FIELDS:
             self.notes.set_mix(mix_of(choices))
-        if names & EAR_FIELDS:
+        if names & {*EAR_FIELDS, "patch"}:  # another patch ends a comparison, which was heard elsewhere
             self.notes.listen(heard_ear(choices))
         if "patch" in names:
             self.live.set_patch(choices.patch, heard_ear(choices))
@@ -238,6 +238,7 @@ class Performance(QObject):
         choices = self._session.choices
         if patch is not None:
             choices = choices.model_copy(update=choices_of(patch))
+        self.notes.listen(heard_ear(choices))
         self.live.set_patch(choices.patch, heard_ear(choices))
 
     def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:

@@ -68,6 +68,8 @@ KNOBS = {  # field of `Choices` -> (label, range, tip)
     ),
 }
 
+OF_THE_PATCH = "While keys play the patch, it is the patch's own and is saved with it"
+
 
 class TransportBar(QFrame):
     """Gestures emit signals and change nothing; `show_choices` shows what became of them."""
@@ -166,7 +168,9 @@ class TransportBar(QFrame):
 
     def _build_pickup(self) -> QVBoxLayout:
         self._stereo = tool_button(
-            "Stereo", "Stereo", "Two listening points: “listen” for the left channel, “right” for the right"
+            "Stereo",
+            "Stereo",
+            f"Two listening points: “listen” for the left channel, “right” for the right\n{OF_THE_PATCH}",
         )
         self._stereo.setCheckable(True)
         self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
@@ -174,7 +178,7 @@ class TransportBar(QFrame):
             "Velocity",
             "Velocity pick-up",
             f"Hear the string's velocity, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s).\n"
-            f"Otherwise its displacement (full scale {1000 * FULL_SCALE_M:g} mm)",
+            f"Otherwise its displacement (full scale {1000 * FULL_SCALE_M:g} mm)\n{OF_THE_PATCH}",
         )
         self._velocity.setCheckable(True)
         self._velocity.toggled.connect(

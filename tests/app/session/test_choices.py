@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.patches.patch import Fretted, Patch, PhysicalString
+from app.patches.patch import Fretted, Patch, PhysicalString, Pickup
 from app.session.choices import Choices, Session
 from app.session.instrument import choices_of
 
@@ -108,3 +108,63 @@ def test_what_a_note_changes_is_told_as_played_before_it_is_told_as_changed() ->
     assert told == [("played", {"position"}, 0.5), ("changed", {"position"}, 0.5), ("changed", {"position"}, 0.6)]
     with pytest.raises(ValueError, match="position"):
         session.play(position=2)
+
+
+def played_patch(*points: float, kind: str = "displacement") -> Patch:
+    strings = Fretted(string=PhysicalString(**STRING))
+    pickup = Pickup.model_validate({"points": points, "kind": kind})
+    return Patch(name="p", category="harp", preset="many", strings=strings, pickup=pickup)
+
+
+def pickup_of(session: Session) -> tuple[tuple[float, ...], str]:
+    patch = session.choices.patch
+    assert patch is not None
+    return patch.pickup.points, patch.pickup.kind
+
+
+def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
+    session = Session()
+    session.update(**choices_of(played_patch(0.2)))
+    session.update(pickup="velocity")
+    session.move_listening_point(0.3)
+    assert pickup_of(session) == ((0.3,), "velocity")
+    session.update(stereo=True, listen_right=0.9)
+    assert pickup_of(session) == ((0.3, 0.9), "velocity")
+    session.update(stereo=False)
+    assert pickup_of(session) == ((0.3,), "velocity")
+    seen = recorded(session)
+    session.update(patch=played_patch(0.6, 0.8))  # the other way
+    choices = session.choices
+    assert (choices.listen, choices.listen_right, choices.stereo, choices.pickup) == (0.6, 0.8, True, "displacement")
+    assert seen == [frozenset({"patch", "listen", "listen_right", "stereo", "pickup"})]
+
+
+def test_a_patch_that_keys_do_not_play_keeps_its_pick_up() -> None:
+    session = Session()
+    session.update(**choices_of(played_patch(0.2)))
+    session.update(preset="one")
+    session.update(listen=0.7, pickup="velocity", stereo=True)
+    assert pickup_of(session) == ((0.2,), "displacement")
+    session.update(patch=played_patch(0.4))
+    assert session.choices.listen == 0.7
+    session.update(keys_play="pitch")  # it is heard as it is
+    choices = session.choices
+    assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
+
+
+def test_remembered_choices_begin_with_the_pick_up_of_the_patch() -> None:
+    """Those of earlier versions may differ."""
+    session = Session(Choices(patch=played_patch(0.2), listen=0.9, pickup="velocity"))
+    assert (session.choices.listen, session.choices.pickup) == (0.2, "displacement")
+
+
+def test_a_patch_whose_macro_moves_the_right_point_stays_in_stereo() -> None:
+    target = {"field": "pickup.points.1", "low": 0.5, "high": 0.9}
+    macro = {"name": "Width", "targets": (target,)}
+    patch = Patch.model_validate({**dict(played_patch(0.2, 0.8)), "macros": (macro,)})
+    session = Session()
+    session.update(**choices_of(patch))
+    before = session.choices
+    with pytest.raises(ValueError, match=r"p stays in stereo: its macro Width"):
+        session.update(stereo=False)
+    assert session.choices is before

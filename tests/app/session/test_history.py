@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from app.patches.library import SHIPPED, read_patch
 from app.session.choices import Choices, Session
 from app.session.history import GATHER_S, LARGEST_STEPS, RECORDED, History
+from app.session.instrument import choices_of
 
 
 class Clock:
@@ -149,3 +151,52 @@ def test_a_drag_after_a_note_goes_back_to_where_the_note_was(clock: Clock) -> No
     history.let_go()
     history.undo()
     assert (session.choices.position, session.choices.amplitude_mm) == (0.7, 4)
+
+
+def heard(session: Session) -> tuple[bool, str, float, object]:
+    choices = session.choices
+    assert choices.patch is not None
+    return choices.stereo, choices.pickup, choices.listen, choices.patch.pickup
+
+
+def test_where_a_patch_is_heard_is_one_step_of_undo(clock: Clock) -> None:
+    session = Session()
+    session.update(**choices_of(read_patch(SHIPPED / "classical_guitar.json")))
+    history, states, words = History(session, clock), [heard(session)], []
+    for change in ({"pickup": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11}):
+        clock.now_s += 1
+        session.update(**change)
+        states.append(heard(session))
+        words.append(history.undo_words)
+    assert words == ["pick-up", "stereo", "listening point"]
+    for there, back in ((states[:-1][::-1], history.undo), (states[1:], history.redo)):
+        for state in there:
+            back()
+            assert heard(session) == state
+    assert not history.redo_words
+
+
+def test_the_patchs_own_pick_up_comes_with_the_keys_and_is_no_step(clock: Clock) -> None:
+    session = Session()
+    session.update(**choices_of(read_patch(SHIPPED / "classical_guitar.json")))
+    history = History(session, clock)
+    own = heard(session)
+    session.update(keys_play="place")
+    session.update(listen=0.9)
+    assert history.undo_words == "listening point"
+    session.update(keys_play="pitch")
+    assert heard(session) == own
+    assert not history.undo_words  # the step would lead to where it is
+    session.update(keys_play="place")
+    for listen in (0.8, 0.7):
+        clock.now_s += 1
+        session.update(listen=listen)
+    session.update(keys_play="pitch")
+    history.undo()  # of what was chosen for places; now it is heard from keys
+    moved = heard(session)
+    assert moved[2] == 0.8
+    assert moved[3] != own[3]
+    history.redo()
+    assert heard(session) == own
+    history.undo()
+    assert heard(session) == moved
