@@ -20,6 +20,7 @@ from app.presets.folders import user_folder
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine.effects import BODIES, Impulse
 
+TITLES = {"guitar": "Guitar body"}  # of the engine's bodies
 ENDINGS = (".wav", ".flac", ".aif", ".aiff")
 _NAME: TypeAdapter[str] = TypeAdapter(Reference)
 
@@ -32,6 +33,11 @@ def own_bodies() -> Path:
 def body_names() -> list[str]:
     """The names of all bodies, the engine's first. Never raises: files are read only when they are used."""
     return [*BODIES, *_own_files()]
+
+
+def body_titles() -> list[tuple[str, str]]:
+    """The name and the title of each body, as `body_names`. The user's own are called what their files are."""
+    return [(name, TITLES.get(name, name)) for name in body_names()]
 
 
 def own_impulse(name: str) -> Impulse:

@@ -113,7 +113,7 @@ class MidiControl(QObject):
         if self._dialog is not None:
             self._dialog.set_patch_turnable(patch is not None)
             if patch is not None:
-                self._dialog.show_patch(patch.mode, patch.bend_semitones, patch.mod_wheel)
+                self._dialog.show_patch(patch.mode, patch.bend_semitones, patch.bend_by, patch.mod_wheel)
 
     def _choose_port(self, name: str) -> None:
         assert self._dialog is not None

@@ -69,7 +69,7 @@ class AppMenu(QMenu):
 
 def menu_button(menu: QMenu) -> QToolButton:
     """The button in the header that opens the menu."""
-    button = tool_button("☰", "Menu", "Theme, UI scale, undo, MIDI, notices, help")
+    button = tool_button("☰", "Menu", "Theme, UI scale, undo, export instrument, audio, MIDI, notices, help")
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)
     return button

@@ -24,7 +24,16 @@ NOTE_MODES = (
     ("Select preset", "preset"),
 )
 CHANNELS = (("Any channel plays any key", "poly"), ("Guitar: a channel is a string", "guitar"), ("MPE", "mpe"))
+BENDS_BY = (
+    ("Tension: the string is pulled tighter", "tension"),
+    ("Length: a slide along the string", "length"),
+)
 BENDS = (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 12.0, 24.0, 48.0)  # semitones
+BEND_TIP = (
+    "How the pitch wheel bends: a string that is pulled tighter, as by a finger on a guitar, keeps its length;\n"
+    "one that is made shorter or longer, as by a slide, keeps its tension. They sound different"
+)
+OF_THE_PATCH = "It belongs to the patch and is saved with it"
 
 
 class MidiDialog(QDialog):
@@ -46,6 +55,7 @@ class MidiDialog(QDialog):
         self.setWindowTitle("MIDI")
         self.setMinimumWidth(460)
         self._inputs = combo_box("MIDI input", [])
+        self._inputs.setToolTip("The MIDI keyboard, or the port of another program, whose notes are played")
         self._inputs.activated.connect(lambda row: self.port_chosen.emit(self._inputs.itemData(row)))
         self._notes = combo_box("Function of notes", NOTE_MODES)
         self._notes.setToolTip("Velocity always sets how hard the string is plucked")
@@ -54,8 +64,14 @@ class MidiDialog(QDialog):
         self._bends = combo_box("Range of the pitch wheel", [(_semitones(each), each) for each in BENDS])
         turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
         self._wheel = combo_box("Modulation wheel", [("Nothing", "none"), *turnable])
-        for box, field in ((self._channels, "mode"), (self._bends, "bend_semitones"), (self._wheel, "mod_wheel")):
-            box.setToolTip("Of the patch, and saved with it")
+        self._bends_by = combo_box("What the pitch wheel changes", BENDS_BY)
+        for box, field, tip in (
+            (self._channels, "mode", "Whether the MIDI channel of a note says on which string it is played"),
+            (self._bends, "bend_semitones", "How far the pitch wheel bends when it is turned all the way"),
+            (self._bends_by, "bend_by", BEND_TIP),
+            (self._wheel, "mod_wheel", "What the modulation wheel changes while you play"),
+        ):
+            box.setToolTip(f"{tip}.\n{OF_THE_PATCH}")
             box.activated.connect(lambda row, box=box, field=field: self.patch_turned.emit(field, box.itemData(row)))
         self._problem = Label()
         self._problem.setObjectName("warning")
@@ -71,6 +87,7 @@ class MidiDialog(QDialog):
             ("Notes", self._notes),
             ("Channels", self._channels),
             ("Pitch wheel", self._bends),
+            ("Bends by", self._bends_by),
             ("Modulation wheel", self._wheel),
         ):
             label = Label(name)
@@ -87,6 +104,7 @@ class MidiDialog(QDialog):
         column.addLayout(self._build_rows(turned))
         close = QPushButton("Close")
         close.setAutoDefault(False)
+        close.setToolTip("Close the dialog; MIDI plays on (Escape)")
         close.clicked.connect(self.reject)
         column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
         self.set_learnable("")
@@ -121,16 +139,21 @@ class MidiDialog(QDialog):
         self._inputs.setEnabled(bool(names))
         self.show_problem(problem)
 
-    def show_patch(self, mode: str, bend_semitones: float, mod_wheel: str) -> None:
+    def show_patch(self, mode: str, bend_semitones: float, bend_by: str, mod_wheel: str) -> None:
         """What the patch that is played makes of channels and wheels."""
         if self._bends.findData(bend_semitones) < 0:
             self._bends.addItem(_semitones(bend_semitones), bend_semitones)
-        for box, value in ((self._channels, mode), (self._bends, bend_semitones), (self._wheel, mod_wheel)):
+        for box, value in (
+            (self._channels, mode),
+            (self._bends, bend_semitones),
+            (self._bends_by, bend_by),
+            (self._wheel, mod_wheel),
+        ):
             box.setCurrentIndex(max(0, box.findData(value)))
 
     def set_patch_turnable(self, turnable: bool) -> None:
         """Whether there is a patch to play."""
-        for box in (self._channels, self._bends, self._wheel):
+        for box in (self._channels, self._bends, self._bends_by, self._wheel):
             box.setEnabled(turnable)
 
     def set_learnable(self, why_not: str) -> None:

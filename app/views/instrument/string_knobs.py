@@ -28,6 +28,7 @@ from engine.pluck import POSITION_RANGE, WIDTH_RANGE
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 TIMES = "× {:.2f}"
 WHOLE = "tuning.transpose"  # an integer
+NO_A4 = "The Scala keyboard mapping of this patch has a reference pitch of its own, so that A4 would change nothing"
 
 
 @dataclass(frozen=True)
@@ -246,6 +247,16 @@ class StringKnobs(QWidget):
         for field in SHAPED:
             self.knobs[field].setEnabled(patch.pluck.shape != "triangular")
         self.knobs["damping.release_t60_s"].setEnabled(not patch.damping.let_ring)
+        self._show_a4(bool(patch.tuning.keymap.strip()))
+
+    def _show_a4(self, mapped: bool) -> None:
+        """`mapped`: whether a keyboard mapping, with a reference pitch of its own, leaves nothing to this knob."""
+        knob = self.knobs["tuning.a4_hz"]
+        knob.setEnabled(not mapped)
+        if mapped:
+            knob.setToolTip(NO_A4)
+        else:
+            knob.set_name("A4", "Pitch of A4")
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
         """The resulting string: names and values with their units ("tension": "72.3 N"), in order."""

@@ -9,10 +9,19 @@ import pytest
 import soundfile
 
 from app.audio.impulse_file import ImpulseError
-from app.instrument.bodies import body_digest, body_names, install_body, own_bodies, own_impulse
+from app.instrument.bodies import (
+    TITLES,
+    body_digest,
+    body_names,
+    body_titles,
+    install_body,
+    own_bodies,
+    own_impulse,
+)
 from app.instrument.effects import body_problem, body_response, effects_of
 from app.instrument.offline import render_note
 from app.patches.patch import Body, Patch
+from engine.effects import BODIES
 from engine.presets import Preset
 
 RATE_HZ = 48_000
@@ -123,3 +132,9 @@ def test_one_that_was_damaged_is_told_with_its_file(patch: Patch, tmp_path: Path
     (own_bodies() / "late.wav").write_text("no sound any more")
     assert str(own_bodies() / "late.wav") in body_problem(on(patch, name))
     assert effects_of(on(patch, name)) is None
+
+
+def test_every_body_has_a_title_in_words(tmp_path: Path) -> None:
+    install_body(late(tmp_path / "here.wav"))
+    assert body_titles() == [("guitar", "Guitar body"), ("here", "here")]
+    assert set(TITLES) == set(BODIES)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
@@ -235,14 +235,23 @@ def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiCont
     assert dialog is not None
     assert not dialog._wheel.isEnabled()  # there is no patch
     patch = read_patch(PATCHES / "classical_guitar.json")
-    midi.show_patch(patch.model_copy(update={"mode": "guitar", "bend_semitones": 2.5, "mod_wheel": "knobs.decay"}))
-    shown = [box.currentData() for box in (dialog._channels, dialog._bends, dialog._wheel)]
-    assert shown == ["guitar", 2.5, "knobs.decay"]
+    hands = {"mode": "guitar", "bend_semitones": 2.5, "bend_by": "length", "mod_wheel": "knobs.decay"}
+    midi.show_patch(patch.model_copy(update=hands))
+    shown = [box.currentData() for box in (dialog._channels, dialog._bends, dialog._bends_by, dialog._wheel)]
+    assert shown == ["guitar", 2.5, "length", "knobs.decay"]
     turned: list[tuple[str, object]] = []
     midi.patch_turned.connect(lambda field, value: turned.append((field, value)))
-    for box, value in ((dialog._channels, "mpe"), (dialog._bends, 12.0), (dialog._wheel, "pluck.position")):
+    for box, value in (
+        (dialog._channels, "mpe"),
+        (dialog._bends, 12.0),
+        (dialog._bends_by, "tension"),
+        (dialog._wheel, "pluck.position"),
+    ):
         box.activated.emit(box.findData(value))
-    assert turned == [("mode", "mpe"), ("bend_semitones", 12.0), ("mod_wheel", "pluck.position")]
+    wheel = ("mod_wheel", "pluck.position")
+    assert turned == [("mode", "mpe"), ("bend_semitones", 12.0), ("bend_by", "tension"), wheel]
+    boxes, buttons = dialog.findChildren(QComboBox), dialog.findChildren(QPushButton)
+    assert [each.accessibleName() for each in (*boxes, *buttons) if not each.toolTip()] == []
 
 
 def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:

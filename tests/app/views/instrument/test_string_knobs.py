@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Patch
+from app.patches.patch import Patch, TuningChoice
 from app.views.instrument.string_knobs import StringKnobs
 
 
@@ -76,3 +76,14 @@ def test_the_facts_are_told_in_their_units(knobs: StringKnobs) -> None:
     knobs.show_facts({"tension": "72.3 N", "length": "650 mm"})
     assert knobs.facts.accessibleDescription() == "tension 72.3 N, length 650 mm"
     assert knobs.facts.grab().toImage() != before
+
+
+def test_a_keyboard_mapping_leaves_nothing_to_a4_and_the_tip_says_why(knobs: StringKnobs, guitar: Patch) -> None:
+    a4 = knobs.knobs["tuning.a4_hz"]
+    keymap = "12\n0\n127\n60\n69\n440\n12\n" + "".join(f"{n}\n" for n in range(12))
+    knobs.show_patch(guitar.model_copy(update={"tuning": TuningChoice(keymap=keymap)}))
+    assert not a4.isEnabled()
+    assert "reference pitch of its own" in a4.toolTip()
+    knobs.show_patch(guitar)
+    assert a4.isEnabled()
+    assert "reference pitch" not in a4.toolTip()
