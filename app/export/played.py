@@ -8,12 +8,12 @@ from pathlib import Path
 
 from app.export.recording import Recording
 from app.export.wav import Level, WavSettings, write_wav
-from app.instrument.effects import channels_of
 from app.instrument.events import TimedEvent
 from app.instrument.midi_file import midi_bytes
-from app.instrument.offline import render_events
+from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
+from app.shared.vocabulary import DIFFERENCE
 from app.shared.whole_file import whole_file
 from engine.presets import Preset
 
@@ -28,6 +28,30 @@ class PlayedFile:
     level: Level
 
 
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What was played through a patch, and not yet written to a file.
+
+    Attributes:
+        patch: with which it began.
+        events: `PatchTurned` among them have the pick-up through which it was heard.
+        source: that was heard: "model", "truth" or "difference".
+        difference_gain_db: the gain of the difference.
+    """
+
+    patch: Patch
+    events: tuple[TimedEvent, ...]
+    source: str = "model"
+    difference_gain_db: float = 0.0
+
+    @property
+    def source_words(self) -> str:
+        """The source for people."""
+        if self.source != DIFFERENCE:
+            return f"the {self.source}"
+        return f"the difference of model and truth at {self.difference_gain_db:+g} dB"
+
+
 def write_played(
     path: Path,
     patch: Patch,
@@ -37,12 +61,12 @@ def write_played(
     settings: WavSettings = WavSettings("24", RATE_HZ),  # noqa: B008 - immutable
     seconds: float | None = None,
     advanced: Callable[[float], None] = lambda seconds: None,
+    difference_gain_db: float = 0.0,
 ) -> PlayedFile:
     """Writes a WAV file, whole or not at all. Memory does not grow with its length.
 
     Args:
-        source: "model" or "truth".
-        seconds, advanced: see `render_events`.
+        source, seconds, advanced, difference_gain_db: see `render_events`.
 
     Raises:
         ValueError: a key has no possible string, or `source` is unknown.
@@ -50,8 +74,11 @@ def write_played(
     """
     rate_hz = settings.rate_hz or RATE_HZ
     with whole_file(path) as file:
-        sound = Recording(channels_of(patch))
-        for block in render_events(patch, preset, events, rate_hz, source, seconds, advanced=advanced):
+        sound = Recording(channels_played(patch, events))
+        blocks = render_events(
+            patch, preset, events, rate_hz, source, seconds, advanced=advanced, difference_gain_db=difference_gain_db
+        )
+        for block in blocks:
             sound.append(block)
         tags = {"title": f"{path.stem}: {patch.name}", "software": f"{PROGRAM} {program_version()}"}
         level = write_wav(file, sound, rate_hz, settings, tags)
@@ -64,10 +91,18 @@ def recorded_files(path: Path) -> tuple[Path, Path]:
     return sound, sound.with_suffix(".mid")
 
 
-def write_recorded(path: Path, patch: Patch, preset: Preset, events: Sequence[TimedEvent], source: str) -> str:
+def write_recorded(path: Path, played: Played, preset: Preset) -> str:
     """Writes both `recorded_files` and returns in words what was written. Raises as `write_played`."""
     sound_file, midi_file = recorded_files(path)
-    written = write_played(sound_file, patch, preset, events, source)
+    written = write_played(
+        sound_file,
+        played.patch,
+        preset,
+        played.events,
+        played.source,
+        difference_gain_db=played.difference_gain_db,
+    )
     with whole_file(midi_file) as file:
-        file.write(midi_bytes(events))
-    return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s, peak {written.level.peak_db:.1f} dBFS"
+        file.write(midi_bytes(played.events))
+    level = f"peak {written.level.peak_db:.1f} dBFS"
+    return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s of {played.source_words}, {level}"

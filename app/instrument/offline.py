@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.effects import channels_of, effects_of
-from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent, moves_effects
+from app.instrument.events import Event, NoteOff, NoteOn, PatchTurned, TimedEvent, moves_effects
 from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
+from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD
 from engine.presets import Preset
-from engine.voices import Mixer
+from engine.voices import Ear, Mixer
 
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
@@ -24,29 +25,38 @@ STOLEN_S = 0.03
 
 
 class _Stage:
-    """A player and a mixer without a device."""
+    """A player and a mixer without a device. `gains`: of the sources that are heard together."""
 
-    def __init__(self, patch: Patch, preset: Preset, rate_hz: int, source: str, limited: bool) -> None:
+    def __init__(self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
-        self._source = source
+        self._gains = gains
         self._struck: list[Struck] = []
-        self.player = Player(patch, preset, rate_hz, self._take, (source,))
+        self.player = Player(patch, preset, rate_hz, self._take, tuple(gains))
         self.tail_s = 0.0
         self._set_effects()
 
     def _take(self, struck: Struck) -> None:
         self._struck = [each for each in self._struck if not each.over]
         for each in self._struck[: max(0, len(self._struck) + 1 - MOST_RINGING)]:
-            each.voices[self._source].release(STOLEN_S)
-        voice = struck.voices[self._source]
-        voice.start_with_gain(struck.gain)
+            for voice in each.voices.values():
+                voice.release(STOLEN_S)
+        for source, voice in struck.voices.items():
+            voice.start_with_gain(self._gains[source] * struck.gain)
         self._struck.append(struck)
-        self.mixer.add(voice)
+        self.mixer.add(*struck.voices.values())
 
     def handle(self, event: Event) -> None:
         self.player.handle(event)
         if moves_effects(event, self.player.patch):
             self._set_effects()
+
+    def render(self, frames: int) -> NDArray[np.float32]:
+        """The next frames; strings that ring follow the patch to other listening points, as in the window."""
+        ear = Ear(tuple(self.player.patch.pickup.points), self.player.patch.pickup.kind)
+        for struck in self._struck:
+            for voice in struck.voices.values():
+                voice.listen(ear)
+        return self.mixer.render(frames)
 
     def _set_effects(self) -> None:
         self.mixer.set_effects(effects := effects_of(self.player.heard_through))
@@ -69,30 +79,30 @@ def render_events(
     seconds: float | None = None,
     limited: bool = True,
     advanced: Callable[[float], None] = lambda seconds: None,
+    difference_gain_db: float = 0.0,
 ) -> Iterator[NDArray[np.float32]]:
     """The sound of a patch that plays events, in blocks (frames, channels), ±1 being full scale. Deterministic.
 
     An event counts from the next quantum of 64 frames on.
 
     Args:
+        source: "model", "truth", or "difference", which is model minus truth with its gain.
         seconds: its length; None: until all has died away, a minute after the last event at most.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
         advanced: is called with the seconds rendered so far; may raise, to end it.
 
     Raises:
-        ValueError: a key has no possible string, or `source` is neither "model" nor "truth".
+        ValueError: a key has no possible string, or there is no such `source`.
     """
-    if source not in ("model", "truth"):
-        raise ValueError(f"source must be model or truth, not {source!r}")
-    stage = _Stage(patch, preset, rate_hz, source, limited)
-    channels = channels_of(patch)
+    stage = _Stage(patch, preset, rate_hz, _gains(source, difference_gain_db), limited)
+    channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)
 
     def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
         nonlocal done, skipped
         while done < frame:
-            block = stage.mixer.render(min(BLOCK_FRAMES, frame - done))
+            block = stage.render(min(BLOCK_FRAMES, frame - done))
             done += len(block)
             cut, skipped = block[skipped:, :channels], max(0, skipped - len(block))
             if len(cut):
@@ -117,6 +127,22 @@ def render_events(
             yield block
             loudest = max(loudest, float(np.abs(block).max(initial=0.0)))
         quiet_s = quiet_s + (done - before) / rate_hz if stage.silent or loudest < quiet else 0.0
+
+
+def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
+    """How many channels `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
+    turned = (each.event.patch for each in timed if isinstance(each.event, PatchTurned))
+    return max(channels_of(each) for each in (patch, *turned))
+
+
+def _gains(source: str, difference_gain_db: float) -> dict[str, float]:
+    """The factor of each source that is heard."""
+    if source == DIFFERENCE:
+        gain = float(10 ** (difference_gain_db / 20))
+        return {"model": gain, "truth": -gain}
+    if source not in ("model", "truth"):
+        raise ValueError(f"source must be model, truth or {DIFFERENCE}, not {source!r}")
+    return {source: 1.0}
 
 
 def render_note(

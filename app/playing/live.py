@@ -10,7 +10,7 @@ from pathlib import Path
 from app.instrument.effects import body_problem, effects_of
 from app.instrument.events import Controller, Event, NoteOn, PatchTurned, TimedEvent, moves_effects
 from app.instrument.player import SOURCES, Player, Struck
-from app.patches.patch import Patch
+from app.patches.patch import Patch, Pickup
 from app.playing.notes import Note, Notes
 from app.playing.sources import Sources
 from app.playing.stroke import Stroke
@@ -22,6 +22,10 @@ from engine.voices import Ear
 
 SEEN_DB = 70.0  # below full scale: softer strings do not light their keys
 LONGEST_RECORDING = 100_000  # events
+FULL = (
+    f"The recording is full ({LONGEST_RECORDING} notes, releases and movements of wheels and knobs): what is played "
+    "from now on is not in it. End it and save it, then record again."
+)
 
 
 class Live:
@@ -51,6 +55,7 @@ class Live:
         self._made: tuple[Struck, Note] | None = None
         self._recorded: list[TimedEvent] | None = None
         self._recording_began_s = 0.0
+        self._told_full = False
         self._wished: object = None
         self._effects: Effects | None = None  # as set
         self._dry = False
@@ -76,7 +81,7 @@ class Live:
                 self._player = None
                 self._wish_effects(None)
                 return
-            self._note_down(PatchTurned(patch))
+            self._note_down_patch(patch)
             if player is not None and player.patch.preset == patch.preset:
                 try:
                     player.set_patch(patch)
@@ -96,6 +101,8 @@ class Live:
         """Where keys are heard from now on."""
         with self._lock:
             self._ear, player = ear, self._player
+            if player is not None:
+                self._note_down_patch(player.patch)
         if player is not None:
             player.listen(ear)
             self._prepare(player)
@@ -190,9 +197,9 @@ class Live:
     def begin_recording(self) -> None:
         """Records events from now on; an earlier recording is discarded."""
         with self._lock:
-            self._recorded, self._recording_began_s = [], time.monotonic()
+            self._recorded, self._recording_began_s, self._told_full = [], time.monotonic(), False
             if self._player is not None:
-                self._note_down(PatchTurned(self._player.patch))
+                self._note_down_patch(self._player.patch)
 
     def end_recording(self) -> list[TimedEvent]:
         """The events, with times in s from the first note on; empty where there was no note."""
@@ -203,9 +210,21 @@ class Live:
             return []
         return [TimedEvent(max(0.0, each.time_s - first), each.event) for each in events]
 
+    def _note_down_patch(self, patch: Patch) -> None:
+        """With the pick-up through which it is heard, which is not its own where keys choose places."""
+        if self._ear is not None:
+            pickup = Pickup(points=self._ear.points, kind=self._ear.pickup)
+            patch = patch.model_copy(update={"pickup": pickup})
+        self._note_down(PatchTurned(patch))
+
     def _note_down(self, event: Event) -> None:
-        if self._recorded is not None and len(self._recorded) < LONGEST_RECORDING:
+        if self._recorded is None:
+            return
+        if len(self._recorded) < LONGEST_RECORDING:
             self._recorded.append(TimedEvent(time.monotonic() - self._recording_began_s, event))
+        elif not self._told_full:
+            self._told_full = True
+            self._report(FULL, "")
 
     # How it is done
 

@@ -29,6 +29,9 @@ class Instruments(QObject):
     Args:
         strike: plucks the string as `Choices` say; called in the gesture's thread.
         handle: plays an event through the patch and returns what it struck; called in the gesture's thread.
+
+    Attributes:
+        latest: the note that was struck last and the patch that played it; None: a pluck at a place, or none yet.
     """
 
     played = Signal()  # a note was struck, and the session knows it
@@ -51,6 +54,7 @@ class Instruments(QObject):
         self._strike, self._handle = strike, handle
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # values of `Choices` of struck notes, not in the session yet
+        self.latest: tuple[Patch, Struck] | None = None
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
@@ -99,6 +103,7 @@ class Instruments(QObject):
             return False
         struck = self._handle(event)
         if struck is not None:
+            self.latest = choices.patch, struck
             changes = {
                 "preset": choices.patch.preset,
                 "string": PhysicalString(**asdict(struck.key.string.parameters)),
@@ -115,6 +120,7 @@ class Instruments(QObject):
     def perform(self, changes: dict[str, Any], plucks: bool) -> None:
         """Applies new values of `Choices`, and plucks with them. Without `plucks` in the window's thread alone."""
         if plucks:
+            self.latest = None
             with self._lock:
                 self._told = {**self._told, **changes}
                 choices = self._session.choices.model_copy(update=self._told)

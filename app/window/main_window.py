@@ -76,7 +76,10 @@ PLAYED_KEYS = (  # see `app/playing/keyboard.py`
     ("Z   X", "an octave lower, higher"),
     ("1 … 9", "velocity, from softest to loudest (not while a knob has the keyboard focus)"),
     ("C   V", "softer, harder"),
-    ("A S D F G H J K L ;", "without a patch, or where keys are places: pluck at ten positions, from left to right"),
+    (
+        "A S D F G H J K L ;",
+        "where keys choose the place, or without a patch: pluck at ten places, left to right",
+    ),
 )
 
 

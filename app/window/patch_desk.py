@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, QTimer, QUrl, Signal
+from PySide6.QtCore import QObject, QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QFileDialog, QInputDialog
+from PySide6.QtWidgets import QInputDialog
 
-from app.export.played import recorded_files, write_recorded
-from app.instrument.bodies import body_names
+from app.instrument.beyond_training import outside_of_key, outside_of_string
+from app.instrument.bodies import body_titles
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import MidiFileError, read_midi
 from app.instrument.strings import Strings
@@ -30,20 +29,21 @@ from app.patches.library import (
 )
 from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice
 from app.patches.tuning import SCALA_FILES, read_scala
-from app.playing.chosen import info_of
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
-from app.session.instrument import choices_of, heard_at
+from app.session.instrument import choices_of
+from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
 from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
 from app.window.instruments import Instruments
 from app.window.performance import Performance
+from app.window.recordings import Recordings
 from engine.plain_text import one_line
-from engine.presets import PresetError, load_preset, outside_training
+from engine.presets import PresetError, load_preset
 from engine.presets.of_string import of_string, read_string
 from engine.resonators.family import inharmonicity
 
@@ -51,8 +51,8 @@ AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 NOTE_TOLD_AFTER_MS = 150
 MANY_STRINGS = "studio_any_string"
-RECORDED = "WAV and MIDI (*.wav)"
-PLACES = "The computer's keys pluck the chosen preset at ten positions; choose a patch to play pitches"
+PLACES = "The computer's keys pluck the chosen preset at ten places along its string"
+NO_PATCH = f"{PLACES}; choose a patch to play pitches"
 MIDI_FILES = (".mid", ".midi")
 STRING_FILE = ".toml"
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
@@ -63,11 +63,11 @@ class PatchDesk(QObject):
 
     Attributes:
         favourites: names of patches.
+        recordings: of what is played.
     """
 
     told = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
-    _written, _not_written = Signal(str), Signal(str)  # from the thread that writes a recording
 
     def __init__(
         self,
@@ -85,12 +85,14 @@ class PatchDesk(QObject):
         self.favourites = set(favourites)
         self._entries: list[PatchEntry] = []
         self._shown_s = 0.0
-        self._recording_began_s = 0.0
+        self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
+        self._told_other = ""  # the source that the user was told is not heard from keys
         self._playback = Playback(instruments.play)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
-        self._written.connect(self.informed, Qt.ConnectionType.QueuedConnection)
-        self._not_written.connect(self.told, Qt.ConnectionType.QueuedConnection)
+        self.recordings = Recordings(session, library, performance.live, panel.bar, self)
+        self.recordings.told.connect(self.told)
+        self.recordings.informed.connect(self.informed)
         self.reload()
         self._connect()
 
@@ -105,7 +107,8 @@ class PatchDesk(QObject):
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)
         bar.compare_asked.connect(self.compare)
-        bar.record_asked.connect(self.record)
+        bar.scala_remove_asked.connect(self.remove_scala)
+        bar.keys_play_asked.connect(lambda plays: self._session.update(keys_play=plays))
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
         bar.changed.connect(self.change)
@@ -139,7 +142,7 @@ class PatchDesk(QObject):
         self._entries, problems = list_patches()
         for problem in problems:
             self.told.emit(problem)
-        self._panel.bar.set_bodies([(name, name) for name in body_names()])
+        self._panel.bar.set_bodies(body_titles())
         self._show_entries()
 
     # Intents
@@ -166,8 +169,9 @@ class PatchDesk(QObject):
             self.browser.show_over()
 
     def audition(self, name: str) -> None:
-        """Chooses a patch and plays a note in the middle of its range."""
-        self.choose(name)
+        """Chooses a patch, unless it is there already, maybe changed, and plays a note in the middle of its range."""
+        if self.entry is None or self.entry.name != name:
+            self.choose(name)
         if self.patch is not None:
             key = sum(self.patch.range) // 2
             self._playback.play(_note(key))
@@ -187,8 +191,7 @@ class PatchDesk(QObject):
         except (ValueError, AttributeError):  # a knob at its end asks for slightly more than the bound
             self._show_patch()
             return
-        heard = heard_at(changed) if changed.pickup != patch.pickup else {}
-        self._session.update(patch=changed, **heard)
+        self._session.update(patch=changed)
 
     def save(self) -> None:
         """Saves the patch: under its name where it is the user's own, else asks for one."""
@@ -301,9 +304,15 @@ class PatchDesk(QObject):
         self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
         self.informed.emit(f"{file.name} tunes {patch.name}{left_out}.")
 
+    def remove_scala(self) -> None:
+        """Tunes the patch in twelve equal steps again."""
+        if (patch := self.patch) is not None:
+            tuning = TuningChoice(a4_hz=patch.tuning.a4_hz, transpose=patch.tuning.transpose)
+            self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
+
     def take_body(self, name: str) -> None:
         """Gives the patch one of the user's own bodies, which was just installed."""
-        self._panel.bar.set_bodies([(each, each) for each in body_names()])
+        self._panel.bar.set_bodies(body_titles())
         if self.patch is None:
             self.informed.emit(f"The body {name} was added; choose a patch, then this body in its bar.")
             return
@@ -321,50 +330,6 @@ class PatchDesk(QObject):
         """Whether a MIDI file is played."""
         return self._playback.playing
 
-    # Recording
-
-    def record(self) -> None:
-        """Begins to record, or ends it and asks for a file."""
-        live = self._performance.live
-        if not live.recording:
-            live.begin_recording()
-            self._recording_began_s = time.monotonic()
-            return
-        events = live.end_recording()
-        self._panel.bar.show_recording(None)
-        patch = self.patch
-        if not events or patch is None:
-            self.told.emit("Nothing was played, so nothing was recorded.")
-            return
-        name = f"{patch.name}.wav"
-        while name:
-            name, _ = QFileDialog.getSaveFileName(self._panel, "Save what was played", name, RECORDED)
-            if not name:
-                return
-            taken = [each for each in recorded_files(Path(name)) if each.exists() and each != Path(name)]
-            if not taken:  # the dialog has asked for the name itself alone
-                self.write(Path(name), events)
-                return
-            self.told.emit(f"{taken[0]} exists already; choose another name.")
-
-    def write(self, path: Path, events: list[TimedEvent]) -> threading.Thread | None:
-        """Writes what was played as WAV and MIDI of one name, in a thread; None where there is no patch or preset."""
-        patch = self.patch
-        entry = None if patch is None else self._library.find(patch.preset)
-        if patch is None or entry is None:
-            return None
-        source = "truth" if self._session.source_heard == "truth" else "model"
-
-        def work() -> None:
-            try:
-                self._written.emit(write_recorded(path, patch, load_preset(entry.path), events, source))
-            except (ValueError, PresetError, WriteError, OSError) as error:
-                self._not_written.emit(str(error).splitlines()[0])
-
-        thread = threading.Thread(target=work, name="performance-writer", daemon=True)
-        thread.start()
-        return thread
-
     # What is shown
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -372,25 +337,71 @@ class PatchDesk(QObject):
             self._show_patch()
         if "patch" in names:
             self._panel.bar.show_comparing(False)
-        if names & {"octave", "keys_play", "patch"}:
-            choices = self._session.choices
+        if names & {"octave", "velocity", "keys_play", "patch"}:
+            choices, pitches = self._session.choices, self._instruments.plays_pitches
             self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
-            pitches = self._instruments.plays_pitches
+            self._panel.bar.show_velocity(choices.velocity)
+            self._panel.bar.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
-            self._panel.bar.show_note("" if pitches else PLACES)
-        if names & {"heard", "a", "b"}:
-            self._panel.show_source(self._session.source_heard)
+        if names & {"keys_play", "patch"}:
+            self._judge_anew()
+        if names & {"heard", "a", "b", "keys_play", "patch"}:
+            self._show_source()
+
+    def _show_source(self) -> None:
+        """In whose colour keys are lit; says once that keys do not play another preset which a slot holds."""
+        choices, heard = self._session.choices, self._session.source_heard
+        other = heard if self._instruments.plays_pitches and other_preset(heard) else ""
+        if self._told_other not in (choices.a, choices.b):
+            self._told_other = ""
+        self._panel.show_source("model" if other else heard)
+        if other and other != self._told_other:
+            self.informed.emit(
+                f"Keys sound with the model of their patch, not with {source_title(other, self._library)}: that "
+                "preset is heard when you pluck the string by hand, or where keys choose the place."
+            )
+            self._told_other = other
 
     def show_played(self) -> None:
         """Says soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
         if not self._note_timer.isActive():  # of a chord, or of fast notes, once: it takes milliseconds
             self._note_timer.start()
 
+    def _judge_anew(self) -> None:
+        """Says soon what of the latest note lies outside the training with the knobs as they are now.
+
+        Another patch, or keys that choose places, leave nothing to say.
+        """
+        patch, before, self._noted = self.patch, self._noted, self.patch
+        pitches = self._instruments.plays_pitches
+        if patch is None or not pitches or _is_another(before, patch):
+            self._instruments.latest = None
+        if self._instruments.latest is not None:
+            self.show_played()
+            return
+        self._note_timer.stop()
+        self._panel.bar.show_note(self._keys_words())
+
     def _show_latest_note(self) -> None:
-        choices = self._session.choices
+        self._panel.bar.show_note("; ".join(self._outside()) or self._keys_words())
+
+    def _keys_words(self) -> str:
+        """What the computer's keys do, where they play no pitches; else ""."""
+        if self._instruments.plays_pitches:
+            return ""
+        return NO_PATCH if self.patch is None else PLACES
+
+    def _outside(self) -> list[str]:
+        """What of the latest note, with the present knobs, lies outside the training of its model."""
+        choices, latest, patch = self._session.choices, self._instruments.latest, self.patch
         entry = self._library.find(choices.preset)
-        if entry is not None and choices.string is not None:
-            self._panel.bar.show_note("; ".join(outside_training(info_of(choices, entry), choices.pluck)))
+        if entry is None:
+            return []
+        if latest is not None and patch is not None and latest[0] != patch:
+            return outside_of_key(entry.info, patch, latest[1].event)
+        if choices.string is None:
+            return []
+        return outside_of_string(entry.info, choices.string.parameters, choices.pluck)
 
     def tick(self) -> None:
         """Shows which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
@@ -400,13 +411,13 @@ class PatchDesk(QObject):
         self._shown_s = now_s
         self._panel.show_sounding(self._performance.live.sounding())
         self._panel.bar.show_voices(self._performance.notes.ringing)
-        if self._performance.live.recording:
-            self._panel.bar.show_recording(now_s - self._recording_began_s)
+        self.recordings.tick(now_s)
 
     def close(self) -> None:
-        """Ends the playback; may be called again."""
+        """Ends the playback, and waits until a recording is written; may be called again."""
         self._note_timer.stop()
         self._playback.stop()
+        self.recordings.close()
 
     def _show_entries(self) -> None:
         entry = self.entry
@@ -463,6 +474,13 @@ class PatchDesk(QObject):
 
 def _note(key: int) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY)), TimedEvent(AUDITION_S, NoteOff(key))]
+
+
+def _is_another(before: Patch | None, patch: Patch) -> bool:
+    """Whether it is more than the same patch with knobs turned, or under another name."""
+    if before is None:
+        return True
+    return before.name != patch.name and before.model_copy(update={"name": patch.name}) != patch
 
 
 def facts_of(patch: Patch) -> dict[str, str]:

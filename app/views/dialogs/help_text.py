@@ -11,7 +11,8 @@ TOUR = (
     (
         "Choose an instrument",
         "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change stiffness, "
-        "gauge, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is played.",
+        "gauge, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is played. In the "
+        "same strip you choose whether the computer's keys play pitches or choose where the string is plucked.",
     ),
     (
         "Pluck",
@@ -41,7 +42,8 @@ TOUR = (
     (
         "Listen elsewhere",
         "Drag the green marker beneath the string. At a node of a partial, that partial is not heard; at the ends "
-        "nothing is. Stereo has two listening points; Velocity is the signal of a magnetic pick-up.",
+        "nothing is. Stereo has two listening points; Velocity is the signal of a magnetic pick-up. While keys play "
+        "the patch, all three belong to it, and what you hear is saved, recorded and exported.",
     ),
     (
         "Beyond the training range",

@@ -1,7 +1,7 @@
 """Which patch: previous, next, its name, which opens the browser; save, rename, revert; its macros, body and room.
 
-Below them is its state: what lies outside the model's training, the octave of the computer's keys, the number of
-voices, and recording.
+Below them is its state: what lies outside the model's training, a Scala scale, what the computer's keys play, with
+their octave and velocity, the number of voices, and recording.
 """
 
 from __future__ import annotations
@@ -9,18 +9,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch
+from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch, TuningChoice
 from app.session.step_words import PATCH
 from app.views.controls.knob import Knob, KnobRange
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, plain_tip
+from engine.plain_text import one_line
 
 ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
+LONGEST_SCALE_NAME = 120  # characters
 COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
+KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
+    "pitch": ("Keys play pitches", "The computer's keys play the patch, as a piano's two rows"),
+    "place": ("Keys choose the place", "The computer's keys pluck the chosen preset at ten places along its string"),
+}
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
     "body.mix": ("mix", SHARE, "Mix of the body: 0 % the strings alone, 100 % the body alone"),
@@ -44,6 +51,10 @@ class PatchBar(QFrame):
     revert_asked = Signal()
     compare_asked = Signal(bool)  # whether keys are to play the saved patch
     record_asked = Signal()  # begin or end
+    recording_save_asked = Signal()  # one that is not saved yet
+    recording_discard_asked = Signal()
+    scala_remove_asked = Signal()  # the Scala scale and keyboard mapping of the patch
+    keys_play_asked = Signal(str)  # of KEYS_PLAY
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
     changed = Signal(str, float)  # a field of a patch and its new value
@@ -56,6 +67,8 @@ class PatchBar(QFrame):
         self.setAccessibleName("Patch")
         self._macros: tuple[Macro, ...] = ()
         self._compact = False
+        self._recorded_s: float | None = None
+        self._unsaved = 0
         self.knobs = {field: Knob(name, limits, tip) for field, (name, limits, tip) in _MIXES.items()}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
@@ -82,6 +95,7 @@ class PatchBar(QFrame):
         row.addLayout(turned)
         row.addWidget(vertical_rule())
         row.addLayout(self._build_sound())
+        self.show_keys_play("pitch", possible=True)  # now that each has a parent
 
     def _build_words(self) -> QVBoxLayout:
         previous = tool_button("◀", "Previous patch", "Previous patch in the browser's list")
@@ -132,13 +146,22 @@ class PatchBar(QFrame):
 
     def _build_state(self) -> QHBoxLayout:
         self.note = words_label()
-        lower = tool_button("−", "Octave down", "The computer's keys play an octave lower (Z)")
-        higher = tool_button("+", "Octave up", "The computer's keys play an octave higher (X)")
+        self.scala = tool_button("")
+        self.scala.setObjectName("solo")
+        self.scala.clicked.connect(self.scala_remove_asked)
+        self.scala.hide()
+        self._build_plays()
+        self._lower = lower = tool_button("−", "Octave down", "The computer's keys play an octave lower (Z)")
+        self._higher = higher = tool_button("+", "Octave up", "The computer's keys play an octave higher (X)")
         lower.clicked.connect(lambda: self.octave_asked.emit(-1))
         higher.clicked.connect(lambda: self.octave_asked.emit(1))
         self.octave = faint()
         self.octave.setToolTip("The lowest C on the computer's keys; C4 is middle C (Z, X)")
         self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.velocity = faint()
+        self.velocity.setToolTip("How hard the computer's keys strike, 1 … 127 (1 … 9; C softer, V harder)")
+        self.velocity.setMinimumWidth(72)
+        self.velocity.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.voices = faint("0 voices")
         self.voices.setToolTip("Number of strings that ring")
         self.voices.setMinimumWidth(62)
@@ -147,17 +170,41 @@ class PatchBar(QFrame):
         self.record.setCheckable(True)
         self.record.setObjectName("record")
         self.record.clicked.connect(self.record_asked)
+        self._unsaved_menu = QMenu(self.record)
+        for words, signal in (
+            ("Save the recording …", self.recording_save_asked),
+            ("Discard the recording", self.recording_discard_asked),
+        ):
+            self._unsaved_menu.addAction(words).triggered.connect(lambda _=False, signal=signal: signal.emit())
         for button in (lower, higher):
             button.setObjectName("chip")
         row = QHBoxLayout()
         row.setSpacing(4)
         row.addWidget(self.note, 1)
-        for widget in (lower, self.octave, higher, self.voices, self.record):
+        for widget in (self.scala, self.plays, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)
         self.show_octave(3)
+        self.show_velocity(90)
         self.show_recording(None)
         self.show_note("")
         return row
+
+    def _build_plays(self) -> None:
+        """What the computer's keys play: a menu of the two, under what it is."""
+        self.plays = tool_button("")
+        self.plays.setObjectName("chip")
+        self.plays.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self.plays)
+        menu.setToolTipsVisible(True)
+        group = QActionGroup(menu)
+        self._plays: dict[str, QAction] = {}
+        for key, (words, tip) in KEYS_PLAY.items():
+            action = self._plays[key] = menu.addAction(words)
+            action.setToolTip(tip)
+            action.setCheckable(True)
+            action.triggered.connect(lambda _=False, key=key: self.keys_play_asked.emit(key))
+            group.addAction(action)
+        self.plays.setMenu(menu)
 
     def _build_sound(self) -> QHBoxLayout:
         self.body = combo_box("Body", [("No body", "")])
@@ -216,6 +263,7 @@ class PatchBar(QFrame):
         self.compare.setEnabled(changed)
         self.rename.setEnabled(own)
         self._show_macros(patch.macros)
+        self._show_scala(patch.tuning)
         self.knobs["body.mix"].set_value(patch.body.mix)
         self.knobs["body.mix"].setEnabled(bool(patch.body.name))
         self.knobs["room.mix"].set_value(patch.room.mix)
@@ -240,6 +288,20 @@ class PatchBar(QFrame):
         self._before_macros.setVisible(bool(macros))
         self._share_width()
 
+    def _show_scala(self, tuning: TuningChoice) -> None:
+        """What of Scala tunes the patch; a click removes it."""
+        scale, keymap = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
+        parts = [part for part, there in (("Scale", scale), ("mapping" if scale else "Key mapping", keymap)) if there]
+        self.scala.setVisible(bool(parts))
+        if not parts:
+            return
+        self.scala.setText(f"{', '.join(parts)}  ✕")
+        self.scala.setAccessibleName("Remove the Scala tuning of the patch")
+        lines = [f"Tuned by the Scala scale: {_scale_name(tuning.scale) or 'without a name'}"] if scale else []
+        if keymap:
+            lines.append("A Scala keyboard mapping says which key plays which step, and gives the reference pitch")
+        self.scala.setToolTip(plain_tip("\n".join([*lines, "Click to go back to twelve equal steps"])))
+
     def _show_body(self, name: str) -> None:
         row = self.body.findData(name)
         if row < 0:  # its file is missing
@@ -256,15 +318,49 @@ class PatchBar(QFrame):
         """The octave of the lowest of the computer's keys."""
         self.octave.setText(f"from C{octave}")
 
+    def show_velocity(self, velocity: int) -> None:
+        """With which the computer's keys strike."""
+        self.velocity.setText(f"velocity {velocity}")
+
+    def show_keys_play(self, plays: str, possible: bool) -> None:
+        """What the computer's keys play, of KEYS_PLAY; `possible`: whether there is a patch for pitches."""
+        words, tip = KEYS_PLAY[plays]
+        self._plays[plays].setChecked(True)
+        self.plays.setText(f"{words}  ▾")
+        self.plays.setAccessibleName(words)
+        self.plays.setEnabled(possible)
+        self.plays.setToolTip(f"{tip}; click to change it" if possible else f"{tip}. Choose a patch to play pitches")
+        for widget in (self._lower, self.octave, self._higher, self.velocity):  # of pitches alone
+            widget.setVisible(plays == "pitch")
+
     def show_recording(self, seconds: float | None) -> None:
         """For how many seconds it has been recording; None: it is not."""
-        on = seconds is not None
-        self.record.setChecked(on)
-        self.record.setText(
-            f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}" if seconds is not None else "●  Record"
-        )
-        self.record.setAccessibleName("End recording" if on else "Record what is played")
-        self.record.setToolTip("End the recording and save it" if on else "Record what is played")
+        self._recorded_s = seconds
+        self._show_record()
+
+    def show_unsaved(self, recordings: int) -> None:
+        """How many recordings wait to be saved; while any does, the button saves or discards the latest."""
+        self._unsaved = recordings
+        self._show_record()
+
+    def _show_record(self) -> None:
+        seconds, button = self._recorded_s, self.record
+        on, waits = seconds is not None, seconds is None and self._unsaved > 0
+        button.setChecked(on)
+        if seconds is not None:
+            text = f"■  {int(seconds) // 60}:{int(seconds) % 60:02d}"
+            name, tip = "End recording", "End the recording and save it"
+        elif waits:
+            text, name = "●  Unsaved  ▾", "Recording that is not saved"
+            tip = "What was played is not saved yet: save it, or discard it to record again"
+        else:
+            text, name, tip = "●  Record", "Record what is played", "Record what is played"
+        button.setText(text)
+        button.setAccessibleName(name)
+        button.setToolTip(tip)
+        modes = QToolButton.ToolButtonPopupMode
+        button.setPopupMode(modes.InstantPopup if waits else modes.DelayedPopup)
+        button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
         """A warning: what lies outside the model's training; "" for none."""
@@ -275,6 +371,12 @@ class PatchBar(QFrame):
         self.note.style().polish(self.note)
         self.note.say(text)
         self.note.setToolTip(plain_tip(text))
+
+
+def _scale_name(scale: str) -> str:
+    """What a scale is called: the first line of a .scl file's text that is no comment; "" where that is empty."""
+    lines = (line for line in scale.splitlines() if not line.startswith("!"))
+    return one_line(next(lines, ""), LONGEST_SCALE_NAME)
 
 
 def _named(macro: Macro) -> tuple[str, list[str]]:

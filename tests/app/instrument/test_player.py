@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.instrument.events import MOD_WHEEL, SOUND_OFF, SUSTAIN, Bend, Controller, Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import (
+    MOD_WHEEL,
+    SOUND_OFF,
+    SUSTAIN,
+    Bend,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+)
 from app.instrument.loudness import k_weight
 from app.instrument.offline import render_events, render_note
 from app.instrument.player import Player, Struck
@@ -267,3 +278,36 @@ def test_a_note_can_be_stopped_while_it_is_rendered(patch: Patch, preset: Preset
 def test_a_preset_of_one_string_is_refused(patch: Patch) -> None:
     with pytest.raises(ValueError, match="knows one string only"):
         Player(patch, load_preset(SHIPPED / "studio_nylon_b3.safetensors"), RATE_HZ, lambda struck: None)
+
+
+def test_a_string_that_rings_is_heard_at_a_point_that_moves(patch: Patch, preset: Preset) -> None:
+    """As in the window, and in as many channels as it needs at any time."""
+    there, here = (changed(patch, pickup=Pickup(points=points)) for points in ((0.1, 0.2), (0.5,)))
+    both = changed(patch, pickup=Pickup(points=(0.5, 0.5)))
+    timed = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.3, PatchTurned(both))]
+    sound = np.concatenate(list(render_events(there, preset, timed, RATE_HZ, "model", 1.0, limited=False)))
+    assert sound.shape[1] == 2
+    assert np.abs(sound[:9_600, 0] - sound[:9_600, 1]).max() > 1e-3
+    np.testing.assert_allclose(sound[24_000:, 0], sound[24_000:, 1], atol=1e-6)
+    widened = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.3, PatchTurned(there))]
+    assert next(render_events(here, preset, widened, RATE_HZ, seconds=1.0)).shape[1] == 2
+
+
+def test_the_difference_is_that_of_model_and_truth_with_its_gain(patch: Patch, preset: Preset) -> None:
+    note, rendered = (TimedEvent(0.0, NoteOn(45, 120)),), {}
+    for source in ("model", "truth", "difference"):
+        blocks = render_events(
+            patch,
+            preset,
+            note,
+            RATE_HZ,
+            source,
+            0.5,
+            limited=False,
+            difference_gain_db=20.0 * (source == "difference"),
+        )
+        rendered[source] = np.concatenate(list(blocks)).astype(np.float64)
+    wanted = 10 * (rendered["model"] - rendered["truth"])
+    np.testing.assert_allclose(rendered["difference"], wanted, atol=1e-5)
+    with pytest.raises(ValueError, match="source must be model, truth or difference, not 'noise'"):
+        next(render_events(patch, preset, note, RATE_HZ, "noise"))

@@ -124,3 +124,25 @@ def test_a_preset_that_is_not_there_is_told(live: Live, patch: Patch, wait: Wait
     wait(lambda: bool(live.told))  # type: ignore[attr-defined]
     assert "gone" in live.told[0]  # type: ignore[attr-defined]
     assert live.handle(NoteOn(45, 60)) is None
+
+
+def test_a_full_recording_is_told_once(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.playing.live.LONGEST_RECORDING", 3)
+    live.begin_recording()
+    for _ in range(3):
+        live.handle(NoteOn(45, 60))
+        live.handle(NoteOff(45))
+    assert len(live.end_recording()) == 3
+    assert [line for line in live.told if "recording is full" in line] == live.told  # type: ignore[attr-defined]
+    assert len(live.told) == 1  # type: ignore[attr-defined]
+
+
+def test_the_pick_up_through_which_it_is_heard_is_recorded(live: Live, patch: Patch) -> None:
+    live.begin_recording()
+    live.handle(NoteOn(45, 60))
+    live.listen(Ear((0.1, 0.2), "velocity"))
+    turned = [each.event.patch.pickup for each in live.end_recording() if isinstance(each.event, PatchTurned)]
+    assert [(each.points, each.kind) for each in turned] == [
+        (EAR.points, EAR.pickup),
+        ((0.1, 0.2), "velocity"),
+    ]

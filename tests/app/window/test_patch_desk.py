@@ -6,33 +6,18 @@ import shutil
 from pathlib import Path
 
 import pytest
-import soundfile
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QInputDialog
+from PySide6.QtWidgets import QInputDialog
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import midi_bytes, read_midi
+from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
-from app.patches.patch import Patch
+from app.patches.patch import Macro, Patch, Pickup, Target, TuningChoice
 from app.window.controller import Controller
-from engine.presets.finding import SHIPPED
+from app.window.patch_desk import NOTE_TOLD_AFTER_MS, PLACES
 from engine.presets.of_string import STRINGS, read_string
-
-
-@pytest.fixture
-def played(
-    qtbot: QtBot, preset_folder: Path, controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Controller:
-    """With a patch, and the preset that plays it."""
-    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
-    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
-    controller.library.refresh()
-    controller.patches.choose("steel_string_acoustic")
-    qtbot.waitUntil(lambda: controller.performance.live.ready, timeout=20_000)
-    controller.window.setFocus()
-    return controller
 
 
 def press(qtbot: QtBot, controller: Controller, key: Qt.Key) -> None:
@@ -180,64 +165,140 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     assert "bad.mid" in told[0]
 
 
-def test_what_is_played_is_recorded_as_wav_and_midi(
-    qtbot: QtBot, played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told: list[str] = []
-    informed: list[str] = []
-    played.patches.told.connect(told.append)
-    played.patches.informed.connect(informed.append)
-    played.patches.record()
-    played.patches.record()
-    assert "Nothing was played" in told[0]
-    played.patches.record()
-    played.window.instrument.pressed.emit(60, 100)
-    played.window.instrument.released.emit(60)
-    out = tmp_path / "take.wav"
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(out), ""))
-    played.patches.record()
-    qtbot.waitUntil(lambda: len(informed) == 1, timeout=60_000)
-    assert str(out) in informed[0]
-    assert len(told) == 1  # to have written it is no error
-    sound, rate_hz = soundfile.read(out)
-    assert rate_hz == 48_000
-    assert 0.001 < abs(sound).max() < 1
-    assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
-    played.patches.write(tmp_path / "absent" / "take.wav", [TimedEvent(0.0, NoteOn(60, 100))])
-    qtbot.waitUntil(lambda: len(told) == 2, timeout=60_000)
-    assert "absent" in told[1]
-
-
-def test_a_recording_replaces_no_file_that_nobody_asked_about(
-    qtbot: QtBot, played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "song.mid").write_bytes(b"mine")
-    (tmp_path / "take.wav").write_bytes(b"mine")
-    names = iter(["song.wav", "take", "take 1.5"])
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(tmp_path / next(names)), ""))
-    told: list[str] = []
-    informed: list[str] = []
-    played.patches.told.connect(told.append)
-    played.patches.informed.connect(informed.append)
-    played.patches.record()
-    played.window.instrument.pressed.emit(60, 100)
-    played.window.instrument.released.emit(60)
-    played.patches.record()
-    qtbot.waitUntil(lambda: len(informed) == 1, timeout=60_000)
-    assert "song.mid exists already" in told[0]
-    assert "take.wav exists already" in told[1]
-    assert (tmp_path / "song.mid").read_bytes() == (tmp_path / "take.wav").read_bytes() == b"mine"
-    assert {path.name for path in tmp_path.glob("take 1.5*")} == {"take 1.5.wav", "take 1.5.mid"}
-
-
-def test_what_is_beyond_training_is_told(qtbot: QtBot, played: Controller) -> None:
-    notes: list[str] = []
+def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, played: Controller) -> None:
     bar = played.window.instrument.bar
-    show, bar.show_note = bar.show_note, lambda text: (notes.append(text), show(text))  # type: ignore[method-assign]
+
+    def told(beyond: bool) -> None:
+        qtbot.waitUntil(lambda: ("inharmonicity" in bar.note.toolTip()) == beyond, timeout=5_000)
+
     played.patches.change("knobs.stiffness", 10.0)
     played.patches.change("knobs.gauge", 3.0)
+    assert not bar.note.toolTip()  # nothing was struck
     played.window.instrument.pressed.emit(80, 100)
-    qtbot.waitUntil(lambda: bool(notes) and "outside the trained" in notes[-1], timeout=5_000)
+    told(True)
+    played.patches.change("knobs.decay", 1.5)
+    told(True)
+    qtbot.wait(2 * NOTE_TOLD_AFTER_MS)
+    told(True)
+    played.patches.change("knobs.stiffness", 1.0)
+    played.patches.change("knobs.gauge", 1.0)
+    told(False)
+    played.patches.change("knobs.gauge", 3.0)
+    played.patches.change("knobs.stiffness", 10.0)
+    told(True)  # before the next key
+    played.session.update(keys_play="place")
+    assert bar.note.toolTip() == PLACES
+    played.session.update(keys_play="pitch")
+    assert not bar.note.toolTip()
+    played.window.instrument.pressed.emit(80, 100)
+    told(True)
+    played.patches.choose("concert_harp")
+    assert not bar.note.toolTip()
+    qtbot.wait(2 * NOTE_TOLD_AFTER_MS)
+    assert not bar.note.toolTip()
+
+
+def test_the_transport_changes_where_the_patch_is_heard(played: Controller) -> None:
+    transport, before = played.window.transport, played.session.choices
+    transport._velocity.click()
+    transport._stereo.setChecked(not before.stereo)
+    played.session.move_listening_point(0.21)
+    patch = played.session.choices.patch
+    assert patch is not None
+    assert patch.pickup.kind == "velocity"
+    assert (len(patch.pickup.points) == 2) is not before.stereo
+    assert patch.pickup.points[0] == 0.21
+    assert played.window.instrument.bar.save.isEnabled()
+    assert heard(played) == patch
+    played.patches.choose("concert_harp")
+    harp = read_patch(PATCHES / "concert_harp.json")
+    assert transport._velocity.isChecked() == (harp.pickup.kind == "velocity")
+    assert transport._stereo.isChecked() == (len(harp.pickup.points) == 2)
+
+
+def test_why_a_patch_stays_in_stereo_is_told(played: Controller) -> None:
+    patch = played.session.choices.patch
+    assert patch is not None
+    macro = Macro(name="Width", targets=(Target(field="pickup.points.1", low=0.5, high=0.9),))
+    wide = patch.model_copy(update={"pickup": Pickup(points=(0.2, 0.8)), "macros": (macro,)})
+    played.session.update(patch=wide)
+    played.window.transport._stereo.click()
+    assert played.window.transport._stereo.isChecked()
+    assert "stays in stereo: its macro Width" in played.window.notices.text
+
+
+def test_a_patch_that_is_there_already_is_heard_with_its_changes(played: Controller) -> None:
+    entry = played.patches.entry
+    assert entry is not None
+    played.patches.change("knobs.decay", 3.0)
+    changed = played.session.choices.patch
+    played.patches.audition(entry.name)
+    assert played.session.choices.patch == changed
+    played.patches.audition("concert_harp")
+    assert played.session.choices.patch == read_patch(PATCHES / "concert_harp.json")
+
+
+def test_a_switch_chooses_what_keys_play_and_is_remembered(qtbot: QtBot, played: Controller) -> None:
+    """Also of the preset that plays the patch."""
+    bar = played.window.instrument.bar
+    assert bar.plays.text().startswith("Keys play pitches")
+    bar._plays["place"].trigger()
+    assert bar.plays.text().startswith("Keys choose the place")
+    assert played.session.choices.preset == "studio_any_string"
+    assert played.settings().choices.keys_play == "place"
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding() == {}
+    assert played.performance.notes.ringing == 1
+    bar._plays["pitch"].trigger()
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding().keys() == {48}
+
+
+def test_the_strip_shows_the_velocity_of_the_computers_keys(qtbot: QtBot, played: Controller) -> None:
+    label = played.window.instrument.bar.velocity
+    assert label.text() == f"velocity {played.session.choices.velocity}"
+    press(qtbot, played, Qt.Key.Key_9)
+    assert label.text() == "velocity 127"
+    assert label.isVisible()
+    played.session.update(keys_play="place")  # the amplitude of the transport counts
+    assert not label.isVisible()
+
+
+def test_keys_say_once_that_they_do_not_play_another_preset(played: Controller) -> None:
+    informed: list[str] = []
+    played.patches.informed.connect(informed.append)
+    keys = played.window.instrument.keys
+    played.session.update(a="preset:second", heard="a")
+    assert len(informed) == 1
+    assert "Keys sound with the model of their patch" in informed[0]
+    assert keys._source == "model"
+    played.session.switch_source()
+    assert keys._source == "truth"
+    played.session.switch_source()
+    played.patches.change("knobs.decay", 2.0)
+    assert len(informed) == 1
+    played.session.update(keys_play="place")
+    assert keys._source == "preset:second"
+    played.session.update(keys_play="pitch", a="preset:first")
+    assert len(informed) == 2
+
+
+def test_a_scala_scale_is_shown_and_removed(played: Controller) -> None:
+    bar, patch = played.window.instrument.bar, played.session.choices.patch
+    assert patch is not None
+    assert not bar.scala.isVisible()
+    scale = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
+    tuned = patch.model_copy(update={"tuning": TuningChoice(a4_hz=432.0, scale=scale)})
+    played.session.update(patch=tuned)
+    assert bar.scala.isVisible()
+    assert "Five equal steps" in bar.scala.toolTip()
+    bar.scala.click()
+    assert not bar.scala.isVisible()
+    now = played.session.choices.patch
+    assert now is not None
+    assert now.tuning == TuningChoice(a4_hz=432.0)
+    played.history.undo()
+    assert played.session.choices.patch == tuned
 
 
 def heard(played: Controller) -> Patch:

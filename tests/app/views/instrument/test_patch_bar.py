@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Macro, Patch, Target
+from app.patches.patch import Macro, Patch, Target, TuningChoice
 from app.views.instrument.patch_bar import PatchBar
 
 LEFT = Qt.MouseButton.LeftButton
@@ -99,9 +99,58 @@ def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
     assert not bar.record.isChecked()
     bar.show_octave(-1)
     assert bar.octave.text() == "from C-1"
+    bar.show_velocity(17)
+    assert bar.velocity.text() == "velocity 17"
     bar.show_note("Beyond training: stiffness")
     assert bar.note.objectName() == "warning"
     with qtbot.waitSignal(bar.octave_asked) as told:
         (higher,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == "Octave up")
         qtbot.mouseClick(higher, LEFT)
     assert told.args == [1]
+
+
+def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, bar: PatchBar) -> None:
+    for plays, words in (("place", "Keys choose the place"), ("pitch", "Keys play pitches")):
+        with qtbot.waitSignal(bar.keys_play_asked) as told:
+            bar._plays[plays].trigger()
+        assert told.args == [plays]
+        bar.show_keys_play(plays, possible=True)
+        assert bar.plays.text().startswith(words)
+        assert bar.octave.isVisible() == bar.velocity.isVisible() == (plays == "pitch")
+    bar.show_keys_play("place", possible=False)
+    assert not bar.plays.isEnabled()
+    assert "Choose a patch" in bar.plays.toolTip()
+
+
+def test_the_record_button_saves_or_discards_what_is_not_saved(qtbot: QtBot, bar: PatchBar) -> None:
+    bar.show_unsaved(1)
+    assert bar.record.text().startswith("●  Unsaved")
+    for action, signal in zip(bar._unsaved_menu.actions(), ("save", "discard"), strict=True):
+        with qtbot.waitSignal(getattr(bar, f"recording_{signal}_asked")):
+            action.trigger()
+    bar.show_recording(3.0)  # another was begun before the first turned out not to be written
+    assert bar.record.text() == "■  0:03"
+    assert bar.record.menu() is None
+    bar.show_recording(None)
+    bar.show_unsaved(0)
+    assert bar.record.text() == "●  Record"
+    with qtbot.waitSignal(bar.record_asked):
+        qtbot.mouseClick(bar.record, LEFT)
+
+
+def test_scala_is_shown_by_name_and_can_be_removed(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
+    scale = "! a.scl\n!\nTwo <b>halves</b>\n 2\n!\n 600.\n 2/1\n"
+    keymap = "2\n0\n127\n60\n69\n440\n2\n0\n1\n"
+    for tuning, text in (
+        ({"scale": scale}, "Scale  ✕"),
+        ({"keymap": keymap}, "Key mapping  ✕"),
+        ({"scale": scale, "keymap": keymap}, "Scale, mapping  ✕"),
+    ):
+        bar.show_patch(guitar.model_copy(update={"tuning": TuningChoice(**tuning)}), own=True)
+        assert (bar.scala.text(), bar.scala.isVisible()) == (text, True)
+        assert ("halves" in bar.scala.toolTip()) == ("scale" in tuning)
+        assert "<b>" not in bar.scala.toolTip()
+    with qtbot.waitSignal(bar.scala_remove_asked):
+        qtbot.mouseClick(bar.scala, LEFT)
+    bar.show_patch(guitar, own=True)
+    assert not bar.scala.isVisible()

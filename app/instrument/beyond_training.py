@@ -1,0 +1,36 @@
+"""What of a note lies outside the training of the model that plays it, also after a knob was turned."""
+
+from __future__ import annotations
+
+import contextlib
+
+from app.instrument.events import NoteOn
+from app.instrument.loud_keys import on_string
+from app.instrument.strings import Strings
+from app.patches.patch import Patch
+from engine.pluck import Pluck
+from engine.presets import PresetInfo, outside_training
+from engine.presets.of_string import info_of_string
+from engine.resonators.string import StringParameters
+
+
+def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn) -> list[str]:
+    """As `outside_of_string`, of what a key would sound with; empty for a key without a possible string.
+
+    Wheels and slides are left out.
+    """
+    try:
+        found = Strings(patch).of_key(event.key)
+    except ValueError:
+        found = None
+    if found is None:
+        return []
+    return outside_of_string(info, found.parameters, on_string(found, patch.pluck.pluck(event.velocity)))
+
+
+def outside_of_string(info: PresetInfo, string: StringParameters, pluck: Pluck) -> list[str]:
+    """How a string and its pluck differ from what a preset was trained on, in plain words; empty where not."""
+    if info.family is not None:
+        with contextlib.suppress(ValueError):  # it cannot play that one; its own string is judged
+            info = info_of_string(info, string)
+    return outside_training(info, pluck)

@@ -1,0 +1,133 @@
+"""What is played through the patch, recorded and written as files; what is not saved yet is kept."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QFileDialog
+
+from app.export.played import Played, recorded_files, write_recorded
+from app.instrument.events import PatchTurned
+from app.playing.live import Live
+from app.presets.library import Library
+from app.session.choices import Session
+from app.session.slots import other_preset
+from app.shared.whole_file import WriteError
+from app.views.instrument.patch_bar import PatchBar
+from engine.presets import PresetError, load_preset
+
+FILES = "WAV and MIDI (*.wav)"
+WAIT_S = 30.0  # for files that are being written, when the window is closed
+
+
+class Recordings(QObject):
+    """Lives in the window's thread, as long as the window. The button of `bar` records, ends, saves and discards.
+
+    A recording is kept until it is written or discarded; while one is, no other begins.
+    """
+
+    told = Signal(str)  # an error, for the user
+    informed = Signal(str)  # what went well
+    _written, _not_written = Signal(str), Signal(object, str)  # from the thread that writes
+
+    def __init__(self, session: Session, library: Library, live: Live, bar: PatchBar, parent: QObject) -> None:
+        super().__init__(parent)
+        self._session, self._library, self._live, self._bar = session, library, live, bar
+        self._began_s = 0.0
+        self._unsaved: list[Played] = []
+        self._writers: list[threading.Thread] = []
+        bar.record_asked.connect(self.record)
+        bar.recording_save_asked.connect(self.save)
+        bar.recording_discard_asked.connect(self.discard)
+        self._written.connect(self.informed, Qt.ConnectionType.QueuedConnection)
+        self._not_written.connect(self._take_back, Qt.ConnectionType.QueuedConnection)
+
+    def record(self) -> None:
+        """Begins to record; or ends it and asks for a file, as it does for a recording that is not saved yet."""
+        if self._live.recording:
+            self._end()
+        elif self._unsaved:
+            self.save()
+        else:
+            self._live.begin_recording()
+            self._began_s = time.monotonic()
+
+    def save(self) -> None:
+        """Asks for a file for the latest recording. Without one, the recording is kept."""
+        if not self._unsaved:
+            return
+        played = self._unsaved[-1]
+        name = f"{played.patch.name}.wav"
+        while name:
+            name, _ = QFileDialog.getSaveFileName(self._bar, "Save what was played", name, FILES)
+            if not name:
+                return
+            taken = [each for each in recorded_files(Path(name)) if each.exists() and each != Path(name)]
+            if not taken:  # the dialog has asked for the name itself alone
+                self.write(Path(name), played)
+                return
+            self.told.emit(f"{taken[0]} exists already; choose another name.")
+
+    def discard(self) -> None:
+        """Forgets the latest recording."""
+        if self._unsaved:
+            self._unsaved.pop()
+            self._show_unsaved()
+
+    def write(self, path: Path, played: Played) -> None:
+        """Writes WAV and MIDI of one name in a thread; a recording that could not be written is kept."""
+        if played in self._unsaved:
+            self._unsaved.remove(played)
+            self._show_unsaved()
+        entry = self._library.find(played.patch.preset)
+        if entry is None:
+            self._take_back(played, f"The preset {played.patch.preset}, which plays the patch, was not found.")
+            return
+        preset_file = entry.path
+
+        def work() -> None:
+            try:
+                self._written.emit(write_recorded(path, played, load_preset(preset_file)))
+            except (ValueError, PresetError, WriteError, OSError) as error:
+                self._not_written.emit(played, str(error).splitlines()[0])
+
+        thread = threading.Thread(target=work, name="performance-writer", daemon=True)
+        self._writers = [*(each for each in self._writers if each.is_alive()), thread]
+        thread.start()
+
+    def tick(self, now_s: float) -> None:
+        """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
+        if self._live.recording:
+            self._bar.show_recording(now_s - self._began_s)
+
+    def close(self) -> None:
+        """Waits until files are written, WAIT_S at most; may be called again."""
+        until_s = time.monotonic() + WAIT_S
+        for thread in self._writers:
+            thread.join(max(0.0, until_s - time.monotonic()))
+
+    def _end(self) -> None:
+        events = self._live.end_recording()
+        self._bar.show_recording(None)
+        patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
+        patch = patches[0] if patches else self._session.choices.patch
+        if not events or patch is None:
+            self.told.emit("Nothing was played, so nothing was recorded.")
+            return
+        choices = self._session.choices
+        source = "model" if other_preset(choices.source_heard) else choices.source_heard
+        self._unsaved.append(Played(patch, tuple(events), source, choices.difference_gain_db))
+        self._show_unsaved()
+        self.save()
+
+    def _take_back(self, played: Played, message: str) -> None:
+        """What could not be written is kept."""
+        self._unsaved.append(played)
+        self._show_unsaved()
+        self.told.emit(f"{message.rstrip('.')}. The recording is kept: save it by the button that records.")
+
+    def _show_unsaved(self) -> None:
+        self._bar.show_unsaved(len(self._unsaved))

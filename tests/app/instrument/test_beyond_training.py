@@ -1,0 +1,19 @@
+"""What lies outside the training is told of the string as the knobs have it."""
+
+from __future__ import annotations
+
+from app.instrument.beyond_training import outside_of_key
+from app.instrument.events import NoteOn
+from app.patches.patch import Knobs, Patch
+from engine.presets import Preset
+
+
+def test_a_key_is_judged_with_the_knobs_of_the_patch(patch: Patch, preset: Preset) -> None:
+    key = NoteOn(57, 60)
+    assert "decay time" in "; ".join(outside_of_key(preset.info, patch, key))
+    shorter = patch.model_copy(update={"knobs": Knobs(decay=20.0)})
+    assert "decay time" not in "; ".join(outside_of_key(preset.info, shorter, key))
+
+
+def test_a_key_without_a_string_has_nothing_to_be_told(patch: Patch, preset: Preset) -> None:
+    assert outside_of_key(preset.info, patch.model_copy(update={"range": (60, 72)}), NoteOn(40, 60)) == []

@@ -1,0 +1,173 @@
+"""What is played is recorded as it is heard; it is kept until it is written or discarded."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from PySide6.QtWidgets import QFileDialog
+from pytestqt.qtbot import QtBot
+
+from app.export.played import Played
+from app.instrument.events import NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.midi_file import read_midi
+from app.window import recordings as module
+from app.window.controller import Controller
+
+
+class Told:
+    """What the user is told, and answers to the question for a file: paths, and "" for Cancel."""
+
+    def __init__(self, played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.errors: list[str] = []
+        self.good: list[str] = []
+        self.answers: list[Path | str] = []
+        played.patches.told.connect(self.errors.append)
+        played.patches.informed.connect(self.good.append)
+        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(self.answers.pop(0)), ""))
+
+
+@pytest.fixture
+def told(played: Controller, monkeypatch: pytest.MonkeyPatch) -> Told:
+    return Told(played, monkeypatch)
+
+
+def play(played: Controller, key: int = 60) -> None:
+    played.window.instrument.pressed.emit(key, 100)
+    played.window.instrument.released.emit(key)
+
+
+def record(played: Controller) -> None:
+    """A short note, from the click on the button to the end."""
+    played.patches.recordings.record()
+    play(played)
+    played.patches.recordings.record()
+
+
+def test_what_is_played_is_recorded_as_wav_and_midi(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+) -> None:
+    recordings = played.patches.recordings
+    recordings.record()
+    recordings.record()
+    assert "Nothing was played" in told.errors[0]
+    out = tmp_path / "take.wav"
+    told.answers = [out]
+    record(played)
+    qtbot.waitUntil(lambda: len(told.good) == 1, timeout=60_000)
+    assert str(out) in told.good[0]
+    assert "of the model" in told.good[0]
+    assert len(told.errors) == 1  # to have written it is no error
+    sound, rate_hz = soundfile.read(out)
+    assert rate_hz == 48_000
+    assert 0.001 < abs(sound).max() < 1
+    assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+
+
+def test_a_recording_replaces_no_file_that_nobody_asked_about(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+) -> None:
+    (tmp_path / "song.mid").write_bytes(b"mine")
+    (tmp_path / "take.wav").write_bytes(b"mine")
+    told.answers = [tmp_path / name for name in ("song.wav", "take", "take 1.5")]
+    record(played)
+    qtbot.waitUntil(lambda: len(told.good) == 1, timeout=60_000)
+    assert "song.mid exists already" in told.errors[0]
+    assert "take.wav exists already" in told.errors[1]
+    assert (tmp_path / "song.mid").read_bytes() == (tmp_path / "take.wav").read_bytes() == b"mine"
+    assert {path.name for path in tmp_path.glob("take 1.5*")} == {"take 1.5.wav", "take 1.5.mid"}
+
+
+def test_a_cancelled_recording_is_kept_until_it_is_saved_or_discarded(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+) -> None:
+    bar, live = played.window.instrument.bar, played.performance.live
+    told.answers = [""]
+    record(played)
+    assert "Unsaved" in bar.record.text()
+    save, discard = bar._unsaved_menu.actions()
+    played.patches.choose("concert_harp")  # it was played by the other one
+    told.answers = ["", tmp_path / "kept.wav"]
+    save.trigger()
+    played.patches.recordings.record()  # asks again, and records nothing over it
+    assert not live.recording
+    assert "Unsaved" not in bar.record.text()
+    qtbot.waitUntil(lambda: len(told.good) == 1, timeout=60_000)
+    assert (tmp_path / "kept.wav").exists()
+    told.answers = [""]
+    record(played)
+    discard.trigger()
+    assert "Record" in bar.record.text()
+    assert bar.record.menu() is None
+    bar.record.click()
+    assert live.recording
+    assert not told.errors
+
+
+def test_a_recording_that_cannot_be_written_is_kept(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+) -> None:
+    told.answers = [tmp_path / "absent" / "take.wav", tmp_path / "take.wav"]
+    record(played)
+    qtbot.waitUntil(lambda: len(told.errors) == 1, timeout=60_000)
+    assert "absent" in told.errors[0]
+    assert "is kept" in told.errors[0]
+    assert "Unsaved" in played.window.instrument.bar.record.text()
+    played.patches.recordings.save()
+    qtbot.waitUntil(lambda: len(told.good) == 1, timeout=60_000)
+
+
+@pytest.mark.parametrize("button", ["_velocity", "_stereo"])
+def test_it_is_recorded_as_it_is_heard(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, button: str
+) -> None:
+    """Not as the patch was saved."""
+    told.answers = [tmp_path / "before.wav", tmp_path / "after.wav"]
+    played.patches.change("knobs.decay", 10.0)
+    for turn in (lambda: None, getattr(played.window.transport, button).click):
+        turn()
+        played.patches.recordings.record()
+        played.window.instrument.pressed.emit(60, 100)  # and held: when it is let go would differ
+        played.patches.recordings.record()
+        played.window.instrument.released.emit(60)
+    qtbot.waitUntil(lambda: len(told.good) == 2, timeout=60_000)
+    before, after = (soundfile.read(tmp_path / name, always_2d=True)[0] for name in ("before.wav", "after.wav"))
+    assert before.shape[1] == after.shape[1] == 2
+    side = {"_velocity": 0, "_stereo": 1}[button]  # the left one stays where it was
+    assert np.abs(before[:4_800, side] - after[:4_800, side]).max() > 0.05 * np.abs(before).max()
+
+
+@pytest.mark.parametrize(("source", "words"), [("truth", "the truth"), ("difference", "at +40 dB")])
+def test_the_source_that_was_heard_is_written(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, source: str, words: str
+) -> None:
+    played.session.update(a=source, heard="a", difference_gain_db=40.0)
+    told.answers = [tmp_path / "take.wav"]
+    record(played)
+    qtbot.waitUntil(lambda: len(told.good) == 1, timeout=60_000)
+    assert words in told.good[0]
+
+
+def test_closing_the_window_waits_until_it_is_written(
+    played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, done = threading.Event(), []
+
+    def write(path: Path, *_: object) -> str:
+        begun.set()
+        time.sleep(0.3)
+        done.append(path)
+        return ""
+
+    monkeypatch.setattr(module, "write_recorded", write)
+    patch = played.session.choices.patch
+    assert patch is not None
+    events = (TimedEvent(0.0, PatchTurned(patch)), TimedEvent(0.0, NoteOn(60, 100)))
+    played.patches.recordings.write(tmp_path / "take.wav", Played(patch, events))
+    assert begun.wait(20)
+    played.window.close()
+    assert done == [tmp_path / "take.wav"]
