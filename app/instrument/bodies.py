@@ -20,7 +20,7 @@ from app.presets.folders import user_folder
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine.effects import BODIES, Impulse
 
-TITLES = {"guitar": "Guitar body"}  # of the engine's bodies
+TITLES = {"guitar": "Guitar"}  # of the engine's bodies
 ENDINGS = (".wav", ".flac", ".aif", ".aiff")
 _NAME: TypeAdapter[str] = TypeAdapter(Reference)
 

@@ -51,8 +51,7 @@ AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 NOTE_TOLD_AFTER_MS = 150
 MANY_STRINGS = "studio_any_string"
-PLACES = "The computer's keys pluck the chosen preset at ten places along its string"
-NO_PATCH = f"{PLACES}; choose a patch to play pitches"
+NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
 MIDI_FILES = (".mid", ".midi")
 STRING_FILE = ".toml"
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
@@ -108,7 +107,7 @@ class PatchDesk(QObject):
         bar.revert_asked.connect(self.revert)
         bar.compare_asked.connect(self.compare)
         bar.scala_remove_asked.connect(self.remove_scala)
-        bar.keys_play_asked.connect(lambda plays: self._session.update(keys_play=plays))
+        panel.keys_play_asked.connect(lambda plays: self._session.update(keys_play=plays))
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
         bar.changed.connect(self.change)
@@ -341,7 +340,7 @@ class PatchDesk(QObject):
             choices, pitches = self._session.choices, self._instruments.plays_pitches
             self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
             self._panel.bar.show_velocity(choices.velocity)
-            self._panel.bar.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
+            self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
         if names & {"keys_play", "patch"}:
             self._judge_anew()
@@ -380,16 +379,14 @@ class PatchDesk(QObject):
             self.show_played()
             return
         self._note_timer.stop()
-        self._panel.bar.show_note(self._keys_words())
+        self._say("")
 
     def _show_latest_note(self) -> None:
-        self._panel.bar.show_note("; ".join(self._outside()) or self._keys_words())
+        self._say("; ".join(self._outside()))
 
-    def _keys_words(self) -> str:
-        """What the computer's keys do, where they play no pitches; else ""."""
-        if self._instruments.plays_pitches:
-            return ""
-        return NO_PATCH if self.patch is None else PLACES
+    def _say(self, outside: str) -> None:
+        """In the bar: what is outside the training, else how pitches are had where there is no patch."""
+        self._panel.bar.show_note(outside or ("" if self.patch is not None else NO_PATCH))
 
     def _outside(self) -> list[str]:
         """What of the latest note, with the present knobs, lies outside the training of its model."""

@@ -1,12 +1,21 @@
-"""The instrument's strip: the patch bar, the string's knobs (if shown), and the keys or the neck."""
+"""The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtGui import QAction, QActionGroup, QResizeEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QMenu,
+    QSizePolicy,
+    QStackedWidget,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
@@ -20,6 +29,11 @@ from app.views.instrument.string_knobs import StringKnobs
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
 FOLD_TIP, NO_ROOM = "Show or hide the knobs of the string", "The window is too low for the knobs of the string"
 ROOMY = 1320  # pixels: in a narrower window the bar is compact
+PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
+KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
+    "pitch": ("Keys play pitches", "The computer's keys play the patch, as a piano's two rows"),
+    "place": ("Keys choose the place", "The computer's keys pluck the chosen preset at ten places along its string"),
+}
 _SURFACES = (
     ("keys", "Keys", "Show a piano's keyboard"),
     ("neck", "Strings", "Show the strings and where they are stopped"),
@@ -32,6 +46,7 @@ class InstrumentPanel(QFrame):
     pressed = Signal(int, int)  # key, velocity
     released = Signal(int)
     surface_changed = Signal()  # of `surface` or `unfolded`
+    keys_play_asked = Signal(str)  # of KEYS_PLAY
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,6 +66,7 @@ class InstrumentPanel(QFrame):
         self._fold.setCheckable(True)
         self._fold.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._fold.toggled.connect(self.set_unfolded)
+        self._build_plays()
         self._low = (False, False)
         self._hint = Label(HINTS["keys"], self)
         self._hint.setObjectName("hint")
@@ -68,6 +84,7 @@ class InstrumentPanel(QFrame):
         side.setSpacing(4)
         side.addWidget(self._choice)
         side.addWidget(self._fold)
+        side.addWidget(self.plays)
         side.addStretch(1)
         below = QHBoxLayout()
         below.setSpacing(8)
@@ -82,6 +99,26 @@ class InstrumentPanel(QFrame):
         column.addLayout(below)
         self._stack.installEventFilter(self)
         self._hint.installEventFilter(self)
+        self.show_keys_play("pitch", possible=True)
+
+    def _build_plays(self) -> None:
+        """What the computer's keys play: a menu of the two, under what it is."""
+        self.plays = tool_button("")
+        self.plays.setObjectName("chip")
+        self.plays.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.plays.setMinimumWidth(PLAYS_WIDTH)
+        self.plays.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self.plays)
+        menu.setToolTipsVisible(True)
+        group = QActionGroup(menu)
+        self._plays: dict[str, QAction] = {}
+        for key, (words, tip) in KEYS_PLAY.items():
+            action = self._plays[key] = menu.addAction(words)
+            action.setToolTip(tip)
+            action.setCheckable(True)
+            action.triggered.connect(lambda _=False, key=key: self.keys_play_asked.emit(key))
+            group.addAction(action)
+        self.plays.setMenu(menu)
 
     # What is shown
 
@@ -132,6 +169,16 @@ class InstrumentPanel(QFrame):
     def set_octave(self, octave: int) -> None:
         """The octave of the lowest of the computer's keys; C4 is middle C."""
         self.bar.show_octave(octave)
+
+    def show_keys_play(self, plays: str, possible: bool) -> None:
+        """What the computer's keys play, of KEYS_PLAY; `possible`: whether there is a patch for pitches."""
+        words, tip = KEYS_PLAY[plays]
+        self._plays[plays].setChecked(True)
+        self.plays.setText(f"{words}  ▾")
+        self.plays.setAccessibleName(words)
+        self.plays.setEnabled(possible)
+        self.plays.setToolTip(f"{tip}; click to change it" if possible else f"{tip}. Choose a patch to play pitches")
+        self.bar.show_pitches(plays == "pitch")
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
         """What is printed on the computer's keys, by the MIDI key that each plays."""

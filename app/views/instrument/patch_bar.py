@@ -1,7 +1,7 @@
 """Which patch: previous, next, its name, which opens the browser; save, rename, revert; its macros, body and room.
 
-Below them is its state: what lies outside the model's training, a Scala scale, what the computer's keys play, with
-their octave and velocity, the number of voices, and recording.
+Below them is its state: what lies outside the model's training, a Scala scale, octave and velocity of the
+computer's keys, the number of voices, and recording.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch, TuningChoice
@@ -24,10 +23,6 @@ ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
 LONGEST_SCALE_NAME = 120  # characters
 COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
-KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
-    "pitch": ("Keys play pitches", "The computer's keys play the patch, as a piano's two rows"),
-    "place": ("Keys choose the place", "The computer's keys pluck the chosen preset at ten places along its string"),
-}
 SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
 _MIXES = {  # field of a patch -> (label, range, tip)
     "body.mix": ("mix", SHARE, "Mix of the body: 0 % the strings alone, 100 % the body alone"),
@@ -54,7 +49,6 @@ class PatchBar(QFrame):
     recording_save_asked = Signal()  # one that is not saved yet
     recording_discard_asked = Signal()
     scala_remove_asked = Signal()  # the Scala scale and keyboard mapping of the patch
-    keys_play_asked = Signal(str)  # of KEYS_PLAY
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
     changed = Signal(str, float)  # a field of a patch and its new value
@@ -95,7 +89,6 @@ class PatchBar(QFrame):
         row.addLayout(turned)
         row.addWidget(vertical_rule())
         row.addLayout(self._build_sound())
-        self.show_keys_play("pitch", possible=True)  # now that each has a parent
 
     def _build_words(self) -> QVBoxLayout:
         previous = tool_button("◀", "Previous patch", "Previous patch in the browser's list")
@@ -146,11 +139,10 @@ class PatchBar(QFrame):
 
     def _build_state(self) -> QHBoxLayout:
         self.note = words_label()
-        self.scala = tool_button("")
+        self.scala = tool_button("Scala  ✕", "Remove the Scala tuning of the patch")
         self.scala.setObjectName("solo")
         self.scala.clicked.connect(self.scala_remove_asked)
         self.scala.hide()
-        self._build_plays()
         self._lower = lower = tool_button("−", "Octave down", "The computer's keys play an octave lower (Z)")
         self._higher = higher = tool_button("+", "Octave up", "The computer's keys play an octave higher (X)")
         lower.clicked.connect(lambda: self.octave_asked.emit(-1))
@@ -181,30 +173,13 @@ class PatchBar(QFrame):
         row = QHBoxLayout()
         row.setSpacing(4)
         row.addWidget(self.note, 1)
-        for widget in (self.scala, self.plays, lower, self.octave, higher, self.velocity, self.voices, self.record):
+        for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)
         self.show_octave(3)
         self.show_velocity(90)
         self.show_recording(None)
         self.show_note("")
         return row
-
-    def _build_plays(self) -> None:
-        """What the computer's keys play: a menu of the two, under what it is."""
-        self.plays = tool_button("")
-        self.plays.setObjectName("chip")
-        self.plays.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        menu = QMenu(self.plays)
-        menu.setToolTipsVisible(True)
-        group = QActionGroup(menu)
-        self._plays: dict[str, QAction] = {}
-        for key, (words, tip) in KEYS_PLAY.items():
-            action = self._plays[key] = menu.addAction(words)
-            action.setToolTip(tip)
-            action.setCheckable(True)
-            action.triggered.connect(lambda _=False, key=key: self.keys_play_asked.emit(key))
-            group.addAction(action)
-        self.plays.setMenu(menu)
 
     def _build_sound(self) -> QHBoxLayout:
         self.body = combo_box("Body", [("No body", "")])
@@ -291,12 +266,7 @@ class PatchBar(QFrame):
     def _show_scala(self, tuning: TuningChoice) -> None:
         """What of Scala tunes the patch; a click removes it."""
         scale, keymap = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
-        parts = [part for part, there in (("Scale", scale), ("mapping" if scale else "Key mapping", keymap)) if there]
-        self.scala.setVisible(bool(parts))
-        if not parts:
-            return
-        self.scala.setText(f"{', '.join(parts)}  ✕")
-        self.scala.setAccessibleName("Remove the Scala tuning of the patch")
+        self.scala.setVisible(scale or keymap)
         lines = [f"Tuned by the Scala scale: {_scale_name(tuning.scale) or 'without a name'}"] if scale else []
         if keymap:
             lines.append("A Scala keyboard mapping says which key plays which step, and gives the reference pitch")
@@ -322,16 +292,10 @@ class PatchBar(QFrame):
         """With which the computer's keys strike."""
         self.velocity.setText(f"velocity {velocity}")
 
-    def show_keys_play(self, plays: str, possible: bool) -> None:
-        """What the computer's keys play, of KEYS_PLAY; `possible`: whether there is a patch for pitches."""
-        words, tip = KEYS_PLAY[plays]
-        self._plays[plays].setChecked(True)
-        self.plays.setText(f"{words}  ▾")
-        self.plays.setAccessibleName(words)
-        self.plays.setEnabled(possible)
-        self.plays.setToolTip(f"{tip}; click to change it" if possible else f"{tip}. Choose a patch to play pitches")
-        for widget in (self._lower, self.octave, self._higher, self.velocity):  # of pitches alone
-            widget.setVisible(plays == "pitch")
+    def show_pitches(self, pitches: bool) -> None:
+        """Whether the computer's keys play pitches, so that octave and velocity are shown."""
+        for widget in (self._lower, self.octave, self._higher, self.velocity):
+            widget.setVisible(pitches)
 
     def show_recording(self, seconds: float | None) -> None:
         """For how many seconds it has been recording; None: it is not."""

@@ -136,5 +136,5 @@ def test_one_that_was_damaged_is_told_with_its_file(patch: Patch, tmp_path: Path
 
 def test_every_body_has_a_title_in_words(tmp_path: Path) -> None:
     install_body(late(tmp_path / "here.wav"))
-    assert body_titles() == [("guitar", "Guitar body"), ("here", "here")]
+    assert body_titles() == [("guitar", "Guitar"), ("here", "here")]
     assert set(TITLES) == set(BODIES)

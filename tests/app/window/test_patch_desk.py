@@ -16,7 +16,7 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, Patch, Pickup, Target, TuningChoice
 from app.window.controller import Controller
-from app.window.patch_desk import NOTE_TOLD_AFTER_MS, PLACES
+from app.window.patch_desk import NOTE_TOLD_AFTER_MS
 from engine.presets.of_string import STRINGS, read_string
 
 
@@ -187,7 +187,7 @@ def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, pla
     played.patches.change("knobs.stiffness", 10.0)
     told(True)  # before the next key
     played.session.update(keys_play="place")
-    assert bar.note.toolTip() == PLACES
+    assert not bar.note.toolTip()
     played.session.update(keys_play="pitch")
     assert not bar.note.toolTip()
     played.window.instrument.pressed.emit(80, 100)
@@ -240,16 +240,16 @@ def test_a_patch_that_is_there_already_is_heard_with_its_changes(played: Control
 
 def test_a_switch_chooses_what_keys_play_and_is_remembered(qtbot: QtBot, played: Controller) -> None:
     """Also of the preset that plays the patch."""
-    bar = played.window.instrument.bar
-    assert bar.plays.text().startswith("Keys play pitches")
-    bar._plays["place"].trigger()
-    assert bar.plays.text().startswith("Keys choose the place")
+    strip = played.window.instrument
+    assert strip.plays.text().startswith("Keys play pitches")
+    strip._plays["place"].trigger()
+    assert strip.plays.text().startswith("Keys choose the place")
     assert played.session.choices.preset == "studio_any_string"
     assert played.settings().choices.keys_play == "place"
     press(qtbot, played, Qt.Key.Key_A)
     assert played.performance.live.sounding() == {}
     assert played.performance.notes.ringing == 1
-    bar._plays["pitch"].trigger()
+    strip._plays["pitch"].trigger()
     press(qtbot, played, Qt.Key.Key_A)
     assert played.performance.live.sounding().keys() == {48}
 

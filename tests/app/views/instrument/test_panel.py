@@ -68,3 +68,16 @@ def test_in_little_room_the_surface_is_left(panel: InstrumentPanel) -> None:
     assert (panel.knobs.isVisible(), panel.bar.isVisible(), panel.keys.isVisible()) == (False, False, True)
     panel.set_low(False, False)
     assert panel.knobs.isVisible()
+
+
+def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    for plays, words in (("place", "Keys choose the place"), ("pitch", "Keys play pitches")):
+        with qtbot.waitSignal(panel.keys_play_asked) as told:
+            panel._plays[plays].trigger()
+        assert told.args == [plays]
+        panel.show_keys_play(plays, possible=True)
+        assert panel.plays.text().startswith(words)
+        assert panel.bar.octave.isVisible() == panel.bar.velocity.isVisible() == (plays == "pitch")
+    panel.show_keys_play("place", possible=False)
+    assert not panel.plays.isEnabled()
+    assert "Choose a patch" in panel.plays.toolTip()
