@@ -11,6 +11,7 @@ import typer
 from app.commands import arguments
 from app.commands.console import Failure, progress, say
 from app.commands.render import BitsOption
+from engine.plain_text import one_line
 
 DEFAULT_RATE_HZ = 48_000
 
@@ -73,6 +74,6 @@ def play(
         raise Failure(str(error)) from error
     took_s, level = time.monotonic() - began_s, written.level
     print(
-        f"{out}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
+        f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
         f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
     )

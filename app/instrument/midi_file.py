@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.midi_chunks import check_chunks
 from engine.plain_text import one_line
+from engine.read_file import UnusableFile, read_bounded
 
-LARGEST_BYTES = 4 * 2**20
-MOST_EVENTS = 200_000
+LARGEST_BYTES = 2**20
+MOST_EVENTS = 100_000
 LONGEST_S = 3_600.0
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 BEND_STEPS = 8_192
@@ -50,12 +52,14 @@ def read_midi(path: Path) -> list[TimedEvent]:
     import mido
 
     try:
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise MidiFileError(f"{path}: cannot be read ({error}); check the name") from error
-    if len(raw) > LARGEST_BYTES:
-        raise MidiFileError(f"{path}: has more than {LARGEST_BYTES // 2**20} MiB; give a smaller MIDI file")
+        raw = read_bounded(path, LARGEST_BYTES)
+        check_chunks(raw, MOST_EVENTS)
+    except UnusableFile as error:
+        raise MidiFileError(f"{path}: {error.strerror}; give a smaller MIDI file") from error
+    except OSError as error:
+        raise MidiFileError(f"{path}: cannot be read ({error.strerror}); check the name") from error
+    except ValueError as error:
+        raise MidiFileError(f"{path}: {error}; save it again as .mid, or give a shorter one") from error
     found: list[TimedEvent] = []
     time_s, messages = 0.0, 0
     try:
