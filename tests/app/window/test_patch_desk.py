@@ -297,3 +297,15 @@ def test_the_pick_ups_knob_moves_where_the_string_is_heard(played: Controller) -
     assert [each.ear.points[0] for each in player.sounding()] == [0.11]
     played.history.undo()
     assert (played.session.choices.patch, played.session.choices.listen) == (before.patch, before.listen)
+
+
+def test_the_difference_is_heard_without_body_and_room(
+    qtbot: QtBot, played: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dry: list[bool] = []
+    monkeypatch.setattr(played.performance.live, "hear_dry", dry.append)
+    played.session.update(b="difference", heard="b")
+    played.performance.hear_dry(True)
+    played.performance.hear_dry(False)  # a listening test has ended
+    played.session.update(heard="a")
+    assert dry == [True, True, True, False]
