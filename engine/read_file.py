@@ -25,9 +25,10 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
         descriptor = os.open(path, _FLAGS)
     except ValueError:  # of a null character
         raise UnusableFile(errno.EINVAL, "no file can have this name", str(path)) from None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise UnusableFile(errno.EINVAL, "not an ordinary file", str(path))
     with os.fdopen(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise UnusableFile(errno.EINVAL, "not an ordinary file", str(path))
         data = file.read(most_bytes + 1)
     if len(data) > most_bytes:
         most = f"{most_bytes // 2**20} MiB" if most_bytes >= 2**20 else f"{most_bytes // 2**10} KiB"

@@ -35,7 +35,7 @@ def check_chunks(raw: bytes, most: int) -> None:
         kind, length = raw[place : place + 4], int.from_bytes(raw[place + 4 : place + 8], "big")
         place += 8
         if kind != b"MTrk" or place + length > len(raw):
-            raise ValueError("is no whole MIDI file: a track is missing, or ends too soon")
+            raise ValueError("is no MIDI file, or not a whole one: a track is missing, or ends too soon")
         left = _walk(raw, place, place + length, left)
         place += length
 
@@ -49,7 +49,7 @@ def _walk(raw: bytes, place: int, end: int, left: int) -> int:
             raise ValueError("has too many messages")
         place = _number(raw, place, end)[1]
         if place >= end:
-            raise ValueError("is no whole MIDI file: a track ends within a message")
+            raise ValueError("is no MIDI file, or not a whole one: a track ends within a message")
         status = raw[place]
         if status < 0x80:  # of the kind of the message before
             status = running
@@ -67,7 +67,7 @@ def _walk(raw: bytes, place: int, end: int, left: int) -> int:
         else:
             place += _DATA_BYTES.get(status) or _DATA_BYTES.get(status >> 4, 0)
     if place > end:
-        raise ValueError("is no whole MIDI file: a track ends within a message")
+        raise ValueError("is no MIDI file, or not a whole one: a track ends within a message")
     return left
 
 

@@ -23,7 +23,7 @@ SCALA_FILES = (".scl", ".kbm")
 LARGEST_FILE_BYTES = 2**16
 MOST_NOTES = 1_000  # of a scale
 LARGEST_MAPPED = 20_000.0  # of any number in a keyboard mapping: the library loops up to it
-PITCHES_HZ = (1e-6, 1e9)  # of any key: their squares are numbers still
+PITCHES_HZ = (1e-60, 1e60)  # of any key, so that their squares are numbers; what no string plays is refused there
 NOTES = (-128, 255)  # all keys, with any transposition and bend
 
 
