@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
 from app.instrument.midi_chunks import check_chunks
+from app.patches.patch import Mode
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 
@@ -17,6 +19,7 @@ MOST_EVENTS = 100_000
 LONGEST_S = 3_600.0
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 BEND_STEPS = 8_192
+DRUMS = 9  # General MIDI's channel 10
 
 
 class MidiFileError(ValueError):
@@ -24,6 +27,18 @@ class MidiFileError(ValueError):
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
+
+
+@dataclass(frozen=True)
+class Song:
+    """What a patch plays of a MIDI file.
+
+    Attributes:
+        left_out: what it does not play, in one line; "" for nothing.
+    """
+
+    events: list[TimedEvent]
+    left_out: str
 
 
 def event_of(message: Any) -> Event | None:
@@ -84,6 +99,32 @@ def read_midi(path: Path) -> list[TimedEvent]:
     return found
 
 
+def read_song(path: Path, mode: Mode) -> Song:
+    """What a patch of that mode plays of a MIDI file: all but drums, which are no strings.
+
+    In MPE channel 10 is one as the others. In guitar mode a file whose notes are all on one channel is no guitar's,
+    whichever channel that is: it plays any key.
+
+    Raises:
+        MidiFileError: as `read_midi`; or it holds only drums.
+    """
+    timed = read_midi(path)
+    notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
+    drums = set() if mode == "mpe" else notes_on & {DRUMS}
+    channels = notes_on - drums
+    if not channels:
+        raise MidiFileError(f"{path}: holds only drums (channel 10); give a MIDI file with other notes")
+    if drums:
+        timed = [each for each in timed if channels_in([each.event]) != drums]
+    if mode == "guitar" and len(channels) == 1:
+        timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
+    return Song(timed, f"{path.name} is played without its drums (channel 10)" if drums else "")
+
+
+def _on_keys(event: Event) -> Event:
+    return event if isinstance(event, PatchTurned) else replace(event, channel=KEYS)
+
+
 def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
     """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out."""
     import mido
@@ -108,7 +149,7 @@ def messages_of(event: Event) -> Iterable[Any]:
 
     if isinstance(event, PatchTurned):
         return
-    channel = event.channel % 16
+    channel = 0 if event.channel == KEYS else event.channel % 16
     if isinstance(event, NoteOn):
         yield mido.Message("note_on", note=event.key, velocity=event.velocity, channel=channel)
     elif isinstance(event, NoteOff):

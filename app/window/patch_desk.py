@@ -15,8 +15,8 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog
 
 from app.export.played import recorded_files, write_recorded
 from app.instrument.bodies import body_names
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import MidiFileError, read_midi
+from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import Strings
 from app.patches.library import (
     SUFFIX,
@@ -97,7 +97,7 @@ class PatchDesk(QObject):
     def _connect(self) -> None:
         panel, bar, browser = self._panel, self._panel.bar, self.browser
         panel.pressed.connect(self._press)
-        panel.released.connect(lambda key: self._instruments.play(NoteOff(key)))
+        panel.released.connect(lambda key: self._instruments.play(NoteOff(key, KEYS)))
         bar.previous_asked.connect(lambda: self.step(-1))
         bar.next_asked.connect(lambda: self.step(1))
         bar.browse_asked.connect(self.toggle)
@@ -258,7 +258,7 @@ class PatchDesk(QObject):
         """One of TAKEN_FILES that was dropped: a patch or a string is chosen, a MIDI file played, a scale tunes."""
         try:
             if file.suffix.lower() in MIDI_FILES:
-                self._playback.play(read_midi(file))
+                self._play_file(file)
             elif file.suffix.lower() in SCALA_FILES:
                 self._tune(file)
             elif file.suffix.lower() == STRING_FILE:
@@ -267,6 +267,12 @@ class PatchDesk(QObject):
                 self._session.update(**choices_of(read_patch(file)))
         except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
             self.told.emit(one_line(str(error)))
+
+    def _play_file(self, file: Path) -> None:
+        song = read_song(file, "poly" if self.patch is None else self.patch.mode)
+        if song.left_out:
+            self.informed.emit(f"{song.left_out}.")
+        self._playback.play(song.events)
 
     def _take_string(self, file: Path) -> None:
         """Chooses the string whose physical parameters the file has, plucked by the model of many strings."""
@@ -434,7 +440,7 @@ class PatchDesk(QObject):
     def _press(self, key: int, velocity: int) -> None:
         """Plays a key on the screen; these are always pitches."""
         self._session.update(keys_play="pitch")
-        self._instruments.play(NoteOn(key, velocity))
+        self._instruments.play(NoteOn(key, velocity, KEYS))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)
@@ -462,7 +468,7 @@ class PatchDesk(QObject):
 
 
 def _note(key: int) -> list[TimedEvent]:
-    return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY)), TimedEvent(AUDITION_S, NoteOff(key))]
+    return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY, KEYS)), TimedEvent(AUDITION_S, NoteOff(key, KEYS))]
 
 
 def facts_of(patch: Patch) -> dict[str, str]:

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.events import SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import KEYS, SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
 from app.playing.live import Live
 from app.playing.notes import Notes
+from app.playing.playback import Playback
 from app.playing.sources import Sources
 from app.playing.stroke import Mix
 from engine.effects import Effects
@@ -124,3 +125,16 @@ def test_a_preset_that_is_not_there_is_told(live: Live, patch: Patch, wait: Wait
     wait(lambda: bool(live.told))  # type: ignore[attr-defined]
     assert "gone" in live.told[0]  # type: ignore[attr-defined]
     assert live.handle(NoteOn(45, 60)) is None
+
+
+def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(live: Live, wait: Wait) -> None:
+    playback = Playback(live.handle)
+    bent = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.0, Bend(1.0)), TimedEvent(600.0, NoteOff(45))]
+    playback.play(bent)
+    wait(lambda: live._player is not None and live._player._hands.of(0).bend == 1.0)
+    playback.stop()
+    for channel in (0, KEYS):
+        made = live.handle(NoteOn(57, 60, channel))
+        assert made is not None
+        struck, _ = made
+        assert struck.parameters == struck.key.string.parameters
