@@ -10,6 +10,7 @@ import dataclasses
 import functools
 import json
 import math
+import re
 import tomllib
 import types
 from collections.abc import Mapping
@@ -18,8 +19,13 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 from engine import bounds
 from engine.plain_text import one_line
+from engine.read_file import UnusableFile, read_bounded
 
 T = TypeVar("T")
+# A dotted key, plain or quoted parts. Possessive: each character is looked at once or twice, whatever the text holds.
+_LONG_KEY = re.compile(
+    rf"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{bounds.MOST_DOTS + 1}}}"""
+)
 
 
 class SchemaError(ValueError):
@@ -49,15 +55,18 @@ def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file.
 
     Raises:
-        SchemaError: not TOML, or larger or nested deeper than `engine.bounds` allows.
+        SchemaError: not TOML, no ordinary file, or larger or nested deeper than `engine.bounds` allows.
         OSError: it cannot be read.
     """
-    with path.open("rb") as file:
-        raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
-    if len(raw) > bounds.LARGEST_TEXT_BYTES:
-        raise SchemaError(f"{path}: larger than the {bounds.LARGEST_TEXT_BYTES // 2**10} KiB that it may have")
     try:
-        data = tomllib.loads(raw.decode("utf-8"))
+        text = read_bounded(path, bounds.LARGEST_TOML_BYTES).decode("utf-8")
+        if _LONG_KEY.search(text):
+            raise SchemaError(f"{path}: a key has more than {bounds.MOST_DOTS} dots")
+        data = tomllib.loads(text)
+    except UnusableFile as error:
+        raise SchemaError(f"{path}: {error.strerror}") from error
+    except SchemaError:
+        raise
     except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
         raise SchemaError(f"{path}: not valid TOML: {error or type(error).__name__}") from error
     check_nesting(data, str(path))
@@ -65,8 +74,8 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def check_nesting(data: object, where: str) -> None:
-    """Raises SchemaError where lists and tables lie deeper in each other than anything of ours."""
-    level = [data]
+    """Raises SchemaError where lists and tables lie deeper in each other, or hold more, than anything of ours."""
+    level, entries = [data], 0
     for _ in range(bounds.DEEPEST_NESTING):
         level = [
             inner
@@ -76,6 +85,9 @@ def check_nesting(data: object, where: str) -> None:
         ]
         if not level:
             return
+        entries += len(level)
+        if entries > bounds.MOST_JSON_ENTRIES:
+            raise SchemaError(f"{where}: more than {bounds.MOST_JSON_ENTRIES} entries")
     raise SchemaError(f"{where}: nested more than {bounds.DEEPEST_NESTING} deep")
 
 

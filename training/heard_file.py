@@ -16,6 +16,8 @@ from typing import Any, get_type_hints
 
 from filelock import FileLock
 
+from engine.plain_text import one_line
+from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read
 from engine.whole_file import whole_file
 
@@ -86,17 +88,15 @@ def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
     """What is known of a folder's presets by their digest, and a line for whatever is wrong. Raises nothing."""
     path = folder / NAME
     try:
-        if not path.is_file():
-            return {}, []
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_BYTES + 1)
-        text = raw.decode("utf-8")
+        text = read_bounded(path, LARGEST_BYTES).decode("utf-8")
+    except (FileNotFoundError, NotADirectoryError):
+        return {}, []
+    except UnusableFile as error:
+        return {}, [one_line(f"{path}: {error.strerror}; remove it")]
     except OSError as error:
         return {}, [f"{path}: cannot be read ({error.strerror or error}); presets are listed without it"]
     except UnicodeDecodeError:
         return {}, [f"{path}: not a text file; remove it, or measure the presets again"]
-    if len(raw) > LARGEST_BYTES:
-        return {}, [f"{path}: larger than the {LARGEST_BYTES // 2**20} MiB that it may have; remove it"]
     return _parsed(path, text)
 
 

@@ -16,6 +16,7 @@ from typing import Any, Literal, get_type_hints
 from filelock import FileLock
 
 from engine import bounds
+from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read
 from engine.whole_file import whole_file
 from training.knowledge import given_to
@@ -23,6 +24,7 @@ from training.knowledge import given_to
 QUARTERS = 4  # windows of the horizon, with an error each
 SHORT_HORIZON = 400  # frames; the paper's second horizon, over which every run is measured too
 RESULTS = Path(__file__).parent / "results.csv"
+LARGEST_BYTES = 2 * 2**20  # of such a file: some 2,500 rows
 
 Status = Literal["done", "diverged", "failed"]
 
@@ -118,22 +120,22 @@ def read_results(path: Path) -> list[Row]:
         SchemaError: it is not a results file, or a value is wrong; the message names the file, line and column.
         OSError: it cannot be read.
     """
-    if not path.exists():
-        return []
     try:
-        with path.open("rb") as file:
-            raw = file.read(bounds.LARGEST_TABLE_BYTES + 1)
-        if len(raw) > bounds.LARGEST_TABLE_BYTES:
-            raise SchemaError(f"{path}: larger than the {bounds.LARGEST_TABLE_BYTES // 2**20} MiB that it may have")
-        lines = list(csv.reader(io.StringIO(raw.decode("utf-8"), newline="")))
+        text = read_bounded(path, LARGEST_BYTES).decode("utf-8")
+        lines = csv.reader(io.StringIO(text, newline=""))
+        columns = next(lines, [])
+        if "digest" not in columns:
+            raise SchemaError(f"{path}: not a results file: its first line must name {', '.join(COLUMNS[:3])}, …")
+        if unknown := sorted(set(columns) - set(COLUMNS)):
+            raise SchemaError(f"{path}: unknown column {unknown[0]!r}; it is of a newer version: update this program")
+        # one at a time, so that it ends at the first fault
+        return [_parse(columns, row, f"{path}: line {n}") for n, row in enumerate(lines, 2)]
+    except FileNotFoundError:
+        return []
+    except UnusableFile as error:
+        raise SchemaError(f"{path}: {error.strerror}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin anew") from error
-    if not lines or "digest" not in lines[0]:
-        raise SchemaError(f"{path}: not a results file: its first line must name {', '.join(COLUMNS[:3])}, …")
-    if unknown := sorted(set(lines[0]) - set(COLUMNS)):
-        raise SchemaError(f"{path}: unknown column {unknown[0]!r}; it is of a newer version: update this program")
-    columns, *rows = lines
-    return [_parse(columns, row, f"{path}: line {n}") for n, row in enumerate(rows, 2)]
 
 
 def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:

@@ -14,6 +14,7 @@ from app.commands.console import Failure, Report
 from app.shared.whole_file import whole_file
 from engine.plain_text import one_line
 
+MOST_NUMBERS = 8 * 2**20  # of a file of displacements: 64 MiB in double precision
 LARGEST_RESULT_BYTES = 4 * 2**30
 BYTES_AT_ONCE = 16 * 2**20  # of a result, computed at a time
 FRAMES_AT_ONCE = 4096
@@ -27,7 +28,7 @@ def read_displacements(path: Path) -> Tensor:
     """Initial displacements in m, float64 (batch, points).
 
     Raises:
-        Failure: missing, not a NumPy file, of another shape or type, or not finite.
+        Failure: missing, not a NumPy file, of another shape or type, too large, or not finite.
     """
     array = _load(path)
     if array.ndim != 2 or 0 in array.shape:
@@ -35,6 +36,8 @@ def read_displacements(path: Path) -> Tensor:
         raise Failure(f"{path}: has shape {array.shape}, expected (batch, points){hint}")
     if array.dtype.kind not in "fiu":
         raise Failure(f"{path}: holds {array.dtype}, expected real numbers; save u.astype(float)")
+    if array.size > MOST_NUMBERS:
+        raise Failure(f"{path}: has shape {array.shape}; at most {MOST_NUMBERS} numbers may be given: split it")
     values = np.array(array, dtype=np.float64)
     if not np.isfinite(values).all():
         row, point = np.argwhere(~np.isfinite(values))[0]
@@ -86,6 +89,8 @@ def blocks_of(steps: int) -> Iterator[int]:
 
 
 def _load(path: Path) -> np.ndarray:
+    if path.exists() and not path.is_file():  # reading a pipe would block
+        raise Failure(f"{path}: not an ordinary file; give a NumPy .npy file")
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a damaged header allocates no memory
     except FileNotFoundError:

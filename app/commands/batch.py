@@ -21,6 +21,7 @@ from app.commands.render import (
     Rate,
     check_sound,
 )
+from engine.plain_text import one_line
 from engine.pluck import DEFAULT_LISTEN
 
 if TYPE_CHECKING:
@@ -102,7 +103,9 @@ def batch(
     for message in dict.fromkeys(row.message for row in rows if row.message):
         say(message)
     counts = Counter(row.status for row in rows)
-    print(f"{out / INDEX}: {counts['written']} written, {counts['kept']} kept, {counts['failed']} failed")
+    print(
+        f"{one_line(str(out / INDEX))}: {counts['written']} written, {counts['kept']} kept, {counts['failed']} failed"
+    )
     clipped = sum(row.clipped or 0 for row in rows)
     if clipped:
         say(f"note: {clipped} samples were clipped; lower the amplitudes, or choose --bits 32f or --normalise")

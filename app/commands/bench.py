@@ -518,6 +518,8 @@ def soak(
             ("holes a minute", holes.a_minute, 0),
             ("holes together, ms", holes.heard_ms, 0),
             ("longest hole, ms", holes.longest_ms, 0),
+            ("holes of another process's steady tone", holes.control, None),
+            ("these together, ms", holes.control_ms, None),
             ("gaps that the mixer tells", sum(holes.told.values()), 0),
             *((f"of them {cause}", count, None) for cause, count in holes.told.items()),
             ("longest stall of the window, s", found.longest_stall_s, 0.1),

@@ -91,10 +91,10 @@ def progress(what: str) -> Iterator[Report]:
     from rich.console import Console
 
     columns = (
-        bars.TextColumn("{task.description}"),
+        bars.TextColumn("{task.description}", markup=False),
         bars.BarColumn(bar_width=10),
-        bars.TextColumn("{task.fields[left]}"),
-        bars.TextColumn("{task.fields[text]}"),
+        bars.TextColumn("{task.fields[left]}", markup=False),
+        bars.TextColumn("{task.fields[text]}", markup=False),
     )
     started = time.monotonic()
     with bars.Progress(*columns, console=Console(stderr=True), transient=True) as bar:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from app.commands.console import Failure, say
+from engine.plain_text import one_line
 
 
 def faust(
@@ -30,4 +31,4 @@ def faust(
         raise Failure(str(error)) from error
     if chosen.body.name or chosen.room.mix:
         say("note: without the patch's body and room")
-    print(f"{out}: {written} modes")
+    print(f"{one_line(str(out))}: {written} modes")

@@ -9,6 +9,7 @@ import typer
 
 from app.commands import arguments
 from app.commands.console import Failure, number, print_json, print_table, progress, say
+from engine.plain_text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,9 +41,16 @@ def simulate(
             "(steel_e4) or as a file of its parameters.",
         ),
     ],
-    rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate.")],
-    modes: Annotated[int, typer.Option(min=1, metavar="M", help="Number of modes.")],
     steps: Steps,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate.")] = 48_000,
+    modes: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="M",
+            help="Number of modes; default all below 20 kHz and half the rate, as many as the grid of U0 holds.",
+        ),
+    ] = None,
     solver: Annotated[
         Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
     ] = "fast",
@@ -68,9 +76,15 @@ def simulate(
         )
     from app.commands import arrays
     from engine import bounds
+    from engine.presets.of_string import HIGHEST_HZ
 
     initial = arrays.read_displacements(u0)
     points = initial.shape[1]
+    highest_hz = min(HIGHEST_HZ, rate / 2)
+    if modes is None:
+        modes = min(parameters.modes_below(highest_hz), points - 2)
+    if modes < 1:
+        raise Failure(f"{string}: no mode is below {highest_hz:g} Hz, or {u0} has no point between its ends")
     if modes > points - 2:
         raise typer.BadParameter(
             f"a grid of {points} points holds 1 … {points - 2} modes, not {modes}", param_hint="--modes"
@@ -161,7 +175,7 @@ def compare(
     if json:
         print_json(found)
         return
-    print(f"{loaded.name}: rel. MSE {number(found['rel_mse'])}, rel. MAE {number(found['rel_mae'])}")
+    print(f"{one_line(str(loaded.name))}: rel. MSE {number(found['rel_mse'])}, rel. MAE {number(found['rel_mae'])}")
     columns = ("from s", "to s", "rel. MSE", "rel. MAE", "")
     rows = [
         [*list(w.values())[:4], "past the training horizon" if w["past_horizon"] else ""] for w in found["windows"]

@@ -11,6 +11,7 @@ import typer
 from app.commands import arguments
 from app.commands.console import Failure, progress, say
 from app.commands.render import BitsOption
+from engine.plain_text import one_line
 
 DEFAULT_RATE_HZ = 48_000
 
@@ -31,22 +32,25 @@ def play(
 ) -> None:
     """Render a MIDI file, played by a patch, to WAV.
 
-    The same files give the same samples.
+    The same files give the same samples. Drums (channel 10) are left out, except with a patch for MPE.
     """
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
 
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     if seconds is not None:
         arguments.check_range("--seconds", seconds, 0.001, LONGEST_S, "s")
-    from app.instrument.midi_file import MidiFileError, read_midi
+    from app.instrument.midi_file import MidiFileError, read_song
     from app.patches.library import PatchError, find_patch
 
     try:
-        events, chosen = read_midi(midi), find_patch(patch).patch
+        chosen = find_patch(patch).patch
+        song = read_song(midi, chosen.mode)
     except (MidiFileError, PatchError) as error:
         raise Failure(str(error)) from error
     from app.instrument.effects import body_problem
 
+    if song.left_out:
+        say(song.left_out)
     if problem := body_problem(chosen):
         say(problem)
     loaded = arguments.open_preset(chosen.preset)
@@ -56,14 +60,14 @@ def play(
     from app.shared.whole_file import WriteError
 
     began_s = time.monotonic()
-    whole_s = seconds if seconds is not None else events[-1].time_s + LONGEST_TAIL_S / 10
+    whole_s = seconds if seconds is not None else song.events[-1].time_s + LONGEST_TAIL_S / 10
     try:
         with progress(f"{midi.name} by {chosen.name}") as report:
             written = write_played(
                 out,
                 chosen,
                 loaded,
-                events,
+                song.events,
                 source,
                 WavSettings(bits, rate, normalise),
                 seconds,
@@ -73,6 +77,6 @@ def play(
         raise Failure(str(error)) from error
     took_s, level = time.monotonic() - began_s, written.level
     print(
-        f"{out}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
+        f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "
         f"peak {level.peak_db:.1f} dBFS, {level.clipped} samples clipped"
     )

@@ -9,6 +9,7 @@ import typer
 
 from app.commands.console import Failure, progress, say
 from app.shared.key_names import key_named
+from engine.plain_text import one_line
 
 ASKED_ABOVE_BYTES = 2**30  # refused without --yes
 
@@ -86,7 +87,7 @@ def sampled(
         raise typer.BadParameter(str(error)) from error
     words = f"{counted(plan)}, {size_words(plan, soundfont)}"
     if size_only:
-        print(f"{out}: {words}")
+        print(f"{one_line(str(out))}: {words}")
         return
     if needed_bytes(plan, soundfont) > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
@@ -99,7 +100,7 @@ def sampled(
     for note in notes(plan, made, "--dry leaves"):
         say(f"note: {note}")
     kept = made.samples - made.rendered
-    print(f"{out}: {made.rendered} samples rendered, {kept} kept, {megabytes(made.size_bytes)}")
+    print(f"{one_line(str(out))}: {made.rendered} samples rendered, {kept} kept, {megabytes(made.size_bytes)}")
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:

@@ -120,7 +120,7 @@ def merge(
     before = len(read_results(file))
     rows = migrated(row for other in others for row in read_results(other))
     after = len(add_rows(file, rows))
-    print(f"{file}: {after} rows, {after - before} of them new")
+    print(f"{one_line(str(file))}: {after} rows, {after - before} of them new")
 
 
 @results.command()

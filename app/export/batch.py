@@ -22,7 +22,7 @@ from app.export.sound import Cancelled, ExportCancelled, SoundRequest, Voices
 from app.export.wav import WavSettings
 from app.shared.vocabulary import Pickup, Source
 from engine.pluck import Pluck
-from engine.presets import Preset, load_preset, of_string
+from engine.presets import Preset, load_preset, of_string, outside_training
 from engine.resonators.string import StringParameters
 from engine.sources import Runaway
 
@@ -247,17 +247,17 @@ def _rendered(
         return [*failed, *_rendered(plan, preset, truth, progress, cancelled)]
     except ExportError as error:
         return [replace(row, message=str(error)) for row in blank.values()]
-    errors, told = _errors(preset, voices), _outside(job.instrument, preset)
+    errors, told = _errors(preset, voices), _outside(job, preset)
     return [
         _measured(blank[source], report, *(((None, None), "") if source == "truth" else (errors, told)))
         for source, report in zip(blank, reports, strict=True)
     ]
 
 
-def _outside(instrument: Instrument, preset: Preset) -> str:
-    """A warning that the string lies outside those that a model of many has learned; "" where it does not."""
-    words = preset.info.family.outside(preset.info.string) if preset.info.family else []
-    return f"warning: {instrument.name}: {'; '.join(words)}" if words else ""
+def _outside(job: _Job, preset: Preset) -> str:
+    """A warning that string or pluck lie outside what a model of many strings has learned; "" where they do not."""
+    words = outside_training(preset.info, job.pluck) if preset.info.family else []
+    return f"warning: {job.instrument.name}: {'; '.join(words)}" if words else ""
 
 
 def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, float | None], message: str) -> BatchRow:

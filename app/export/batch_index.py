@@ -14,6 +14,7 @@ from filelock import FileLock
 from app.export.files import ExportError
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
+from engine.read_file import read_bounded
 
 INDEX = "index.csv"
 Status = Literal["written", "kept", "failed"]
@@ -85,10 +86,8 @@ class BatchIndex:
 def _read_rows(path: Path) -> dict[str, BatchRow]:
     """By file name; empty where there is no index, or one that cannot be read and will be replaced."""
     try:
-        if path.stat().st_size > bounds.LARGEST_TABLE_BYTES:
-            return {}
-        with path.open(encoding="utf-8", newline="") as file:
-            return {row.file: row for row in map(_read_row, csv.DictReader(file))}
+        text = read_bounded(path, bounds.LARGEST_TABLE_BYTES).decode("utf-8")
+        return {row.file: row for row in map(_read_row, csv.DictReader(io.StringIO(text, newline="")))}
     except (OSError, ValueError, KeyError, TypeError, StopIteration, csv.Error):
         return {}
 

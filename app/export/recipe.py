@@ -13,11 +13,12 @@ from app.export.sound import LONGEST_S, SoundRequest
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import Bits, Pickup, Source
+from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.plain_text import one_line
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, of_string, preset_digest
 from engine.resonators.string import StringParameters
-from engine.schema import read
+from engine.schema import parse_json, read
 from engine.sources import FULL_SCALE_M
 
 
@@ -57,7 +58,7 @@ class Recipe(BaseModel):
     decay_db: float | None = None
     source: Source
     difference_gain_db: float = 0.0
-    preset_rate_hz: int
+    preset_rate_hz: int = Field(ge=1, le=HIGHEST_RATE_HZ)
     horizon_s: float
     full_scale_m: float
     rate_hz: int = Field(ge=RATE_RANGE_HZ[0], le=RATE_RANGE_HZ[1])
@@ -65,7 +66,7 @@ class Recipe(BaseModel):
     normalise: bool
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
     string: StringParameters | None = None
-    modes: int | None = None
+    modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
 
     @field_validator("string", mode="before")
     @classmethod
@@ -142,6 +143,8 @@ def read_recipe(path: Path) -> Recipe:
         RecipeError: the file is missing or no sound file, or its recipe is damaged or of a newer version.
     """
     try:
+        if path.exists() and not path.is_file():  # reading a pipe would block
+            raise RecipeError(f"{path}: not an ordinary file; give a WAV that was exported")
         with soundfile.SoundFile(path) as file:
             text = file.comment
     except (OSError, soundfile.LibsndfileError) as error:
@@ -154,9 +157,9 @@ def read_recipe(path: Path) -> Recipe:
             f"{path}: has no recipe; it was not exported by {PROGRAM}, or another program has removed its tags"
         )
     try:
-        return Recipe.model_validate_json(text)
+        return Recipe.model_validate(parse_json(text, "the recipe"))
     except ValidationError as error:
-        first = error.errors()[0]
+        first = error.errors(include_url=False, include_input=False)[0]
         field = ".".join(map(str, first["loc"])) or "the text"
         raise _unusable(path, f"{field}: {first['msg']}") from error
     except (ValueError, OverflowError) as error:  # raised for numbers that are too long

@@ -18,7 +18,9 @@ from app.patches.library import file_stem
 from app.patches.patch import LONGEST_NAME, Reference
 from app.presets.folders import user_folder
 from app.shared.whole_file import WriteError, explain, whole_file
+from engine.bounds import LARGEST_IMPULSE_BYTES
 from engine.effects import BODIES, Impulse
+from engine.read_file import read_bounded
 
 TITLES = {"guitar": "Guitar"}  # of the engine's bodies
 ENDINGS = (".wav", ".flac", ".aif", ".aiff")
@@ -81,12 +83,12 @@ def install_body(file: Path) -> str:
     folder, known = own_bodies(), _own_files()
     stem = file_stem(file.stem)[: LONGEST_NAME - 5]
     try:
-        data = file.read_bytes()
+        data = read_bounded(file, LARGEST_IMPULSE_BYTES)
     except OSError as error:
         raise ImpulseError(f"{file}: cannot be read ({error.strerror}); check the name") from error
     for name, path in known.items():
         with suppress(OSError):  # one that cannot be read counts as another
-            if path.stat().st_size == len(data) and path.read_bytes() == data:
+            if path.stat().st_size == len(data) and read_bounded(path, LARGEST_IMPULSE_BYTES) == data:
                 return name
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -119,7 +121,7 @@ def _own_files() -> dict[str, Path]:
 
 @lru_cache(maxsize=16)
 def _digest(path: Path, time_ns: int, size: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_bounded(path, LARGEST_IMPULSE_BYTES)).hexdigest()
 
 
 @lru_cache(maxsize=16)

@@ -1,13 +1,17 @@
-"""What a player does, as values. Keys are MIDI keys, 0 … 127."""
+"""What a player does, as values. Keys are MIDI keys, 0 … 127; channels are MIDI's, counted from 0, or `KEYS`."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from app.patches.patch import Patch
 
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
+VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
+REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
 PEDAL_DOWN = 64  # from this value on
+KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ class NoteOff:
 
 @dataclass(frozen=True)
 class Bend:
-    """The pitch wheel moves to -1 … 1, in ranges of the patch."""
+    """The pitch wheel moves to -1 … 1, in ranges of the channel: the patch's, unless messages set another (RPN 0)."""
 
     value: float
     channel: int = 0
@@ -59,6 +63,20 @@ def moves_effects(event: object, patch: Patch) -> bool:
 
 
 Event = NoteOn | NoteOff | Bend | Controller | PatchTurned
+
+
+def channels_in(events: Iterable[Event]) -> set[int]:
+    """The channels that events come on."""
+    return {event.channel for event in events if not isinstance(event, PatchTurned)}
+
+
+def let_go(channels: Iterable[int]) -> list[Event]:
+    """What leaves channels as if nobody had played on them: pedal up, wheels at rest, no key held."""
+    events: list[Event] = []
+    for channel in sorted(channels):
+        events += [Controller(SUSTAIN, 0, channel), Bend(0.0, channel)]
+        events += [Controller(RESET, 0, channel), Controller(NOTES_OFF, 0, channel)]
+    return events
 
 
 @dataclass(frozen=True)

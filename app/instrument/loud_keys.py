@@ -33,13 +33,13 @@ class LoudKeys:
         self._patch, self._ear, self._grid_points = patch, ear, grid_points
         self._strings, self._response = Strings(patch), body_response(patch)
 
-    def of_key(self, key: int) -> LoudKey | None:
-        """None for a key that is silent.
+    def of_key(self, key: int, string: int | None = None) -> LoudKey | None:
+        """None for a key that is silent. `string`: on which of a set it is played, as in `Strings.of_key`.
 
         Raises:
             ValueError: the key has no possible string.
         """
-        found = self._alone(key)
+        found = self._alone(key, string)
         return None if found is None else replace(found, gain=found.gain * self._level)
 
     @cached_property
@@ -56,9 +56,9 @@ class LoudKeys:
         over_db = max(0.0, max(peaks_db, default=HIGHEST_PEAK_DB) - HIGHEST_PEAK_DB)
         return float(10 ** ((self._patch.level_db - over_db) / 20))
 
-    def _alone(self, key: int) -> LoudKey | None:
+    def _alone(self, key: int, number: int | None = None) -> LoudKey | None:
         """With the gain that makes it as loud as the others."""
-        string = self._strings.of_key(key)
+        string = self._strings.of_key(key, number)
         if string is None:
             return None
         modes = min(string.modes, self._grid_points - 2)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
+from app.instrument.midi_chunks import check_chunks
+from app.patches.patch import Mode
 from engine.plain_text import one_line
+from engine.read_file import UnusableFile, read_bounded
 
-LARGEST_BYTES = 4 * 2**20
-MOST_EVENTS = 200_000
+LARGEST_BYTES = 2**20
+MOST_EVENTS = 80_000
 LONGEST_S = 3_600.0
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 BEND_STEPS = 8_192
+DRUMS = 9  # General MIDI's channel 10
 
 
 class MidiFileError(ValueError):
@@ -22,6 +27,18 @@ class MidiFileError(ValueError):
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
+
+
+@dataclass(frozen=True)
+class Song:
+    """What a patch plays of a MIDI file.
+
+    Attributes:
+        left_out: what it does not play, in one line; "" for nothing.
+    """
+
+    events: list[TimedEvent]
+    left_out: str
 
 
 def event_of(message: Any) -> Event | None:
@@ -50,24 +67,23 @@ def read_midi(path: Path) -> list[TimedEvent]:
     import mido
 
     try:
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise MidiFileError(f"{path}: cannot be read ({error}); check the name") from error
-    if len(raw) > LARGEST_BYTES:
-        raise MidiFileError(f"{path}: has more than {LARGEST_BYTES // 2**20} MiB; give a smaller MIDI file")
+        raw = read_bounded(path, LARGEST_BYTES)
+        check_chunks(raw, MOST_EVENTS)
+    except UnusableFile as error:
+        raise MidiFileError(f"{path}: {error.strerror}; give a smaller MIDI file") from error
+    except OSError as error:
+        raise MidiFileError(f"{path}: cannot be read ({error.strerror}); check the name") from error
+    except ValueError as error:
+        raise MidiFileError(f"{path}: {error}; save it again as .mid, or give a shorter one") from error
     found: list[TimedEvent] = []
-    time_s, messages = 0.0, 0
     try:
         song = mido.MidiFile(file=io.BytesIO(raw))
         if song.ticks_per_beat < 1:  # mido reads a count of frames as a negative number
             raise MidiFileError(f"{path}: counts frames, not beats (SMPTE); save it with ticks a beat")
-        for message in song:
-            time_s, messages = time_s + message.time, messages + 1
-            if messages > MOST_EVENTS or not time_s <= LONGEST_S:
-                told = f"more than {MOST_EVENTS} messages" if messages > MOST_EVENTS else "more than an hour of music"
-                raise MidiFileError(f"{path}: {told}; give a shorter MIDI file")
-            if not message.is_meta and (event := event_of(message)) is not None:
+        for time_s, message in _in_time(song):
+            if not time_s <= LONGEST_S:
+                raise MidiFileError(f"{path}: more than an hour of music; give a shorter MIDI file")
+            if (event := event_of(message)) is not None:
                 found.append(TimedEvent(time_s, event))
     except MidiFileError:
         raise
@@ -78,6 +94,57 @@ def read_midi(path: Path) -> list[TimedEvent]:
     if not any(isinstance(each.event, NoteOn) for each in found):
         raise MidiFileError(f"{path}: holds no note; give a MIDI file with notes")
     return found
+
+
+def _in_time(song: Any) -> Iterator[tuple[float, Any]]:
+    """The messages of all tracks in the order of their times, which are in s.
+
+    mido's own way through a song copies each message three times, and takes twice as long.
+    """
+    import mido
+
+    if song.type == 2:
+        raise ValueError("its tracks are songs of their own (type 2)")
+    ticked: list[tuple[int, Any]] = []
+    for track in song.tracks:
+        tick = 0
+        for message in track:
+            tick += message.time
+            ticked.append((tick, message))
+    ticked.sort(key=lambda each: each[0])  # of one time: in the order of the tracks
+    time_s, before, tempo = 0.0, 0, TEMPO
+    for tick, message in ticked:
+        time_s += mido.tick2second(tick - before, song.ticks_per_beat, tempo)
+        before = tick
+        if message.type == "set_tempo":
+            tempo = message.tempo
+        yield time_s, message
+
+
+def read_song(path: Path, mode: Mode) -> Song:
+    """What a patch of that mode plays of a MIDI file: all but drums, which are no strings.
+
+    In MPE channel 10 is one as the others. In guitar mode a file whose notes are all on one channel is no guitar's,
+    whichever channel that is: it plays any key.
+
+    Raises:
+        MidiFileError: as `read_midi`; or it holds only drums.
+    """
+    timed = read_midi(path)
+    notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
+    drums = set() if mode == "mpe" else notes_on & {DRUMS}
+    channels = notes_on - drums
+    if not channels:
+        raise MidiFileError(f"{path}: holds only drums (channel 10); give a MIDI file with other notes")
+    if drums:
+        timed = [each for each in timed if channels_in([each.event]) != drums]
+    if mode == "guitar" and len(channels) == 1:
+        timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
+    return Song(timed, f"{path.name} is played without its drums (channel 10)" if drums else "")
+
+
+def _on_keys(event: Event) -> Event:
+    return event if isinstance(event, PatchTurned) else replace(event, channel=KEYS)
 
 
 def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
@@ -104,7 +171,7 @@ def messages_of(event: Event) -> Iterable[Any]:
 
     if isinstance(event, PatchTurned):
         return
-    channel = event.channel % 16
+    channel = 0 if event.channel == KEYS else event.channel % 16
     if isinstance(event, NoteOn):
         yield mido.Message("note_on", note=event.key, velocity=event.velocity, channel=channel)
     elif isinstance(event, NoteOff):

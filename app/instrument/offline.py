@@ -25,7 +25,11 @@ STOLEN_S = 0.03
 
 
 class _Stage:
-    """A player and a mixer without a device. `gains`: of the sources that are heard together."""
+    """A player and a mixer without a device.
+
+    Args:
+        gains: of the sources that are heard together; a difference, of two, is heard without body and room.
+    """
 
     def __init__(self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
@@ -59,7 +63,8 @@ class _Stage:
         return self.mixer.render(frames)
 
     def _set_effects(self) -> None:
-        self.mixer.set_effects(effects := effects_of(self.player.heard_through))
+        effects = effects_of(self.player.heard_through) if len(self._gains) == 1 else None
+        self.mixer.set_effects(effects)
         if effects is not None:
             self.tail_s = max(self.tail_s, effects.tail_s(self.mixer.rate_hz))
 
@@ -86,7 +91,7 @@ def render_events(
     An event counts from the next quantum of 64 frames on.
 
     Args:
-        source: "model", "truth", or "difference", which is model minus truth with its gain.
+        source: "model", "truth", or "difference": model minus truth with its gain, without body and room.
         seconds: its length; None: until all has died away, a minute after the last event at most.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
         advanced: is called with the seconds rendered so far; may raise, to end it.

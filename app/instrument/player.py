@@ -1,22 +1,27 @@
 """A patch that is played: events become voices, and change those that ring.
 
-Strings are known by their places: a key, or in guitar mode a channel, which is one string. A place that is struck
-again goes on with the motion that it has; a key that is released damps its string, unless the pedal or the patch lets
-it ring. Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
+Strings are known by their places: a key, or a channel of a guitar, which is one string. A place that is struck again
+goes on with the motion that it has; a key that is released damps its string, unless the pedal or the patch lets it
+ring. Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
+
+In guitar mode the first channels are the strings, the highest first, as guitars with MIDI send them. The first of
+them alone may as well be a keyboard: until another has played, it plays any key, each on the string that the key
+chooses. So do all further channels, and the keys of the computer and the screen (`events.KEYS`) always.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from app.instrument import events
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
+from app.instrument.hands import GUITAR_STRINGS, Hands
 from app.instrument.loud_keys import LoudKeys, on_string
-from app.instrument.strings import KeyString, Strings, bent, damped, slid
-from app.patches.patch import Patch
+from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
+from app.patches.patch import Patch, StringSet
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.presets import Preset
@@ -26,12 +31,10 @@ from engine.voices import Ear, Program, Voice
 from engine.voices.programs import solver_program, tension_program
 
 SOURCES = ("model", "truth")
-MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
-MPE_MASTER = 0
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03
-KEPT_KEYS = 256
+KEPT_KEYS = 512
 GOALS = 8  # values that are tried for a wheel all the way up
 # What a wheel all the way up makes of a field: a factor of its own value, or a value
 WHEEL_FACTORS = {"knobs": 4.0, "damping": 10.0, "pluck.hardest_mm": 2.0, "body.size": 2.0, "room.t60_s": 3.0}
@@ -60,12 +63,17 @@ class Key:
     programs: dict[str, Program]
 
 
+Place = tuple[int | None, int | None]  # channel and key, each None where any is the same string
+
+
 @dataclass(eq=False)
 class Struck:
     """A string that was struck, in its present state.
 
     Attributes:
         place: which string of the instrument it is.
+        string: which one of the patch's set, where a guitar's channel says so: see `Strings.of_key`. None: the key
+            chooses it.
         gain: the factor of its voices.
         voices: by source.
         parameters: of the string, with bends, slides, dampers and knobs.
@@ -74,7 +82,8 @@ class Struck:
         damped: whether the damper is on it.
     """
 
-    place: int
+    place: Place
+    string: int | None
     event: NoteOn
     key: Key
     pluck: Pluck
@@ -107,22 +116,6 @@ class Struck:
             voice.retune(resonator, seconds)
 
 
-@dataclass
-class _Channel:
-    bend: float = 0.0  # -1 … 1
-    pedal: bool = False
-    slide: int | None = None
-
-
-@dataclass
-class _Hands:
-    channels: dict[int, _Channel] = field(default_factory=dict)
-    wheel: int = 0
-
-    def of(self, channel: int) -> _Channel:
-        return self.channels.setdefault(channel, _Channel())
-
-
 class Player:
     """Plays one patch. Every public method may be called from any thread.
 
@@ -152,8 +145,8 @@ class Player:
         self._preset, self._rate_hz, self._deliver = preset, rate_hz, deliver
         self._sources = tuple(sources)
         self._lock = threading.RLock()
-        self._hands = _Hands()
-        self._ringing: dict[int, Struck] = {}
+        self._hands = Hands()
+        self._ringing: dict[Place, Struck] = {}
         self._all: list[Struck] = []  # with those whose place was struck again, until they are over
         self._listens: Ear | None = None
         self._take(patch)
@@ -176,11 +169,16 @@ class Player:
     def set_patch(self, patch: Patch) -> None:
         """Plays another patch, or the same with a knob turned; strings that ring glide to it.
 
+        Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
+
         Raises:
             ValueError: the tuning is impossible; nothing has changed then.
         """
         with self._lock:
+            before = self._patch
             self._take(patch)
+            if is_another(patch, before):
+                self._hands.rest()
             for struck in self._sounding():
                 self._retune(struck, KNOB_S)
 
@@ -208,10 +206,11 @@ class Player:
         """Computes what keys sound with, so that a strike need not. None: all keys of the patch."""
         low, high = self._patch.range
         for key in keys if keys is not None else range(low, high + 1):
-            try:
-                self._key(key)
-            except ValueError:
-                continue  # raised again when it is struck
+            for string in self._strings_for(key):
+                try:
+                    self._key(key, string)
+                except ValueError:
+                    continue  # raised again when it is struck
 
     # Events
 
@@ -228,9 +227,7 @@ class Player:
                 self._note_off(event)
             elif isinstance(event, Bend):
                 self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
-                for struck in self._sounding():
-                    if self._bends(struck, event.channel):
-                        self._retune(struck, BEND_S)
+                self._follow_bend(event.channel)
             elif isinstance(event, Controller):
                 self._controller(event)
             else:
@@ -259,8 +256,8 @@ class Player:
         keys = LoudKeys(patch, ear, model.configuration.grid_points)
 
         @lru_cache(maxsize=KEPT_KEYS)
-        def key_of(key: int) -> Key | None:
-            found = keys.of_key(key)
+        def key_of(key: int, string: int | None) -> Key | None:
+            found = keys.of_key(key, string)
             if found is None:
                 return None
             programs: dict[str, Program] = {}
@@ -283,10 +280,11 @@ class Player:
         if event.velocity <= 0:
             self._note_off(NoteOff(event.key, event.channel))
             return None
-        key = self._key(event.key)
+        self._hands.of(event.channel).plays = True
+        place, string = self._where(event)
+        key = self._key(event.key, string)
         if key is None:
             return None
-        place = self._place(event)
         pluck = on_string(key.string, self._pluck(event))
         voices = {
             source: Voice(program, pluck.displacement(program.grid_points), self._ear)
@@ -299,9 +297,10 @@ class Player:
             for source, voice in voices.items():
                 if not before.voices[source].over:
                     voice.continues(before.voices[source])
-        struck = Struck(place, event, key, pluck, self._ear, key.gain, voices, key.string.parameters)
+        own = key.string.parameters
+        struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own)
         parameters = self._with_hands(struck)
-        if parameters != key.string.parameters:
+        if parameters != own:
             struck.retune(parameters, 0.0)
         self._sounding()
         self._ringing[place] = struck
@@ -313,7 +312,7 @@ class Player:
         for struck in self._sounding():
             if struck.held and (struck.event.key, struck.event.channel) == (event.key, event.channel):
                 struck.held = False
-                struck.kept = self._pedal(event.channel)
+                struck.kept = self._hands.pedal(self._patch, event.channel)
                 self._damp(struck)
 
     def _damp(self, struck: Struck) -> None:
@@ -324,51 +323,72 @@ class Player:
         self._retune(struck, DAMPER_S)
 
     def _controller(self, event: Controller) -> None:
-        channel = self._hands.of(event.channel)
+        hand = self._hands.of(event.channel)
         if event.number == events.SUSTAIN:
-            channel.pedal = event.value >= events.PEDAL_DOWN
-            if not channel.pedal:
-                for struck in self._sounding():
-                    if struck.kept and not self._pedal(struck.event.channel):
-                        struck.kept = False
-                        self._damp(struck)
+            hand.pedal = event.value >= events.PEDAL_DOWN
+            self._damp_unkept()
         elif event.number == events.SLIDE:
-            channel.slide = event.value
+            hand.slide = event.value
         elif event.number == events.MOD_WHEEL:
-            self._hands.wheel = event.value
-            if self._patch.mod_wheel.startswith("knobs."):
-                for struck in self._sounding():
-                    self._retune(struck, KNOB_S)
+            self._hands.turn_wheel(event)
+            self._follow_wheel()
         elif event.number == events.SOUND_OFF:
             self.stop()
         elif event.number == events.NOTES_OFF:
             for struck in self._sounding():
-                struck.held = struck.kept = False
-                self._damp(struck)
+                if self._hands.speaks_for(self._patch, event.channel, struck.event.channel):
+                    struck.held = struck.kept = False
+                    self._damp(struck)
         elif event.number == events.RESET:
-            self._hands = _Hands()
+            self._hands.reset(self._patch, event.channel)
+            self._damp_unkept()
+            self._follow_bend(event.channel)
+            self._follow_wheel()
+        elif hand.take_parameter(event):
+            self._follow_bend(event.channel)
+
+    def _damp_unkept(self) -> None:
+        """Puts the damper on strings that a pedal kept, and keeps no longer."""
+        for struck in self._sounding():
+            if struck.kept and not self._hands.pedal(self._patch, struck.event.channel):
+                struck.kept = False
+                self._damp(struck)
+
+    def _follow_bend(self, channel: int) -> None:
+        """Retunes what the pitch wheel of a channel bends."""
+        for struck in self._sounding():
+            if self._hands.act_on(self._patch, channel, struck.event.channel):
+                self._retune(struck, BEND_S)
+
+    def _follow_wheel(self) -> None:
+        """Retunes what the modulation wheel turns."""
+        if self._patch.mod_wheel.startswith("knobs."):
             for struck in self._sounding():
                 self._retune(struck, KNOB_S)
 
-    def _place(self, event: NoteOn) -> int:
-        if self._patch.mode == "guitar":
-            return event.channel
-        return event.key if self._patch.mode == "poly" else 128 * event.channel + event.key
+    def _where(self, event: NoteOn) -> tuple[Place, int | None]:
+        """The place of a note, and on which of a set's strings it is played; None where the key chooses it."""
+        strings = self._patch.strings
+        if not self._hands.is_string(self._patch, event.channel):
+            return (event.channel if self._patch.mode == "mpe" else None, event.key), None
+        chosen = not isinstance(strings, StringSet) or chosen_string(strings, event.key) == event.channel
+        return (event.channel, None), None if chosen else event.channel
 
-    def _pedal(self, channel: int) -> bool:
-        shared = self._patch.mode == "mpe" and self._hands.of(MPE_MASTER).pedal
-        return shared or self._hands.of(channel).pedal
+    def _strings_for(self, key: int) -> Iterator[int | None]:
+        """On which strings a key may be struck, as in `_where`."""
+        yield None
+        strings = self._patch.strings
+        if self._patch.mode == "guitar" and isinstance(strings, StringSet):
+            others = fretting(strings, key)[1:]  # without the one that the key chooses
+            yield from (number for number in others if number < GUITAR_STRINGS)
 
-    def _bends(self, struck: Struck, channel: int) -> bool:
-        return struck.event.channel == channel or (self._patch.mode == "mpe" and channel == MPE_MASTER)
+    def _on(self, struck: Struck) -> int | None:
+        """On which of the present set's strings it rings; None where its key chooses it."""
+        return struck.string if self._patch.mode == "guitar" else None
 
     def _ratio(self, struck: Struck) -> float:
         """The factor by which pitch wheels raise its frequency."""
-        own = self._hands.of(struck.event.channel).bend
-        if self._patch.mode != "mpe" or struck.event.channel == MPE_MASTER:
-            return float(2 ** (own * self._patch.bend_semitones / 12))
-        shared = self._hands.of(MPE_MASTER).bend
-        return float(2 ** ((own * MPE_BEND_SEMITONES + shared * self._patch.bend_semitones) / 12))
+        return float(2 ** (self._hands.semitones(self._patch, struck.event.channel) / 12))
 
     def _pluck(self, event: NoteOn) -> Pluck:
         pluck = self._wheeled("pluck").pluck.pluck(event.velocity)
@@ -399,11 +419,12 @@ class Player:
         """The string of its key, with the present knobs, wheels and damper."""
         patch = self._wheeled("knobs")
         string = struck.key.string.parameters
+        on = self._on(struck)
         try:
-            now = self._key(struck.event.key) if patch is self._patch else None
+            now = self._key(struck.event.key, on) if patch is self._patch else None
             if now is not None:
                 string = now.string.parameters
-            elif (wheeled := Strings(patch).of_key(struck.event.key)) is not None:
+            elif (wheeled := Strings(patch).of_key(struck.event.key, on)) is not None:
                 string = wheeled.parameters
             string = (slid if self._patch.bend_by == "length" else bent)(string, self._ratio(struck))
             if struck.damped:
@@ -416,3 +437,8 @@ class Player:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
             struck.retune(parameters, seconds)
+
+
+def is_another(patch: Patch, than: Patch) -> bool:
+    """Whether a patch is another instrument: neither the same with a knob turned, nor the same under a new name."""
+    return patch.name != than.name and patch.model_copy(update={"name": than.name}) != than

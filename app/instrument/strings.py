@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from app.patches.patch import Fretted, Knobs, OpenString, Patch
+from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
 from engine.resonators.string import StringParameters
 
 HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
 MOST_MODES = 99  # the shipped model's grid holds no more
+HIGHEST_FRET = 24
+MOST_SLACKENED = 5  # keys by which a guitar's string may be tuned lower than the set's
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,12 @@ class Strings:
         self._patch = patch
         self._tuning = Tuning(patch.tuning)
 
-    def of_key(self, key: int) -> KeyString | None:
+    def of_key(self, key: int, string: int | None = None) -> KeyString | None:
         """The string of a key; None for a key beyond the patch's range, or one that its tuning leaves out.
+
+        Args:
+            string: on which of a set the key is played, counted from the highest, 0; None, or one that the set does
+                not have or that would have to be slackened too far: the one that the key itself chooses.
 
         Raises:
             ValueError: no string has that pitch; the message names the key and what is impossible.
@@ -54,7 +60,7 @@ class Strings:
             return None
         pitch_hz = self._tuning.hz(key)
         try:
-            own = self._own(key)
+            own = self._own(key, string)
             parameters = fretted(own, pitch_hz)
             modes = min(parameters.modes_below(HIGHEST_HZ), MOST_MODES)
             if modes < 1:
@@ -63,19 +69,31 @@ class Strings:
             raise ValueError(f"key {key} of {self._patch.name}, {pitch_hz:.4g} Hz: {error}") from error
         return KeyString(key, parameters, pitch_hz, modes, parameters.length_m / own.length_m)
 
-    def _own(self, key: int) -> StringParameters:
+    def _own(self, key: int, number: int | None) -> StringParameters:
         """The whole string on which a key is played, with the patch's knobs."""
         strings = self._patch.strings
         if isinstance(strings, Fretted):
             return turned(strings.string.parameters, self._patch.knobs)
-        chosen: OpenString = strings.strings[0]
-        for string in strings.strings:
-            if string.note <= key:
-                chosen = string
+        ordered = strings.strings[::-1]
+        if number is None or number >= len(ordered) or key < ordered[number].note - MOST_SLACKENED:
+            number = chosen_string(strings, key)
+        chosen = ordered[number]
         own = turned(chosen.string.parameters, self._patch.knobs)
         if key >= chosen.note:
             return own
         return bent(own, self._tuning.hz(key) / self._tuning.hz(chosen.note))  # slackened
+
+
+def chosen_string(strings: StringSet, key: int) -> int:
+    """Which string of a set, from the highest, 0, a key chooses: the highest at or below it, else the lowest."""
+    ordered = strings.strings[::-1]
+    return next((number for number, string in enumerate(ordered) if string.note <= key), len(ordered) - 1)
+
+
+def fretting(strings: StringSet, key: int) -> list[int]:
+    """The strings of a set on which a key can be fretted, counted from the highest, 0."""
+    ordered = enumerate(strings.strings[::-1])
+    return [number for number, string in ordered if string.note <= key <= string.note + HIGHEST_FRET]
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:

@@ -15,6 +15,7 @@ from app.presets.folders import user_folder
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
 from engine.plain_text import one_line
+from engine.read_file import read_bounded
 from engine.schema import SchemaError, parse_json
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
@@ -59,15 +60,9 @@ def read_patch(path: Path) -> Patch:
         PatchError: it is missing, too large, damaged, impossible, or of a newer version.
     """
     try:
-        if not path.is_file():  # reading a pipe would block
-            raise PatchError(f"{path}: no file; check the name")
-        with path.open("rb") as file:
-            raw = file.read(bounds.LARGEST_TEXT_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a path with a null character
-        if isinstance(error, PatchError):
-            raise
-        told = getattr(error, "strerror", None) or error
-        raise PatchError(f"{path}: cannot be read ({told}); check the name and its permissions") from error
+        raw = read_bounded(path, bounds.LARGEST_TEXT_BYTES)
+    except OSError as error:
+        raise PatchError(f"{path}: cannot be read ({error.strerror}); check the name and its permissions") from error
     try:
         data = parse_json(raw, str(path))
         if isinstance(data, dict) and isinstance(data.get("version"), int) and data["version"] > 1:

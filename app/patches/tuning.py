@@ -13,6 +13,7 @@ import numpy as np
 
 from engine.bounds import brief
 from engine.plain_text import one_line
+from engine.read_file import UnusableFile, read_bounded
 
 if TYPE_CHECKING:
     from app.patches.patch import TuningChoice
@@ -22,6 +23,7 @@ SCALA_FILES = (".scl", ".kbm")
 LARGEST_FILE_BYTES = 2**16
 MOST_NOTES = 1_000  # of a scale
 LARGEST_MAPPED = 20_000.0  # of any number in a keyboard mapping: the library loops up to it
+PITCHES_HZ = (1e-60, 1e60)  # of any key, so that their squares are numbers; what no string plays is refused there
 NOTES = (-128, 255)  # all keys, with any transposition and bend
 
 
@@ -61,14 +63,11 @@ def read_scala(path: Path) -> str:
     from app.patches.patch import TuningChoice, explained
 
     try:
-        if not path.is_file():  # reading a pipe would block
-            raise ValueError(one_line(f"{path}: no file; check the name"))
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_FILE_BYTES + 1)
+        raw = read_bounded(path, LARGEST_FILE_BYTES)
+    except UnusableFile as error:
+        raise ValueError(one_line(f"{path}: {error.strerror}; give a .scl or .kbm file")) from error
     except OSError as error:
         raise ValueError(one_line(f"{path}: cannot be read ({error.strerror}); check the name")) from error
-    if len(raw) > LARGEST_FILE_BYTES:
-        raise ValueError(one_line(f"{path}: longer than {LARGEST_FILE_BYTES // 2**10} KiB; give a .scl or .kbm file"))
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -107,7 +106,7 @@ def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"{field}: {one_line(str(error), 200).rstrip('.')}; {remedy}") from error
     mapped = np.array([note for note in range(NOTES[0], NOTES[1] + 1) if tuned.is_midi_note_mapped(note)])
     pitch_hz = np.array([tuned.frequency_for_midi_note(int(note)) for note in mapped])
-    bad = mapped[~(np.isfinite(pitch_hz) & (pitch_hz > 0))]
+    bad = mapped[~((pitch_hz > PITCHES_HZ[0]) & (pitch_hz < PITCHES_HZ[1]))]  # not a number is neither
     if not len(mapped) or len(bad):
         told = f"key {bad[0]}" if len(bad) else "any key"
         raise ValueError(f"{field}: gives no pitch to {told}; its intervals or its reference pitch are impossible")

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from app.instrument.events import Event
+from app.instrument.events import Event, channels_in, let_go
 from app.instrument.midi_file import event_of
 
 
@@ -51,13 +51,25 @@ def load_backend() -> Backend:
 
 
 class MidiInput:
-    """At most one open input. `on_message` is called in mido's thread, all else by one thread."""
+    """At most one open input. All is called by one thread.
 
-    def __init__(self, on_message: Callable[[Event], None], load: Callable[[], Backend] = load_backend) -> None:
+    Args:
+        on_message: is called with what comes, in mido's thread.
+        on_let_go: is called with what lets go what came, in the thread of `let_go`, `close` or `open`.
+    """
+
+    def __init__(
+        self,
+        on_message: Callable[[Event], None],
+        load: Callable[[], Backend] = load_backend,
+        on_let_go: Callable[[Event], object] = lambda event: None,
+    ) -> None:
         self._on_message = on_message
+        self._on_let_go = on_let_go
         self._load = load
         self._backend: Backend | None = None
         self._port: OpenPort | None = None
+        self._channels: set[int] = set()  # on which something came
         self.name = ""  # of the open input
 
     def names(self) -> list[str]:
@@ -72,7 +84,7 @@ class MidiInput:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:
-        """Opens the input of that name, and closes any other.
+        """Opens the input of that name, and closes any other, whose keys are let go.
 
         Raises:
             MidiUnavailable: no backend, no such input, or another program has it.
@@ -90,10 +102,17 @@ class MidiInput:
         self.name = found
 
     def close(self) -> None:
-        """Closes the input, if one is open; may be called again."""
+        """Closes the input, if one is open, and lets its keys go; may be called again."""
         port, self._port, self.name = self._port, None, ""
         if port is not None:
             port.close()
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Lets go the keys that are held through the input, and leaves its wheels and pedals at rest."""
+        channels, self._channels = self._channels, set()
+        for event in let_go(channels):
+            self._on_let_go(event)
 
     def _loaded(self) -> Backend:
         if self._backend is None:
@@ -103,6 +122,7 @@ class MidiInput:
     def _receive(self, message: Any) -> None:
         event = event_of(message)
         if event is not None:
+            self._channels |= channels_in([event])
             self._on_message(event)
 
 

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
-from app.instrument.events import NOTES_OFF, SUSTAIN, Controller, Event, TimedEvent
+from app.instrument.events import Event, TimedEvent, channels_in, let_go
 
 LEAD_S = 0.05  # before the first event
 JOIN_S = 2.0
@@ -39,7 +39,7 @@ class Playback:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops, and releases every key; may be called again."""
+        """Stops, lets every key go and leaves wheels and pedals at rest; may be called again."""
         self._stopping.set()
         thread, self._thread = self._thread, None
         if thread is not None and thread is not threading.current_thread():
@@ -51,7 +51,6 @@ class Playback:
             if stopping.wait(max(0.0, began_s + each.time_s - time.monotonic())):
                 break
             self._handle(each.event)
-        for channel in sorted({each.event.channel for each in events if hasattr(each.event, "channel")}):
-            self._handle(Controller(SUSTAIN, 0, channel))
-        self._handle(Controller(NOTES_OFF, 0))
+        for event in let_go(channels_in(each.event for each in events)):
+            self._handle(event)
         self._ended()

@@ -8,7 +8,9 @@ from itertools import count
 from pathlib import Path
 
 from app.shared.whole_file import WriteError, explain, whole_file
+from engine.bounds import LARGEST_PRESET_BYTES
 from engine.presets import PresetError, load_preset, preset_digest
+from engine.read_file import read_bounded
 from engine.sources import ModelSource
 
 SUFFIX = ".safetensors"
@@ -50,7 +52,7 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
     target = next(path for name in names if name not in taken and not (path := folder / f"{name}{SUFFIX}").exists())
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        data = file.read_bytes()
+        data = read_bounded(file, LARGEST_PRESET_BYTES)
         with whole_file(target) as copy:
             copy.write(data)
     except OSError as error:

@@ -20,6 +20,7 @@ from engine.presets import (
     preset_digest,
     preset_files,
     read_info,
+    unreadable,
 )
 from engine.schema import SchemaError
 from training.cell import Cell
@@ -112,6 +113,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     heard = {digest: found for known, _ in tables for digest, found in known.items()}
     problems = [problem for _, found in tables for problem in found]
     for folder in folders:
+        problems += [problem] if (problem := unreadable(folder)) else []
         for path in preset_files(folder):
             try:
                 if path.stem in entries:

@@ -41,6 +41,7 @@ PATCH = {  # fields of a patch, by their path; a field that is not here is named
     "damping.release_t60_s": "release",
     "mode": "playing mode",
     "bend_semitones": "range of bends",
+    "bend_by": "kind of bends",
     "mod_wheel": "modulation wheel",
     "tuning.a4_hz": "pitch of A4",
     "tuning.keymap": "keyboard mapping",

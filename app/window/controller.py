@@ -268,14 +268,14 @@ class Controller(QObject):
             return
         self.performance.stop()
         render = partial(self.performance.render_sound, self.session.choices)
-        self.performance.live.hear_dry(True)
+        self.performance.hear_dry(True)
         self._abx = AbxDialog(self.sound, subject, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 
     def _listening_test_ended(self) -> None:
         dialog, self._abx = self._abx, None
-        self.performance.live.hear_dry(False)
+        self.performance.hear_dry(False)
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
         dialog.deleteLater()

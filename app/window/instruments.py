@@ -9,7 +9,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 
-from app.instrument.events import Event, NoteOff, NoteOn
+from app.instrument.events import KEYS, Event, NoteOff, NoteOn
 from app.instrument.player import Struck
 from app.patches.patch import Patch, PhysicalString
 from app.playing.keyboard import LOWEST_C, KeyPress, Reach, play, semitone_of, turn
@@ -156,11 +156,11 @@ class Instruments(QObject):
             key = LOWEST_C + 12 * choices.octave + semitone
             if 0 <= key <= HIGHEST_KEY:
                 self._down[press] = key
-                self.play(NoteOn(key, choices.velocity))
+                self.play(NoteOn(key, choices.velocity, KEYS))
         elif (turned := turn(press, choices.octave, choices.velocity)) is not None:
             self._session.update(octave=turned[0], velocity=turned[1])
 
     def _release(self, press: KeyPress) -> None:
         key = self._down.pop(press, None)
         if key is not None:
-            self.play(NoteOff(key))
+            self.play(NoteOff(key, KEYS))

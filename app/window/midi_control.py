@@ -58,7 +58,7 @@ class MidiControl(QObject):
         self._dialog: MidiDialog | None = None
         self._patch: Patch | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
-        self.input = MidiInput(self._receive, load)
+        self.input = MidiInput(self._receive, load, handle)
 
     def start(self) -> None:
         """Opens the remembered input, if any; emits `told` where it cannot."""
@@ -83,7 +83,7 @@ class MidiControl(QObject):
             )
             dialog.patch_turned.connect(self.patch_turned)
             dialog.port_chosen.connect(self._choose_port)
-            dialog.notes_chosen.connect(lambda mode: self._remember(self.choices.model_copy(update={"notes": mode})))
+            dialog.notes_chosen.connect(self._choose_notes)
             dialog.learn_asked.connect(self._learn)
             dialog.forget_asked.connect(lambda field: self._remember(self.choices.forgotten(field)))
             dialog.finished.connect(lambda _: self._learn(""))
@@ -129,6 +129,10 @@ class MidiControl(QObject):
         if problem:
             self._dialog.show_problem(problem)
 
+    def _choose_notes(self, mode: str) -> None:
+        self.input.let_go()  # releases of what is held would no longer be played
+        self._remember(self.choices.model_copy(update={"notes": mode}))
+
     def _learn(self, field: str) -> None:
         """Assigns the next controller that moves to `field`; "", or the same field again: ends waiting for one."""
         self._learning = field if field and field != self._learning else None
@@ -156,6 +160,7 @@ class MidiControl(QObject):
         if self._learning is not None and isinstance(event, Controller):
             field, self._learning = self._learning, None
             self._remember(self.choices.learned(field, event.number))
+            self.input.let_go()  # it may be the pedal, whose release would no longer be played
         meaning = meaning_of(event, self.choices, self._reach(), self._presets())
         if meaning.changes:
             self.performed.emit(meaning.changes)

@@ -14,8 +14,9 @@ from PySide6.QtWidgets import QInputDialog
 
 from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import MidiFileError, read_midi
+from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import MidiFileError, read_song
+from app.instrument.player import is_another
 from app.instrument.strings import Strings
 from app.patches.library import (
     SUFFIX,
@@ -98,7 +99,7 @@ class PatchDesk(QObject):
     def _connect(self) -> None:
         panel, bar, browser = self._panel, self._panel.bar, self.browser
         panel.pressed.connect(self._press)
-        panel.released.connect(lambda key: self._instruments.play(NoteOff(key)))
+        panel.released.connect(lambda key: self._instruments.play(NoteOff(key, KEYS)))
         bar.previous_asked.connect(lambda: self.step(-1))
         bar.next_asked.connect(lambda: self.step(1))
         bar.browse_asked.connect(self.toggle)
@@ -260,7 +261,7 @@ class PatchDesk(QObject):
         """One of TAKEN_FILES that was dropped: a patch or a string is chosen, a MIDI file played, a scale tunes."""
         try:
             if file.suffix.lower() in MIDI_FILES:
-                self._playback.play(read_midi(file))
+                self._play_file(file)
             elif file.suffix.lower() in SCALA_FILES:
                 self._tune(file)
             elif file.suffix.lower() == STRING_FILE:
@@ -269,6 +270,12 @@ class PatchDesk(QObject):
                 self._session.update(**choices_of(read_patch(file)))
         except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
             self.told.emit(one_line(str(error)))
+
+    def _play_file(self, file: Path) -> None:
+        song = read_song(file, "poly" if self.patch is None else self.patch.mode)
+        if song.left_out:
+            self.informed.emit(f"{song.left_out}.")
+        self._playback.play(song.events)
 
     def _take_string(self, file: Path) -> None:
         """Chooses the string whose physical parameters the file has, plucked by the model of many strings."""
@@ -373,7 +380,7 @@ class PatchDesk(QObject):
         """
         patch, before, self._noted = self.patch, self._noted, self.patch
         pitches = self._instruments.plays_pitches
-        if patch is None or not pitches or _is_another(before, patch):
+        if patch is None or not pitches or before is None or is_another(patch, before):
             self._instruments.latest = None
         if self._instruments.latest is not None:
             self.show_played()
@@ -442,7 +449,7 @@ class PatchDesk(QObject):
     def _press(self, key: int, velocity: int) -> None:
         """Plays a key on the screen; these are always pitches."""
         self._session.update(keys_play="pitch")
-        self._instruments.play(NoteOn(key, velocity))
+        self._instruments.play(NoteOn(key, velocity, KEYS))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)
@@ -470,14 +477,7 @@ class PatchDesk(QObject):
 
 
 def _note(key: int) -> list[TimedEvent]:
-    return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY)), TimedEvent(AUDITION_S, NoteOff(key))]
-
-
-def _is_another(before: Patch | None, patch: Patch) -> bool:
-    """Whether it is more than the same patch with knobs turned, or under another name."""
-    if before is None:
-        return True
-    return before.name != patch.name and before.model_copy(update={"name": patch.name}) != patch
+    return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY, KEYS)), TimedEvent(AUDITION_S, NoteOff(key, KEYS))]
 
 
 def facts_of(patch: Patch) -> dict[str, str]:

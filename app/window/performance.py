@@ -44,6 +44,7 @@ MotionKey = tuple[str, StringParameters, Pluck, float]  # the preset's name, its
 LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
 KEY_FIELDS = {"preset", "string", "amplitude_mm", "shape", "width"}  # what plucks of keys at ten places depend on
+SLOT_FIELDS = {"a", "b", "heard"}
 MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
 
@@ -217,6 +218,8 @@ class Performance(QObject):
             self.notes.set_mix(mix_of(choices))
         if names & {*EAR_FIELDS, "patch"}:  # another patch ends a comparison, which was heard elsewhere
             self.notes.listen(heard_ear(choices))
+        if names & SLOT_FIELDS:
+            self.hear_dry(False)
         if "patch" in names:
             self.live.set_patch(choices.patch, heard_ear(choices))
         elif names & EAR_FIELDS:
@@ -232,6 +235,10 @@ class Performance(QObject):
         if entry is not None and render_request(choices, entry.path, self._library) != self._asked:
             self.render()
         self.follow()
+
+    def hear_dry(self, dry: bool) -> None:
+        """Leaves body and room out where `dry` is True; else only while the difference is heard."""
+        self.live.hear_dry(dry or self._session.source_heard == "difference")
 
     def hear_patch(self, patch: Patch | None) -> None:
         """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""

@@ -42,8 +42,7 @@ class Keeper(QObject):
         rested, self._seen = now == self._seen, now
         if not rested or now == self._base or (self._writing is not None and self._writing.is_alive()):
             return
-        base, self._base = self._base, now
-        self._writing = threading.Thread(target=self._write, args=(base, now), name="settings")
+        self._writing = threading.Thread(target=self._write, args=(self._base, now), name="settings")
         self._writing.start()
 
     def close(self) -> None:
@@ -54,7 +53,6 @@ class Keeper(QObject):
         now = self._current()
         if now != self._base or not self._path.exists():
             self._write(self._base, now)
-            self._base = now
 
     def _write(self, base: Settings, now: Settings) -> None:
         try:
@@ -62,6 +60,7 @@ class Keeper(QObject):
             with FileLock(self._path.with_name(f".{self._path.name}.lock"), timeout=LOCK_S):
                 theirs = read_settings(self._path)
                 save_settings(self._path, now if theirs is None else merged(base, now, theirs))
+            self._base = now  # not where it failed: it is tried again
         except OSError as error:
             if not self._told:  # once: it would come again with every change
                 self._told = True

@@ -5,7 +5,6 @@ A broken one is set aside, not fatal; where only some fields are wrong, the othe
 
 from __future__ import annotations
 
-import errno
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -22,6 +21,7 @@ from app.session.choices import Choices
 from app.views.look import Look
 from engine import bounds
 from engine.plain_text import one_line
+from engine.read_file import read_bounded
 from engine.schema import SchemaError, parse_json
 from engine.whole_file import whole_file
 
@@ -75,18 +75,18 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         told = error.strerror or error
         return Settings(), one_line(f"The settings {path} cannot be read ({told}); starting with defaults.")
     try:
-        return Settings.model_validate_json(text), ""
-    except (ValidationError, OverflowError) as error:  # the latter of integers where numbers belong
+        return _parsed(text), ""
+    except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
             path.replace(aside)
         except OSError:
             aside = path
-        kept, why = None, str(error)
+        kept, why = None, "" if isinstance(error, ValidationError) else str(error)
         if isinstance(error, ValidationError):
-            first = error.errors()[0]
-            why = f"{'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}"
-            kept = _without(text, error)
+            faults = error.errors(include_url=False, include_input=False)
+            why = f"{'.'.join(map(str, faults[0]['loc'])) or 'the file'}: {faults[0]['msg']}"
+            kept = _without(text, [[str(part) for part in fault["loc"]] for fault in faults])
         told = (
             f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
@@ -97,7 +97,7 @@ def load_settings(path: Path) -> tuple[Settings, str]:
 def read_settings(path: Path) -> Settings | None:
     """The settings of a file; None where it is missing or cannot be used as a whole. Never raises."""
     try:
-        return Settings.model_validate_json(_bytes(path))
+        return _parsed(_bytes(path))
     except (OSError, ValueError, OverflowError):
         return None
 
@@ -121,16 +121,15 @@ def _changed(base: BaseModel, now: BaseModel) -> set[str]:
 
 
 def _bytes(path: Path) -> bytes:
-    with path.open("rb") as file:
-        text = file.read(bounds.LARGEST_TEXT_BYTES + 1)
-    if len(text) > bounds.LARGEST_TEXT_BYTES:
-        raise OSError(errno.EFBIG, "it is larger than any settings", str(path))
-    return text
+    return read_bounded(path, bounds.LARGEST_TEXT_BYTES)
 
 
-def _without(text: bytes, error: ValidationError) -> Settings | None:
-    """The settings less the fields that `error` names; None where nothing is left to keep."""
-    fields = [[str(part) for part in fault["loc"]] for fault in error.errors()]
+def _parsed(text: bytes) -> Settings:
+    return Settings.model_validate(parse_json(text, "the file"))
+
+
+def _without(text: bytes, fields: list[list[str]]) -> Settings | None:
+    """The settings less the fields at these paths of keys; None where nothing is left to keep."""
     if any(field[:1] in ([], ["version"]) for field in fields):  # no settings, or those of another version
         return None
     try:

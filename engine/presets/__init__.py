@@ -16,7 +16,7 @@ from engine.presets.file import (
     read_info,
     save_preset,
 )
-from engine.presets.finding import SHIPPED, find_preset, preset_files
+from engine.presets.finding import SHIPPED, find_preset, preset_files, unreadable
 from engine.presets.info import PresetInfo, TrainedRange, outside_training
 from engine.presets.of_string import STRINGS, find_string, of_string, read_string
 
@@ -38,4 +38,5 @@ __all__ = [
     "read_info",
     "read_string",
     "save_preset",
+    "unreadable",
 ]

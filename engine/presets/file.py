@@ -10,6 +10,8 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -121,10 +123,11 @@ def preset_digest(path: Path) -> str:
     """SHA-256 of a preset's file, in hexadecimal; remembered for as long as the file is the same one.
 
     Raises:
-        PresetError: it cannot be read.
+        PresetError: it cannot be read, is no file, or is larger than a preset may be.
     """
     try:
         state = path.stat()
+        _check_kind(path, state)
         return _digest(path, state.st_mtime_ns, state.st_size)
     except OSError as error:
         raise PresetError(f"{path}: the preset cannot be read any more ({error.strerror}); put it back") from error
@@ -144,15 +147,7 @@ class _open:
 
     def __enter__(self) -> Any:
         try:
-            size = self._path.stat().st_size
-            if not self._path.is_file():
-                raise PresetError(f"{self._path}: not a file; give a .safetensors preset")
-            if size > bounds.LARGEST_PRESET_BYTES:
-                most = bounds.LARGEST_PRESET_BYTES
-                raise PresetError(
-                    f"{self._path}: {size / 2**20:.0f} MiB is more than the {most // 2**20} MiB that a preset may"
-                    " have; it is not one of ours"
-                )
+            _check_kind(self._path, self._path.stat())
             check_header(self._path)
             self._file = safe_open(self._path, framework="pt")
             return self._file.__enter__()
@@ -167,6 +162,18 @@ class _open:
 
     def __exit__(self, *exception: Any) -> None:
         self._file.__exit__(*exception)
+
+
+def _check_kind(path: Path, state: os.stat_result) -> None:
+    """Raises PresetError where it is a folder, a pipe, which would keep a reader waiting, or too large."""
+    if not stat.S_ISREG(state.st_mode):
+        raise PresetError(f"{path}: not a file; give a .safetensors preset")
+    if state.st_size > bounds.LARGEST_PRESET_BYTES:
+        most = bounds.LARGEST_PRESET_BYTES
+        raise PresetError(
+            f"{path}: {state.st_size / 2**20:.0f} MiB is more than the {most // 2**20} MiB that a preset may"
+            " have; it is not one of ours"
+        )
 
 
 def check_header(path: Path) -> None:

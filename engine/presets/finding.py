@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
+from engine.plain_text import one_line
 from engine.presets.file import PresetError
 
 SHIPPED = Path(__file__).parents[2] / "presets"
 
 
 def preset_files(*folders: Path) -> list[Path]:
-    """The preset files of the given folders (the shipped ones by default), by name."""
-    return sorted((p for folder in folders or (SHIPPED,) for p in folder.glob("*.safetensors")), key=lambda p: p.stem)
+    """The preset files of the given folders (the shipped ones by default), by name.
+
+    A folder that is missing, or that nobody may look into, has none; `unreadable` tells why.
+    """
+    found = []
+    for folder in folders or (SHIPPED,):
+        with contextlib.suppress(OSError):
+            found += [path for path in folder.iterdir() if path.suffix == ".safetensors"]
+    return sorted(found, key=lambda path: path.stem)
+
+
+def unreadable(folder: Path) -> str:
+    """Why a folder that is there cannot be looked into, in one line; empty where it can, or is not there."""
+    try:
+        next(folder.iterdir(), None)
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        return one_line(f"{folder}: cannot be looked into ({error.strerror}); check its name and permissions")
+    return ""
 
 
 def find_preset(name_or_path: str, files: Iterable[Path] | None = None) -> Path:

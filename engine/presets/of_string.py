@@ -65,7 +65,7 @@ def of_string(
     try:
         told = info_of_string(preset.info, string, rate_hz, modes)
         model = preset.model.tuned(Physics(told.resonator, told.rate_hz, told.scale_m))
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise PresetError(f"{preset.path}: string: {error}") from error
     return replace(preset, info=told, model=model.eval())
 

@@ -27,7 +27,7 @@ from app.export.sampled.store import SampleIndex, StoredSample, read_index
 from app.export.wav import WavSettings
 from app.instrument.bodies import own_bodies
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
-from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi
+from app.instrument.midi_file import LONGEST_S, MOST_EVENTS, MidiFileError, midi_bytes, read_midi, read_song
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, list_patches, read_patch
 from app.patches.patch import TuningChoice
@@ -256,6 +256,7 @@ def scala_or_bytes(whole: bytes, draw: random.Random) -> bytes:
 def song(path: Path) -> None:
     """Reads a MIDI file, and writes what it says."""
     events = read_midi(path)
+    assert read_song(path, "mpe").events == events
     assert all(0 <= each.time_s <= LONGEST_S for each in events) and len(events) <= MOST_EVENTS
     for each in events:
         if isinstance(each.event, Bend):

@@ -22,6 +22,8 @@ from engine.presets.file import check_header
 from engine.schema import parse_json
 from engine.whole_file import whole_file
 
+LARGEST_BYTES = 2 * 2**30  # weights, their mean, the best of them, and the moments of the optimiser
+
 
 @dataclass(frozen=True)
 class Checkpoint:
@@ -53,12 +55,14 @@ class Checkpoint:
 
     @classmethod
     def load(cls, path: Path) -> Checkpoint:
-        """Raises ValueError, naming the file and the remedy, where it is damaged."""
+        """Raises ValueError, naming the file and the remedy, where it is damaged, or no file of ours."""
         model: dict[str, Tensor] = {}
         best: dict[str, Tensor] = {}
         average: dict[str, Tensor] = {}
         optimiser: dict[str, dict[str, Tensor]] = {}
         try:
+            if path.exists() and (not path.is_file() or path.stat().st_size > LARGEST_BYTES):
+                raise ValueError(f"no file of at most {LARGEST_BYTES // 2**20} MiB")
             check_header(path)
             with safe_open(path, framework="pt") as file:
                 facts = parse_json(file.metadata()["facts"], "facts")

@@ -21,6 +21,8 @@ from app.shared.vocabulary import Pickup
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine.plain_text import one_line
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Shape
+from engine.read_file import UnusableFile, read_bounded
+from engine.schema import SchemaError, parse_json
 
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
 VERSION: Literal[2] = 2  # 1 did not tell the string
@@ -161,14 +163,16 @@ def load_record(path: Path) -> AbxRecord:
         RecordError: it is missing, damaged, edited, or of a newer version.
     """
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE_BYTES + 1)
+        data = parse_json(read_bounded(path, LARGEST_FILE_BYTES), "the record")
+    except UnusableFile as error:
+        raise RecordError(f"{path}: {error.strerror}; choose the record of a listening test") from error
     except OSError as error:
         raise RecordError(f"{path}: cannot be read ({error.strerror}); check the name") from error
-    if len(data) > LARGEST_FILE_BYTES:
-        raise RecordError(f"{path}: too large for a record of a listening test; choose another file")
+    except SchemaError as error:
+        told = "not a JSON file, or cut short; choose the record of a listening test"
+        raise RecordError(one_line(f"{path}: {told} ({error})")) from error
     try:
-        return AbxRecord.model_validate_json(data)
+        return AbxRecord.model_validate(data)
     except ValidationError as error:
         raise RecordError(_explain(path, error)) from error
     except OverflowError as error:
@@ -211,10 +215,8 @@ def make_record(
 
 
 def _explain(path: Path, error: ValidationError) -> str:
-    first = error.errors()[0]
-    fields = {entry["loc"][0] for entry in error.errors() if entry["loc"]}
-    if first["type"] == "json_invalid":
-        return f"{path}: not a JSON file, or cut short; choose the record of a listening test"
+    faults = error.errors(include_url=False, include_input=False)
+    first, fields = faults[0], {entry["loc"][0] for entry in faults if entry["loc"]}
     if "kind" in fields or (not first["loc"] and first["type"] != "value_error"):
         return f"{path}: not the record of a listening test; choose another file"
     if "version" in fields:

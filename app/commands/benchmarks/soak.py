@@ -46,6 +46,7 @@ from app.audio.choices import SoundChoice
 from app.commands.benchmarks.machine import Machine
 from app.commands.benchmarks.play import analysis, hands
 from app.commands.benchmarks.play.children import Missing, need_programs
+from app.commands.benchmarks.play.control import steady_tone_aside
 from app.commands.benchmarks.play.recording import recording_aside
 from app.commands.benchmarks.play.sound_server import RATE_HZ, sound_server
 from app.commands.benchmarks.random_changes import Repertoire, random_change
@@ -79,6 +80,7 @@ class Holes:
         heard_ms, longest_ms: of them together, and of the longest.
         heard_at_s: since the recording began.
         told: by the app's mixer, by cause; of very many the latest.
+        control: of a steady tone that another process plays meanwhile in the same way: the machine's, not the app's.
     """
 
     seconds: float
@@ -87,6 +89,8 @@ class Holes:
     longest_ms: float
     heard_at_s: tuple[float, ...]
     told: dict[str, int]
+    control: int
+    control_ms: float
 
     @property
     def a_minute(self) -> float:
@@ -146,7 +150,10 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
             memory_mib: list[float] = []
             watch = _Watch(stage, seconds, report)
             gaps_before = len(stage.controller.sound.status().gaps)
-            with recording_aside(server, file):
+            with (
+                steady_tone_aside(server, Path(folder), settings.sound.buffer) as tone,
+                recording_aside(server, file),
+            ):
                 if playing:
                     changes, plucks = 0, _play(stage, random, seconds)
                 else:
@@ -157,7 +164,7 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
                 memory_mib = watch.at_each_minute()
             notices, platform = stage.window.notices.notices, stage.platform
             faults.update({notice.details: notice.times for notice in notices if "Traceback" in notice.details})
-        holes = _holes(file, playing, Counter(gap.cause for gap in gaps))
+        holes = _holes(file, tone, playing, Counter(gap.cause for gap in gaps))
     left = [thread.name for thread in threading.enumerate() if thread not in threads_before]
     return Soak(
         Machine.here(),
@@ -180,10 +187,11 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
     )
 
 
-def _holes(file: Path, playing: bool, told: Counter[str]) -> Holes:
-    sound = np.memmap(file, np.float32, "r", shape=(file.stat().st_size // 4,))
+def _holes(file: Path, tone: Path, playing: bool, told: Counter[str]) -> Holes:
+    sound, control = (np.memmap(each, np.float32, "r", shape=(each.stat().st_size // 4,)) for each in (file, tone))
     found = [silence for silence in analysis.silences(sound, RATE_HZ) if playing or silence.sharp]
     lengths_ms = [1000 * silence.frames / RATE_HZ for silence in found]
+    controls_ms = [1000 * silence.frames / RATE_HZ for silence in analysis.silences(control, RATE_HZ)]
     return Holes(
         len(sound) / RATE_HZ,
         len(found),
@@ -191,6 +199,8 @@ def _holes(file: Path, playing: bool, told: Counter[str]) -> Holes:
         max(lengths_ms, default=0.0),
         tuple(round(silence.start / RATE_HZ, 3) for silence in found),
         dict(told),
+        len(controls_ms),
+        sum(controls_ms),
     )
 
 

@@ -20,6 +20,8 @@ from app.export.sound import Cancelled, ExportCancelled
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
 from engine.plain_text import one_line
+from engine.read_file import UnusableFile, read_bounded
+from engine.schema import parse_json
 
 INDEX = "index.json"
 LOCK = ".index.lock"
@@ -217,16 +219,15 @@ def read_index(path: Path) -> SampleIndex | None:
         ExportError: there is one that is not the index of samples, or one of another version.
     """
     try:
-        with path.open("rb") as file:
-            raw = file.read(bounds.LARGEST_TABLE_BYTES + 1)
-        if len(raw) > bounds.LARGEST_TABLE_BYTES:
-            raise ValueError("too large")
-        return SampleIndex.model_validate_json(raw)
+        raw = read_bounded(path, bounds.LARGEST_TEXT_BYTES)
+        return SampleIndex.model_validate(parse_json(raw, str(path)))
     except FileNotFoundError:
         return None
+    except UnusableFile as error:
+        raise ExportError(f"{path}: {error.strerror}; remove it, or choose another name") from error
     except OSError as error:
         raise ExportError(explain(path, error)) from error
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise ExportError(
             f"{path}: no index of samples that this version reads; remove its folder, or choose another name"
         ) from error

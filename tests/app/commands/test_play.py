@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import soundfile
+from numpy.typing import NDArray
 
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
@@ -64,3 +66,37 @@ def test_what_cannot_be_played_is_told_in_a_line(run, tmp_path: Path) -> None:
         assert found.status == 1
         assert found.err.count("\n") == 1
     assert not out.exists()
+
+
+def test_drums_are_left_out_and_that_is_told_in_a_line(run, tmp_path: Path) -> None:
+    (tmp_path / "plain.mid").write_bytes(midi_bytes(EVENTS))
+    (tmp_path / "drums.mid").write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(40, 127, 9)), *EVENTS]))
+
+    def played(name: str) -> tuple[bytes, str]:
+        out = tmp_path / f"{name}.wav"
+        found = run("play", tmp_path / f"{name}.mid", "--patch", "jazz_guitar", "--out", out, "--seconds", "0.5")
+        assert found.status == 0, found.err
+        return soundfile.read(out)[0].tobytes(), found.err
+
+    (plain, silent), (without, told) = played("plain"), played("drums")
+    assert plain == without
+    assert "drums.mid is played without its drums (channel 10)" in told
+    assert "drums" not in silent
+
+
+def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_patch(run, tmp_path: Path) -> None:
+    chord = [TimedEvent(0.0, NoteOn(key, 90, 2)) for key in (60, 64, 67)]  # all on the oud's highest string
+
+    def played(name: str, events: list[TimedEvent]) -> NDArray[np.float64]:
+        (tmp_path / f"{name}.mid").write_bytes(midi_bytes(events))
+        out = tmp_path / f"{name}.wav"
+        found = run("play", tmp_path / f"{name}.mid", "--patch", "oud", "--out", out, "--seconds", "0.5")
+        assert found.status == 0, found.err
+        sound = soundfile.read(out, always_2d=True)[0][:, 0]
+        return np.abs(np.fft.rfft(sound * np.hanning(len(sound))))
+
+    together = played("chord", chord)
+    for key in (60, 64, 67):
+        near = round(0.5 * 440 * 2 ** ((key - 69) / 12))
+        alone = played("alone", [TimedEvent(0.0, NoteOn(key, 90, 2))])
+        assert together[near - 2 : near + 3].max() > 0.5 * alone[near - 2 : near + 3].max()

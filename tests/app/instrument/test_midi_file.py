@@ -5,8 +5,8 @@ from pathlib import Path
 import mido
 import pytest
 
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent
-from app.instrument.midi_file import MidiFileError, event_of, midi_bytes, read_midi
+from app.instrument.events import KEYS, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
+from app.instrument.midi_file import MidiFileError, Song, event_of, midi_bytes, read_midi, read_song
 from app.patches.patch import Patch
 
 PLAYED = [
@@ -87,10 +87,53 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     file = tmp_path / "huge.mid"
     with file.open("wb") as out:
         out.truncate(100 * 2**20)
-    with pytest.raises(MidiFileError, match="4 MiB"):
+    with pytest.raises(MidiFileError, match="1 MiB"):
         read_midi(file)
 
 
 def test_no_file_says_so(tmp_path: Path) -> None:
     with pytest.raises(MidiFileError, match="cannot be read"):
         read_midi(tmp_path / "none.mid")
+
+
+def song(folder: Path, *notes: tuple[int, int]) -> Path:
+    """A file with a note for each key and channel, and the sustain pedal of each channel."""
+    timed: list[TimedEvent] = []
+    for number, (key, channel) in enumerate(notes):
+        timed += [
+            TimedEvent(0.5 * number, NoteOn(key, 90, channel)),
+            TimedEvent(0.5 * number, Controller(64, 9, channel)),
+        ]
+    file = folder / "song.mid"
+    file.write_bytes(midi_bytes(timed))
+    return file
+
+
+def notes_of(song: Song) -> list[tuple[int, int]]:
+    return [(each.event.key, each.event.channel) for each in song.events if isinstance(each.event, NoteOn)]
+
+
+def test_drums_are_no_strings_and_that_is_told(tmp_path: Path) -> None:
+    found = read_song(song(tmp_path, (60, 0), (36, 9), (62, 1)), "poly")
+    assert notes_of(found) == [(60, 0), (62, 1)]
+    assert channels_in(each.event for each in found.events) == {0, 1}
+    assert found.left_out == "song.mid is played without its drums (channel 10)"
+    with_drums = read_song(song(tmp_path, (60, 1), (36, 9)), "mpe")  # there channel 10 is a member
+    assert (notes_of(with_drums), with_drums.left_out) == ([(60, 1), (36, 9)], "")
+    assert read_song(song(tmp_path, (60, 0)), "poly").left_out == ""
+    with pytest.raises(MidiFileError, match="only drums"):
+        read_song(song(tmp_path, (36, 9)), "poly")
+
+
+def test_a_file_of_one_channel_is_no_guitars(tmp_path: Path) -> None:
+    one = song(tmp_path, (60, 3), (64, 3), (36, 9))
+    assert notes_of(read_song(one, "guitar")) == [(60, KEYS), (64, KEYS)]
+    assert channels_in(each.event for each in read_song(one, "guitar").events) == {KEYS}
+    assert notes_of(read_song(one, "poly")) == [(60, 3), (64, 3)]
+    assert notes_of(read_song(song(tmp_path, (60, 3), (64, 0)), "guitar")) == [(60, 3), (64, 0)]
+
+
+def test_keys_of_the_computer_are_written_on_the_first_channel(tmp_path: Path) -> None:
+    file = tmp_path / "keys.mid"
+    file.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(60, 90, KEYS)), TimedEvent(0.5, NoteOff(60, KEYS))]))
+    assert [each.event for each in read_midi(file)] == [NoteOn(60, 90), NoteOff(60)]

@@ -165,14 +165,14 @@ def test_in_guitar_mode_a_channel_is_one_string(guitar: Patch, preset: Preset) -
     struck: list[Struck] = []
     player = Player(guitar, preset, RATE_HZ, struck.append)
     mixer = Mixer(RATE_HZ)
+    player.handle(NoteOn(60, 100, channel=1))
+    mixer.add(*struck[-1].voices.values())
     for key in (64, 67, 71):
         player.handle(NoteOn(key, 100, channel=0))
         mixer.add(*struck[-1].voices.values())
         mixer.render(4800)
-    player.handle(NoteOn(60, 100, channel=1))
-    mixer.add(*struck[-1].voices.values())
-    assert [each.event.key for each in player.sounding()] == [71, 60]
-    assert [each.over for each in struck] == [True, True, False, False]
+    assert [each.event.key for each in player.sounding()] == [60, 71]
+    assert [each.over for each in struck] == [False, True, True, False]
 
 
 def test_in_mpe_each_note_bends_alone(patch: Patch, preset: Preset) -> None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 
 from app.instrument.strings import Strings, bent, damped, fretted, pitch_hz_of, slid, turned
-from app.patches.patch import Knobs, Patch, TuningChoice
+from app.patches.patch import Knobs, OpenString, Patch, StringSet, TuningChoice
 from engine.resonators.string import StringParameters
+from tests.app.instrument.conftest import physical
 
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
 
@@ -36,6 +37,24 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
     assert lowest is not None
     assert low.parameters.tension_n < 0.5 * lowest.parameters.tension_n
     assert abs(low.parameters.length_m / lowest.parameters.length_m - 1) < 1e-3
+
+
+def test_a_set_may_be_told_on_which_string(guitar: Patch) -> None:
+    strings = [
+        OpenString(note=note, string=physical(replace(STEEL, tension_n=tension_n)))
+        for note, tension_n in ((50, 60.0), (55, 70.0), (59, 80.0))
+    ]
+    found = Strings(Patch.model_validate({**dict(guitar), "strings": StringSet(strings=tuple(strings))}))
+
+    def tension_n(key: int, string: int | None) -> float:
+        of_key = found.of_key(key, string)
+        assert of_key is not None
+        assert abs(cents(pitch_hz_of(of_key.parameters), 440 * 2 ** ((key - 69) / 12))) < 1e-3
+        return of_key.parameters.tension_n
+
+    assert [tension_n(64, string) for string in (None, 0, 1, 2, 3)] == [80.0, 80.0, 70.0, 60.0, 80.0]
+    assert [tension_n(53, string) for string in (None, 0, 2)] == [60.0, 60.0, 60.0]  # 0 is too far above
+    assert tension_n(57, 0) == pytest.approx(80 * 2 ** (-4 / 12), rel=0.01)  # it is slackened
 
 
 def test_a_key_beyond_the_range_is_none(patch: Patch) -> None:

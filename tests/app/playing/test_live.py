@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.events import SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import KEYS, SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
 from app.playing.live import Live
 from app.playing.notes import Notes
+from app.playing.playback import Playback
 from app.playing.sources import Sources
 from app.playing.stroke import Mix
 from engine.effects import Effects
@@ -146,3 +147,16 @@ def test_the_pick_up_through_which_it_is_heard_is_recorded(live: Live, patch: Pa
         (EAR.points, EAR.pickup),
         ((0.1, 0.2), "velocity"),
     ]
+
+
+def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(live: Live, wait: Wait) -> None:
+    playback = Playback(live.handle)
+    bent = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.0, Bend(1.0)), TimedEvent(600.0, NoteOff(45))]
+    playback.play(bent)
+    wait(lambda: live._player is not None and live._player._hands.of(0).bend == 1.0)
+    playback.stop()
+    for channel in (0, KEYS):
+        made = live.handle(NoteOn(57, 60, channel))
+        assert made is not None
+        struck, _ = made
+        assert struck.parameters == struck.key.string.parameters

@@ -3,7 +3,7 @@ from __future__ import annotations
 import threading
 import time
 
-from app.instrument.events import NOTES_OFF, Controller, Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import KEYS, NOTES_OFF, Bend, Controller, Event, NoteOff, NoteOn, TimedEvent, let_go
 from app.playing.playback import Playback
 
 
@@ -30,3 +30,13 @@ def test_it_can_be_stopped_and_lets_go() -> None:
     assert not playback.playing
     assert came[-1] == Controller(NOTES_OFF, 0)
     playback.stop()
+
+
+def test_wheels_and_pedals_of_every_channel_are_at_rest_when_it_ends_within_a_bend() -> None:
+    came: list[Event] = []
+    ended = threading.Event()
+    played: list[Event] = [NoteOn(60, 90), Bend(1.0), NoteOn(64, 90, 5), Bend(-0.5, 5), NoteOn(65, 90, KEYS)]
+    Playback(came.append, ended.set).play([TimedEvent(0.0, event) for event in played])
+    assert ended.wait(10)
+    assert came == [*played, *let_go([0, 5, KEYS])]
+    assert [event for event in came[5:] if isinstance(event, Bend)] == [Bend(0.0), Bend(0.0, 5), Bend(0.0, KEYS)]

@@ -42,6 +42,7 @@ def test_fields_of_a_patch(guitar: Patch, harp: Patch) -> None:
     assert words(guitar, with_part(guitar, body=Body(name="mine", mix=guitar.body.mix))) == "body"
     scale = "! a\n!\nhalves\n 2\n!\n 600.\n 2/1\n"
     assert words(guitar, with_part(guitar, tuning=TuningChoice(scale=scale))) == "scale"
+    assert words(guitar, with_part(guitar, bend_by="length")) == "kind of bends"
     assert words(guitar, with_part(guitar, strings=harp.strings)) == "strings"
     two = guitar.with_values({"knobs.stiffness": 2.0, "level_db": -3.0})
     assert words(guitar, two) == "stiffness and level"

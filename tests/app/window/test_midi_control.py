@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QCoreApplication, Qt
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, let_go
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.playing.keyboard import Reach
@@ -161,6 +161,65 @@ def test_pitches_are_played_by_the_patch_with_bends_pedals_and_releases(
         (event, False) for event in (NoteOn(60, 90, 3), Bend(-1.0, 3), Controller(64, 127, 3), NoteOff(60, 3))
     ]
     assert played == []
+
+
+@pytest.fixture
+def came() -> list[Event]:
+    """What the patch was given to play."""
+    return []
+
+
+@pytest.fixture
+def heard(qtbot: QtBot, backend: FakeBackend, played: Played, came: list[Event]) -> Iterator[MidiControl]:
+    """An input through which a patch is played, with the dialog open; the pedal is assigned."""
+    choices = MidiChoices(port="Keys:Keys 9:0", controllers={"width": 64})
+    midi = control(choices, ["a"], played, lambda: backend, lambda event: came.append(event) is None)
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.start()
+    midi.show_dialog(window)
+    yield midi
+    midi.close()
+
+
+@pytest.mark.parametrize("change", ["another", "none", "close", "notes"])
+def test_what_an_input_holds_is_let_go_with_it(
+    heard: MidiControl, backend: FakeBackend, came: list[Event], change: str
+) -> None:
+    """And nothing of that is learned, or taken for a controller that somebody moved."""
+    performed: list[dict[str, Any]] = []
+    heard.performed.connect(performed.append)
+    dialog = heard._dialog
+    assert dialog is not None
+    backend.send("note_on", note=60, velocity=90, channel=2)
+    backend.send("pitchwheel", pitch=-8192, channel=2)
+    dialog.learn_asked.emit("listen")
+    came.clear()
+    changes: dict[str, Callable[[], object]] = {
+        "another": lambda: dialog.port_chosen.emit("Pads:Pads 24:0"),
+        "none": lambda: dialog.port_chosen.emit(""),
+        "close": heard.close,
+        "notes": lambda: dialog.notes_chosen.emit("position"),
+    }
+    changes[change]()
+    assert came == let_go([2])
+    heard.close()
+    assert came == let_go([2])
+    QCoreApplication.processEvents()
+    assert performed == []
+    assert heard.choices.controllers == {"width": 64}
+
+
+def test_a_pedal_that_is_assigned_while_it_is_down_does_not_stay_down(
+    qtbot: QtBot, heard: MidiControl, backend: FakeBackend, came: list[Event]
+) -> None:
+    heard._remember(heard.choices.forgotten("width"))
+    backend.send("control_change", control=64, value=127, channel=1)
+    assert came == [Controller(64, 127, 1)]
+    heard._learn("listen")
+    with qtbot.waitSignal(heard.performed, timeout=5_000):
+        backend.send("control_change", control=64, value=127, channel=1)
+    assert came[1:] == let_go([1])
 
 
 def test_controllers_reach_the_windows_thread(

@@ -77,6 +77,30 @@ def test_keys_on_the_screen_play(qtbot: QtBot, played: Controller) -> None:
     assert struck.damped
 
 
+def test_keys_on_the_screen_and_of_the_computer_sound_together_on_a_guitars_patch(
+    qtbot: QtBot, played: Controller
+) -> None:
+    played.patches.choose("oud")
+    live = played.performance.live
+    qtbot.waitUntil(lambda: live._player is not None and live._player.patch.mode == "guitar", timeout=5_000)
+    for key in (60, 64):  # on one string
+        played.window.instrument.pressed.emit(key, 100)
+    press(qtbot, played, Qt.Key.Key_X)
+    press(qtbot, played, Qt.Key.Key_G)
+    assert live.sounding().keys() == {60, 64, 67}
+
+
+def test_a_files_drums_are_left_out_and_told(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+    song = tmp_path / "song.mid"
+    song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(40, 90, 9)), TimedEvent(0.0, NoteOn(52, 90))]))
+    informed: list[str] = []
+    played.patches.informed.connect(informed.append)
+    played.take_file(song)
+    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding(), timeout=5_000)
+    assert 40 not in played.performance.live.sounding()
+    assert informed == ["song.mid is played without its drums (channel 10)."]
+
+
 def test_a_knob_changes_the_patch_and_undo_takes_it_back(played: Controller) -> None:
     before = played.session.choices.patch
     assert before is not None
@@ -358,3 +382,15 @@ def test_the_pick_ups_knob_moves_where_the_string_is_heard(played: Controller) -
     assert [each.ear.points[0] for each in player.sounding()] == [0.11]
     played.history.undo()
     assert (played.session.choices.patch, played.session.choices.listen) == (before.patch, before.listen)
+
+
+def test_the_difference_is_heard_without_body_and_room(
+    qtbot: QtBot, played: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dry: list[bool] = []
+    monkeypatch.setattr(played.performance.live, "hear_dry", dry.append)
+    played.session.update(b="difference", heard="b")
+    played.performance.hear_dry(True)
+    played.performance.hear_dry(False)  # a listening test has ended
+    played.session.update(heard="a")
+    assert dry == [True, True, True, False]

@@ -132,3 +132,15 @@ def test_any_file_lets_the_app_start(text: bytes, tmp_path: Path) -> None:
     assert notice.isprintable() and len(notice) <= 500
     save_settings(path, settings)
     assert load_settings(path) == (settings, "")
+
+
+def test_what_could_not_be_written_is_written_later(qtbot: QtBot, tmp_path: Path) -> None:
+    folder, owner = tmp_path / "folder", QObject()
+    folder.write_text("in the way, as a full disk is for a moment")
+    desk = Desk(folder / "settings.json", owner)
+    desk.choose(position=0.41)
+    desk.look()
+    desk.look()
+    folder.unlink()
+    desk.keeper.close()
+    assert load_settings(folder / "settings.json")[0].choices.position == 0.41

@@ -18,7 +18,7 @@ import numpy as np
 from app.audio.choices import Buffer
 from app.commands.benchmarks.play.analysis import silences
 from app.commands.benchmarks.play.children import child
-from app.commands.benchmarks.play.recording import Recording, recording
+from app.commands.benchmarks.play.recording import Recording, recording, recording_aside
 from app.commands.benchmarks.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SoundServer
 
 SINK = "control"
@@ -30,14 +30,32 @@ PATIENCE_S = 20.0
 @contextlib.contextmanager
 def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[Recording]:
     """Plays and records it until the block ends."""
+    _make_sink(server)
+    with recording(server, folder / "control", SINK) as recorded, _tone(server, folder, buffer):
+        recorded.wait_for_sound(0.0, PATIENCE_S)  # so that it does not start while the app does
+        yield recorded
+
+
+@contextlib.contextmanager
+def steady_tone_aside(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[Path]:
+    """The same for long: recorded by a process alone, the mean of both channels, float32 (frames,), in the file."""
+    path = folder / "control"
+    _make_sink(server)
+    with recording_aside(server, path, SINK), _tone(server, folder, buffer):
+        yield path
+
+
+def _make_sink(server: SoundServer) -> None:
     load = ["pactl", "load-module", "module-null-sink", f"sink_name={SINK}", f"rate={RATE_HZ}", f"format={FORMAT}"]
     subprocess.run([*load, f"channels={CHANNELS}"], env=server.environment, check=True, capture_output=True)
+
+
+@contextlib.contextmanager
+def _tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[None]:
+    command = [sys.executable, "-m", "app.commands.benchmarks.play.control", str(buffer)]
     environment = {**server.environment, "PULSE_SINK": SINK}
-    with (folder / "control.log").open("wb") as log, recording(server, folder / "control", SINK) as recorded:
-        command = [sys.executable, "-m", "app.commands.benchmarks.play.control", str(buffer)]
-        with child(command, environment, stdout=log, stderr=log):
-            recorded.wait_for_sound(0.0, PATIENCE_S)  # so that it does not start while the app does
-            yield recorded
+    with (folder / "control.log").open("wb") as log, child(command, environment, stdout=log, stderr=log):
+        yield
 
 
 def holes_ms(tone: Recording, begin_s: float, end_s: float) -> list[float]:

@@ -135,9 +135,9 @@ def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Rec
 
 
 @contextlib.contextmanager
-def recording_aside(server: SoundServer, path: Path) -> Iterator[None]:
+def recording_aside(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[None]:
     """Records the mean of both channels, float32 (frames,), into `path`, by another process alone."""
-    with path.open("wb") as file, child(_recorder(1, SINK), server.environment, stdout=file):
+    with path.open("wb") as file, child(_recorder(1, sink), server.environment, stdout=file):
         yield
 
 

@@ -101,7 +101,7 @@ def test_a_record_of_version_1_is_read(record: AbxRecord, tmp_path: Path) -> Non
         (b"\xff\xfe\x00", "not a JSON file, or cut short"),
         (b"[1, 2]", "not the record of a listening test"),
         (b"{}", "not the record of a listening test"),
-        (b" " * (2**20 + 1), "too large"),
+        (b" " * (2**20 + 1), "larger than the 1 MiB"),
     ],
 )
 def test_a_broken_file_is_refused(tmp_path: Path, data: bytes, message: str) -> None:
