@@ -133,6 +133,7 @@ class Controller(QObject):
         )
         self.patches.told.connect(window.notices.tell)
         self.patches.informed.connect(window.notices.inform)
+        window.may_close = self.patches.recordings.may_close
         self.instruments.played.connect(self.patches.show_played)
         window.show_instrument(settings.instrument.shown)
         window.instrument.show_surface(settings.instrument.surface)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 from PySide6.QtCore import QByteArray, QMargins, QPoint, QRect, Qt, QTimer, Signal
@@ -118,6 +119,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(760, 480)
         self.resize(1280, 800)
         self._painted = False
+        self.may_close: Callable[[], bool] = lambda: True  # asked before it is closed
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
@@ -316,6 +318,9 @@ class MainWindow(QMainWindow):
                 self.file_dropped.emit(url.toLocalFile())
 
     def closeEvent(self, event: QCloseEvent) -> None:
+        if not self.may_close():
+            event.ignore()
+            return
         self.closing.emit()
         super().closeEvent(event)
 

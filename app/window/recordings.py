@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from app.export.played import Played, recorded_files, write_recorded
 from app.instrument.events import PatchTurned
@@ -102,6 +102,14 @@ class Recordings(QObject):
         """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
         if self._live.recording:
             self._bar.show_recording(now_s - self._began_s)
+
+    def may_close(self) -> bool:
+        """Whether the window may be closed; asks where that would lose what was played."""
+        if not self._unsaved and not self._live.recording:
+            return True
+        question = "What was played is not saved. Close the window, and lose it?"
+        answer = QMessageBox.question(self._bar, "Recording not saved", question)
+        return answer == QMessageBox.StandardButton.Yes
 
     def close(self) -> None:
         """Waits until files are written, WAIT_S at most; may be called again."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QFileDialog, QMessageBox
 from pytestqt.qtbot import QtBot
 
 from app.export.played import Played
@@ -26,9 +26,14 @@ class Told:
         self.errors: list[str] = []
         self.good: list[str] = []
         self.answers: list[Path | str] = []
+        self.loses = True  # the answer to whether the window may be closed, and lose a recording
         played.patches.told.connect(self.errors.append)
         played.patches.informed.connect(self.good.append)
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(self.answers.pop(0)), ""))
+        monkeypatch.setattr(QMessageBox, "question", self._question)
+
+    def _question(self, *_: object) -> QMessageBox.StandardButton:
+        return QMessageBox.StandardButton.Yes if self.loses else QMessageBox.StandardButton.No
 
 
 @pytest.fixture
@@ -150,6 +155,20 @@ def test_the_source_that_was_heard_is_written(
     record(played)
     qtbot.waitUntil(lambda: len(told.good) == 1, timeout=60_000)
     assert words in told.good[0]
+
+
+def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Controller, told: Told) -> None:
+    told.answers, told.loses = [""], False
+    record(played)
+    played.window.close()
+    assert played.window.isVisible()
+    played.patches.recordings.discard()
+    played.patches.recordings.record()
+    played.window.close()  # nor while it is made
+    assert played.window.isVisible()
+    told.loses = True
+    played.window.close()
+    assert not played.window.isVisible()
 
 
 def test_closing_the_window_waits_until_it_is_written(
