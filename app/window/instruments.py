@@ -29,6 +29,10 @@ class Instruments(QObject):
     Args:
         strike: plucks the string as `Choices` say; called in the gesture's thread.
         handle: plays an event through the patch and returns what it struck; called in the gesture's thread.
+
+    Attributes:
+        latest: the key that was struck last through a patch, and on which string of its set, as in `Struck`; None
+            before the first.
     """
 
     played = Signal()  # a note was struck, and the session knows it
@@ -49,6 +53,7 @@ class Instruments(QObject):
         self._session = session
         self._library = library
         self._strike, self._handle = strike, handle
+        self.latest: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # values of `Choices` of struck notes, not in the session yet
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
@@ -99,6 +104,7 @@ class Instruments(QObject):
             return False
         struck = self._handle(event)
         if struck is not None:
+            self.latest = struck.event.key, struck.string
             changes = {
                 "preset": choices.patch.preset,
                 "string": PhysicalString(**asdict(struck.key.string.parameters)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Iterable
@@ -16,8 +15,9 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog
 from app.export.played import recorded_files, write_recorded
 from app.instrument.bodies import body_names
 from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
+from app.instrument.facts import facts_of, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
-from app.instrument.strings import Strings
+from app.instrument.strings import KeyString, Strings
 from app.patches.library import (
     SUFFIX,
     PatchEntry,
@@ -45,7 +45,6 @@ from app.window.performance import Performance
 from engine.plain_text import one_line
 from engine.presets import PresetError, load_preset, outside_training
 from engine.presets.of_string import of_string, read_string
-from engine.resonators.family import inharmonicity
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
@@ -85,6 +84,7 @@ class PatchDesk(QObject):
         self.favourites = set(favourites)
         self._entries: list[PatchEntry] = []
         self._shown_s = 0.0
+        self._struck_patch = ""  # the name of the one that played the latest note
         self._recording_began_s = 0.0
         self._playback = Playback(instruments.play)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
@@ -111,6 +111,7 @@ class PatchDesk(QObject):
         bar.changed.connect(self.change)
         bar.body_chosen.connect(self._choose_body)
         panel.knobs.changed.connect(self.change)
+        panel.knobs.figure_asked.connect(self.turn_to)
         browser.opened.connect(self.reload)
         browser.chosen.connect(self.choose)
         browser.audition_asked.connect(self.audition)
@@ -172,14 +173,14 @@ class PatchDesk(QObject):
             key = sum(self.patch.range) // 2
             self._playback.play(_note(key))
 
-    def change(self, field: str, value: float) -> None:
+    def change(self, field: str, value: float | str) -> None:
         """Changes a field of the patch, by its path; a value beyond its bounds is ignored."""
         patch = self.patch
         if patch is None:
             return
         try:
             if field in ASSIGNABLE:
-                changed = patch.with_value(field, value)
+                changed = patch.with_value(field, float(value))
             else:
                 part, _, name = field.partition(".")
                 inner = {**dict(getattr(patch, part)), name: value} if name else value
@@ -189,6 +190,16 @@ class PatchDesk(QObject):
             return
         heard = heard_at(changed) if changed.pickup != patch.pickup else {}
         self._session.update(patch=changed, **heard)
+
+    def turn_to(self, field: str, figure: float) -> None:
+        """Turns a knob of the string to a figure of the string that is shown, or as near to it as the knob goes."""
+        patch, limits = self.patch, self._panel.knobs.knobs[field].limits
+        if patch is None:
+            return
+        try:
+            self.change(field, knob_for(patch, self._shown_key(patch), field, figure, (limits.low, limits.high)))
+        except ValueError as error:
+            self.told.emit(one_line(str(error)))
 
     def save(self) -> None:
         """Saves the patch: under its name where it is the user's own, else asks for one."""
@@ -383,20 +394,49 @@ class PatchDesk(QObject):
             self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
             pitches = self._instruments.plays_pitches
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
-            self._panel.bar.show_note("" if pitches else PLACES)
+            if pitches and self.patch is not None and self.patch.name == self._struck_patch:
+                self._tell_note_soon()  # its string may have been turned beyond the training
+            else:
+                self._panel.bar.show_note("" if pitches else PLACES)
         if names & {"heard", "a", "b"}:
             self._panel.show_source(self._session.source_heard)
 
     def show_played(self) -> None:
         """Says soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
-        if not self._note_timer.isActive():  # of a chord, or of fast notes, once: it takes milliseconds
+        self._struck_patch = "" if self.patch is None else self.patch.name
+        self._tell_note_soon()
+
+    def _tell_note_soon(self) -> None:
+        if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
             self._note_timer.start()
 
     def _show_latest_note(self) -> None:
-        choices = self._session.choices
+        choices, patch, latest = self._session.choices, self.patch, self._instruments.latest
         entry = self._library.find(choices.preset)
+        now = None if patch is None else self._show_string(patch)
+        if now is not None and latest is not None and now.key == latest[0] and self._instruments.plays_pitches:
+            # as the knobs have it by now
+            choices = choices.model_copy(update={"string": PhysicalString(**asdict(now.parameters))})
         if entry is not None and choices.string is not None:
             self._panel.bar.show_note("; ".join(outside_training(info_of(choices, entry), choices.pluck)))
+
+    def _shown_key(self, patch: Patch) -> tuple[int, int | None]:
+        """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""
+        (low, high), latest = patch.range, self._instruments.latest
+        return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
+
+    def _show_string(self, patch: Patch) -> KeyString | None:
+        """Shows that string in figures, or why there is none; None where it is silent or impossible."""
+        found: KeyString | None = None
+        facts: dict[str, str] = {}
+        try:
+            found = Strings(patch).of_key(*self._shown_key(patch))
+        except ValueError as error:
+            facts = {"string": str(error)}
+        knobs = self._panel.knobs
+        knobs.show_facts(facts if found is None else facts_of(found))
+        knobs.show_figures({} if found is None else figures_of(found.parameters))
+        return found
 
     def tick(self) -> None:
         """Shows which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
@@ -424,7 +464,7 @@ class PatchDesk(QObject):
             return
         panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
         panel.knobs.show_patch(patch, entry.patch if entry is not None else None)
-        panel.knobs.show_facts(facts_of(patch))
+        self._show_string(patch)
         panel.set_range(*patch.range)
         strings = patch.strings
         if isinstance(strings, StringSet):
@@ -469,24 +509,3 @@ class PatchDesk(QObject):
 
 def _note(key: int) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY, KEYS)), TimedEvent(AUDITION_S, NoteOff(key, KEYS))]
-
-
-def facts_of(patch: Patch) -> dict[str, str]:
-    """The string in the middle of the patch's range: its properties in words, with units."""
-    key = sum(patch.range) // 2
-    try:
-        found = Strings(patch).of_key(key)
-    except ValueError as error:
-        return {"string": str(error)}
-    if found is None:
-        return {}
-    string = found.parameters
-    return {
-        "key": note_name(key),
-        "pitch": f"{found.pitch_hz:.1f} Hz",
-        "tension": f"{string.tension_n:.1f} N",
-        "length": f"{1000 * string.length_m:.0f} mm",
-        "gauge": f"{2000 * math.sqrt(string.area_m2 / math.pi):.2f} mm",
-        "inharmonicity": f"{inharmonicity(string):.1e}",
-        "decay": f"{math.log(1000) / max(string.decay_rate(1), 1e-9):.1f} s",
-    }

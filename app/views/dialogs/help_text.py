@@ -10,8 +10,9 @@ TOUR = (
     ),
     (
         "Choose an instrument",
-        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change stiffness, "
-        "gauge, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is played.",
+        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change tension, "
+        "length, material, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is "
+        "played.",
     ),
     (
         "Pluck",
