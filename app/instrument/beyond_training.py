@@ -14,13 +14,16 @@ from engine.presets.of_string import info_of_string
 from engine.resonators.string import StringParameters
 
 
-def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn) -> list[str]:
+def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | None = None) -> list[str]:
     """As `outside_of_string`, of what a key would sound with; empty for a key without a possible string.
 
     Wheels and slides are left out.
+
+    Args:
+        string: on which of a set it is played, as of `Strings.of_key`.
     """
     try:
-        found = Strings(patch).of_key(event.key)
+        found = Strings(patch).of_key(event.key, string)
     except ValueError:
         found = None
     if found is None:

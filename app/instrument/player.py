@@ -37,7 +37,14 @@ STOP_S = 0.03
 KEPT_KEYS = 512
 GOALS = 8  # values that are tried for a wheel all the way up
 # What a wheel all the way up makes of a field: a factor of its own value, or a value
-WHEEL_FACTORS = {"knobs": 4.0, "damping": 10.0, "pluck.hardest_mm": 2.0, "body.size": 2.0, "room.t60_s": 3.0}
+WHEEL_FACTORS = {
+    "knobs": 4.0,
+    "knobs.length": 2.0,
+    "damping": 10.0,
+    "pluck.hardest_mm": 2.0,
+    "body.size": 2.0,
+    "room.t60_s": 3.0,
+}
 WHEEL_VALUES = {
     "pluck.position": 0.5,
     "pluck.width": 0.02,

@@ -97,18 +97,22 @@ def fretting(strings: StringSet, key: int) -> list[int]:
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
-    """The string with a patch's multipliers. Damping follows the mass, which so leaves decay rates as they are."""
+    """The string with a patch's multipliers: pitch and decay rates stay, but for what bending and d₃ have in them.
+
+    The tension follows the mass and the square of the length, the damping the mass.
+    """
     area = knobs.gauge**2
     mass = area * knobs.density
     return replace(
         string,
+        length_m=string.length_m * knobs.length * math.sqrt(knobs.tension),
         area_m2=string.area_m2 * area,
         second_moment_m4=string.second_moment_m4 * knobs.stiffness * knobs.gauge**4,
         density_kg_m3=string.density_kg_m3 * knobs.density,
         youngs_modulus_pa=string.youngs_modulus_pa * knobs.modulus,
         damping_d1_kg_m_s=string.damping_d1_kg_m_s * knobs.decay * mass,
         damping_d3_kg_m_s=string.damping_d3_kg_m_s * knobs.brightness_decay * mass,
-        tension_n=string.tension_n * mass,
+        tension_n=string.tension_n * mass * knobs.tension * knobs.length**2,
     )
 
 

@@ -31,6 +31,8 @@ ASSIGNABLE: tuple[str, ...] = (
     "knobs.modulus",
     "knobs.density",
     "knobs.gauge",
+    "knobs.tension",
+    "knobs.length",
     "pluck.position",
     "pluck.width",
     "pluck.width_hard",
@@ -61,6 +63,8 @@ VELOCITIES = (1, 127)
 LEVEL_RANGE_DB = (-60.0, 24.0)
 MULTIPLIER_RANGE = (0.05, 20.0)
 GAUGE_RANGE = (0.25, 4.0)
+LENGTH_RANGE = (0.25, 4.0)
+TENSION_RANGE = (0.0625, 16.0)  # over which the length goes through its own range
 AMPLITUDE_RANGE_MM = (0.001, LARGEST_AMPLITUDE_MM)
 CURVE_RANGE = (-1.0, 1.0)
 RELEASE_RANGE_S = (0.01, 60.0)  # of the damping's T60
@@ -177,6 +181,10 @@ class StringSet(_Value):
 class Knobs(_Value):
     """Multipliers of the strings' own values; 1 leaves them as they are.
 
+    The tuning says which pitch a key has. At one pitch and one mass the tension goes with the square of the length,
+    f = √(T₀/ρA) / 2ℓ for a flexible string: `tension` and `length` each take the other with them, and both multiply.
+    A heavier string (`density`, `gauge`) is tighter at the length that it has.
+
     Attributes:
         stiffness: of the second moment of area alone, and so of the bending stiffness: inharmonicity.
         decay: of d₁, damping of all modes alike; above 1 all decay faster.
@@ -184,6 +192,8 @@ class Knobs(_Value):
         modulus: of Young's modulus: bending stiffness, and how much a hard pluck glides in pitch.
         density: of the mass per volume.
         gauge: of the radius: the area grows with its square, the second moment with its fourth power.
+        tension: of the tension; the length grows with its root. Tighter: more harmonic, less glide of hard plucks.
+        length: of the length; the tension grows with its square. As `tension`, with what follows exchanged.
     """
 
     stiffness: Multiplier = 1.0
@@ -192,6 +202,8 @@ class Knobs(_Value):
     modulus: Multiplier = 1.0
     density: Multiplier = 1.0
     gauge: Annotated[float, _number(*GAUGE_RANGE)] = 1.0
+    tension: Annotated[float, _number(*TENSION_RANGE)] = 1.0
+    length: Annotated[float, _number(*LENGTH_RANGE)] = 1.0
 
 
 class PluckChoices(_Value):

@@ -28,6 +28,7 @@ PATCH = {  # fields of a patch, by their path; a field that is not here is named
     "name": "name of the patch",
     "preset": "model",
     "knobs.brightness_decay": "dulling",
+    "knobs.length": "string length",
     "range": "range of keys",
     "pluck.position": "pluck position",
     "pluck.width": "soft width",

@@ -32,6 +32,8 @@ class Instruments(QObject):
 
     Attributes:
         latest: the note that was struck last and the patch that played it; None: a pluck at a place, or none yet.
+        latest_key: the key that was struck last through a patch, and on which string of its set, as in `Struck`;
+            None before the first.
     """
 
     played = Signal()  # a note was struck, and the session knows it
@@ -52,6 +54,7 @@ class Instruments(QObject):
         self._session = session
         self._library = library
         self._strike, self._handle = strike, handle
+        self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # values of `Choices` of struck notes, not in the session yet
         self.latest: tuple[Patch, Struck] | None = None
@@ -104,6 +107,7 @@ class Instruments(QObject):
         struck = self._handle(event)
         if struck is not None:
             self.latest = choices.patch, struck
+            self.latest_key = struck.event.key, struck.string
             changes = {
                 "preset": choices.patch.preset,
                 "string": PhysicalString(**asdict(struck.key.string.parameters)),

@@ -1,8 +1,7 @@
-"""The patch that keys play: chosen, changed, saved, recorded; and what the instrument's strip shows of it."""
+"""The patch that keys play: chosen, changed, saved; and what the instrument's strip shows of it."""
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -15,9 +14,10 @@ from PySide6.QtWidgets import QInputDialog
 from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
 from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
+from app.instrument.facts import facts_of, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.player import is_another
-from app.instrument.strings import Strings
+from app.instrument.strings import KeyString, Strings
 from app.patches.library import (
     SUFFIX,
     PatchEntry,
@@ -46,7 +46,6 @@ from app.window.recordings import Recordings
 from engine.plain_text import one_line
 from engine.presets import PresetError, load_preset
 from engine.presets.of_string import of_string, read_string
-from engine.resonators.family import inharmonicity
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
@@ -114,6 +113,7 @@ class PatchDesk(QObject):
         bar.changed.connect(self.change)
         bar.body_chosen.connect(self._choose_body)
         panel.knobs.changed.connect(self.change)
+        panel.knobs.figure_asked.connect(self.turn_to)
         browser.opened.connect(self.reload)
         browser.chosen.connect(self.choose)
         browser.audition_asked.connect(self.audition)
@@ -176,14 +176,14 @@ class PatchDesk(QObject):
             key = sum(self.patch.range) // 2
             self._playback.play(_note(key))
 
-    def change(self, field: str, value: float) -> None:
+    def change(self, field: str, value: float | str) -> None:
         """Changes a field of the patch, by its path; a value beyond its bounds is ignored."""
         patch = self.patch
         if patch is None:
             return
         try:
             if field in ASSIGNABLE:
-                changed = patch.with_value(field, value)
+                changed = patch.with_value(field, float(value))
             else:
                 part, _, name = field.partition(".")
                 inner = {**dict(getattr(patch, part)), name: value} if name else value
@@ -192,6 +192,16 @@ class PatchDesk(QObject):
             self._show_patch()
             return
         self._session.update(patch=changed)
+
+    def turn_to(self, field: str, figure: float) -> None:
+        """Turns a knob of the string to a figure of the string that is shown, or as near to it as the knob goes."""
+        patch, limits = self.patch, self._panel.knobs.knobs[field].limits
+        if patch is None:
+            return
+        try:
+            self.change(field, knob_for(patch, self._shown_key(patch), field, figure, (limits.low, limits.high)))
+        except ValueError as error:
+            self.told.emit(one_line(str(error)))
 
     def save(self) -> None:
         """Saves the patch: under its name where it is the user's own, else asks for one."""
@@ -370,7 +380,7 @@ class PatchDesk(QObject):
 
     def show_played(self) -> None:
         """Says soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
-        if not self._note_timer.isActive():  # of a chord, or of fast notes, once: it takes milliseconds
+        if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
             self._note_timer.start()
 
     def _judge_anew(self) -> None:
@@ -389,6 +399,8 @@ class PatchDesk(QObject):
         self._say("")
 
     def _show_latest_note(self) -> None:
+        if self.patch is not None:
+            self._show_string(self.patch)
         self._say("; ".join(self._outside()))
 
     def _say(self, outside: str) -> None:
@@ -402,10 +414,28 @@ class PatchDesk(QObject):
         if entry is None:
             return []
         if latest is not None and patch is not None and latest[0] != patch:
-            return outside_of_key(entry.info, patch, latest[1].event)
+            return outside_of_key(entry.info, patch, latest[1].event, latest[1].string)
         if choices.string is None:
             return []
         return outside_of_string(entry.info, choices.string.parameters, choices.pluck)
+
+    def _shown_key(self, patch: Patch) -> tuple[int, int | None]:
+        """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""
+        (low, high), latest = patch.range, self._instruments.latest_key
+        return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
+
+    def _show_string(self, patch: Patch) -> KeyString | None:
+        """Shows that string in figures, or why there is none; None where it is silent or impossible."""
+        found: KeyString | None = None
+        facts: dict[str, str] = {}
+        try:
+            found = Strings(patch).of_key(*self._shown_key(patch))
+        except ValueError as error:
+            facts = {"string": str(error)}
+        knobs = self._panel.knobs
+        knobs.show_facts(facts if found is None else facts_of(found))
+        knobs.show_figures({} if found is None else figures_of(found.parameters))
+        return found
 
     def tick(self) -> None:
         """Shows which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
@@ -433,7 +463,7 @@ class PatchDesk(QObject):
             return
         panel.bar.show_patch(patch, entry is not None and entry.own, entry is None or entry.patch != patch)
         panel.knobs.show_patch(patch, entry.patch if entry is not None else None)
-        panel.knobs.show_facts(facts_of(patch))
+        self._show_string(patch)
         panel.set_range(*patch.range)
         strings = patch.strings
         if isinstance(strings, StringSet):
@@ -478,24 +508,3 @@ class PatchDesk(QObject):
 
 def _note(key: int) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY, KEYS)), TimedEvent(AUDITION_S, NoteOff(key, KEYS))]
-
-
-def facts_of(patch: Patch) -> dict[str, str]:
-    """The string in the middle of the patch's range: its properties in words, with units."""
-    key = sum(patch.range) // 2
-    try:
-        found = Strings(patch).of_key(key)
-    except ValueError as error:
-        return {"string": str(error)}
-    if found is None:
-        return {}
-    string = found.parameters
-    return {
-        "key": note_name(key),
-        "pitch": f"{found.pitch_hz:.1f} Hz",
-        "tension": f"{string.tension_n:.1f} N",
-        "length": f"{1000 * string.length_m:.0f} mm",
-        "gauge": f"{2000 * math.sqrt(string.area_m2 / math.pi):.2f} mm",
-        "inharmonicity": f"{inharmonicity(string):.1e}",
-        "decay": f"{math.log(1000) / max(string.decay_rate(1), 1e-9):.1f} s",
-    }

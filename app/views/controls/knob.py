@@ -71,6 +71,7 @@ class Knob(QWidget):
     """Gestures emit `value_asked` and change nothing; the owner sets the new value with `set_value`."""
 
     value_asked = Signal(float)
+    figure_asked = Signal(float)  # a number that was typed where a figure is shown
     drag_started = Signal()
     drag_ended = Signal()
 
@@ -84,18 +85,16 @@ class Knob(QWidget):
         self._editor: QLineEdit | None = None
         self._width = WIDTH
         self._low = False
+        self._figure = self._why_barred = self._tip = ""
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.setAccessibleDescription(limits.text.format(self._value))
         self.set_name(name, tip)
 
     def set_name(self, name: str, tip: str = "") -> None:
         """The label and the tooltip, shown as plain text: both may come from a file."""
-        self._name = name
+        self._name, self._tip = name, tip
         self.setAccessibleName(name)
-        told = "Drag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
-        self.setToolTip(plain_tip(f"{tip or name}\n{told}"))
-        self.update()
+        self._tell()
 
     @property
     def value(self) -> float:
@@ -104,13 +103,39 @@ class Knob(QWidget):
     def set_value(self, value: float) -> None:
         if value != self._value:
             self._value = value
-            self.setAccessibleDescription(self.text)
-            self.update()
+            self._tell()
 
     @property
     def text(self) -> str:
         """The value in its unit."""
         return self.limits.text.format(self._value)
+
+    def show_figure(self, figure: str) -> None:
+        """Shows what the value amounts to, with its unit, in its place; "" shows the value again.
+
+        The value itself is in the tooltip, and `figure_asked` tells of a number that is typed.
+        """
+        if figure != self._figure:
+            self._figure = figure
+            self._tell()
+
+    def set_barred(self, why: str) -> None:
+        """Greys it out and says why in the tooltip; "" frees it."""
+        if why != self._why_barred:
+            self._why_barred = why
+            self.setEnabled(not why)
+            self._tell()
+
+    def _tell(self) -> None:
+        """Says its state to the eye, in the tooltip and to a screen reader."""
+        both = f"{self._figure} ({self.text})" if self._figure else self.text
+        self.setAccessibleDescription(both)
+        hands = "Drag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
+        lines = [self._tip or self._name, self._why_barred or hands]
+        if self._figure and not self._why_barred:
+            lines.insert(1, f"Now {both}")
+        self.setToolTip(plain_tip("\n".join(lines)))
+        self.update()
 
     def sizeHint(self) -> QSize:
         return QSize(self._width, LOW_HEIGHT if self._low else HEIGHT)
@@ -125,6 +150,12 @@ class Knob(QWidget):
             self._width = width
             self.updateGeometry()
             self.update()
+
+    def set_width(self, pixels: int) -> None:
+        """For long names and values."""
+        self._width = pixels
+        self.updateGeometry()
+        self.update()
 
     def set_low(self, low: bool) -> None:
         """Smaller, for rows of many knobs."""
@@ -145,7 +176,7 @@ class Knob(QWidget):
         self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
         self._dragged_at = event.position()
         self.value_asked.emit(self.limits.value(self._dragged_share))
-        QToolTip.showText(self._tip_place(), self.text, self)
+        QToolTip.showText(self._tip_place(), self.accessibleDescription(), self)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self._dragged_at is not None and event.button() == Qt.MouseButton.LeftButton:
@@ -212,7 +243,9 @@ class Knob(QWidget):
             value = float(text)
         except ValueError:
             return
-        if math.isfinite(value):
+        if math.isfinite(value) and self._figure:
+            self.figure_asked.emit(value)
+        elif math.isfinite(value):
             taken = min(max(value, self.limits.low), self.limits.high)
             self.value_asked.emit(taken)
             if taken != value:
@@ -257,5 +290,5 @@ class Knob(QWidget):
         painter.drawText(QRectF(0, 0 if self._low else 3, width, 14), Qt.AlignmentFlag.AlignCenter, name)
         painter.setPen(ink)
         painter.setFont(theme.small_font(10 if self._low else 12))
-        foot = 17 if self._low else 23
-        painter.drawText(QRectF(0, self.height() - foot, width, 18), Qt.AlignmentFlag.AlignCenter, self.text)
+        foot = QRectF(0, self.height() - (17 if self._low else 23), width, 18)
+        painter.drawText(foot, Qt.AlignmentFlag.AlignCenter, self._figure or self.text)

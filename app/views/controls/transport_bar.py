@@ -16,8 +16,9 @@ from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Cho
 from app.views.controls.drag_button import DragButton
 from app.views.controls.knob import Knob, KnobRange
 from app.views.controls.meter import Meter
-from app.views.controls.parts import combo_box, tool_button, vertical_rule
+from app.views.controls.parts import tool_button, vertical_rule
 from app.views.controls.plain import Label
+from app.views.controls.shape_box import NO_WIDTH, shape_box
 from app.views.controls.slot_buttons import SlotButtons
 from engine.pluck import (
     DEFAULT_LISTEN,
@@ -28,10 +29,6 @@ from engine.pluck import (
     SHAPES,
     WIDTH_RANGE,
 )
-
-SHAPE_WIDTH = 106  # pixels: the longest name, with the padding of TIGHT
-TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
-_SHAPE_NAMES = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
 
 KNOBS = {  # field of `Choices` -> (label, range, tip)
     "position": (
@@ -130,7 +127,7 @@ class TransportBar(QFrame):
     def show_choices(self, choices: Choices) -> None:
         for field, knob in self.knobs.items():
             knob.set_value(getattr(choices, field))
-        self.knobs["width"].setEnabled(choices.shape != "triangular")
+        self.knobs["width"].set_barred(NO_WIDTH if choices.shape == "triangular" else "")
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
@@ -191,10 +188,7 @@ class TransportBar(QFrame):
         return column
 
     def _build_shape(self) -> QVBoxLayout:
-        self._shape = combo_box("Pluck shape", [(_SHAPE_NAMES[shape], shape) for shape in SHAPES])
-        self._shape.setToolTip("The shape of the pluck")
-        self._shape.setStyleSheet(TIGHT)
-        self._shape.setFixedWidth(SHAPE_WIDTH)
+        self._shape = shape_box()
         self._shape.activated.connect(lambda row: self.change_asked.emit("shape", SHAPES[row]))
         label = Label("PLUCK")
         label.setObjectName("knob")

@@ -10,9 +10,10 @@ TOUR = (
     ),
     (
         "Choose an instrument",
-        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change stiffness, "
-        "gauge, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is played. In the "
-        "same strip you choose whether the computer's keys play pitches or choose where the string is plucked.",
+        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change tension, "
+        "length, material, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is "
+        "played. In the same strip you choose whether the computer's keys play pitches or choose where the string is "
+        "plucked.",
     ),
     (
         "Pluck",

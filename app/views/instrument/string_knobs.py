@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
@@ -14,21 +14,34 @@ from app.patches.patch import (
     AMPLITUDE_RANGE_MM,
     CURVE_RANGE,
     GAUGE_RANGE,
+    LENGTH_RANGE,
     MULTIPLIER_RANGE,
     RELEASE_RANGE_S,
+    TENSION_RANGE,
     TRANSPOSE_RANGE,
     Patch,
 )
 from app.views import theme
-from app.views.controls.knob import LOW_HEIGHT, Knob, KnobRange
+from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob, KnobRange
 from app.views.controls.parts import faint, vertical_rule
-from app.views.controls.plain import plain_tip
-from engine.pluck import POSITION_RANGE, WIDTH_RANGE
+from app.views.controls.plain import Label, plain_tip
+from app.views.controls.shape_box import NO_WIDTH, shape_box
+from engine.pluck import POSITION_RANGE, SHAPES, WIDTH_RANGE
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 TIMES = "× {:.2f}"
 WHOLE = "tuning.transpose"  # an integer
+WIDTHS = {  # in pixels, by the longest name or value
+    "tuning.transpose": 62,
+    "knobs.gauge": 58,
+    "knobs.density": 76,
+    "knobs.stiffness": 62,
+    "pluck.width": 66,
+    "pluck.width_hard": 66,
+}  # the others are narrow
 NO_A4 = "The Scala keyboard mapping of this patch has a reference pitch of its own, so that A4 would change nothing"
+MONO = "The patch is heard at one point, in mono"
+LETS_RING = "The patch lets its strings ring: no key damps them"
 
 
 @dataclass(frozen=True)
@@ -60,12 +73,29 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
         "STRING",
         (
             _Turned(
+                "knobs.tension",
+                "tension",
+                _times(TENSION_RANGE),
+                "Tension; the pitch stays, so that the length follows. Tight strings glide less when plucked hard",
+            ),
+            _Turned(
+                "knobs.length",
+                "length",
+                _times(LENGTH_RANGE),
+                "Length of the string; the pitch stays, so that the tension follows: longer is tighter",
+            ),
+            _Turned(
                 "knobs.gauge",
                 "gauge",
                 _times(GAUGE_RANGE),
-                "Thickness of the string: thick strings are stiffer and decay differently",
+                "Thickness (diameter) at the same length: thick strings are heavier, tighter and stiffer",
             ),
-            _Turned("knobs.density", "density", _times(), "Mass of the material: gut is light, steel heavy"),
+            _Turned(
+                "knobs.density",
+                "density",
+                _times(),
+                "Mass of the material at the same length: gut is light and slack, steel heavy and tight",
+            ),
             _Turned(
                 "knobs.modulus",
                 "modulus",
@@ -76,19 +106,27 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
                 "knobs.stiffness",
                 "stiffness",
                 _times(),
-                "Bending stiffness alone: how far partials are spread (inharmonicity)",
+                "Bending stiffness alone: how far partials are spread. The figure is the inharmonicity B: "
+                "partial n of f lies at n f √(1 + B n²)",
             ),
         ),
     ),
     (
         "DECAY",
         (
-            _Turned("knobs.decay", "decay", _times(), "Damping of all partials alike: above 1 the sound is shorter"),
+            _Turned(
+                "knobs.decay",
+                "decay",
+                _times(),
+                "Damping of all partials alike: more is shorter. The figure is how long the first takes to "
+                "fall by 60 dB",
+            ),
             _Turned(
                 "knobs.brightness_decay",
                 "dulling",
                 _times(),
-                "Damping that grows with frequency: above 1 the sound darkens sooner",
+                "Damping that grows with frequency: more darkens sooner. The figure is how long the partial near "
+                "3 kHz takes to fall by 60 dB",
             ),
             _Turned(
                 "damping.release_t60_s",
@@ -149,7 +187,7 @@ GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
         ),
     ),
 )
-SHAPED = ("pluck.width", "pluck.width_hard")  # a triangle has no width
+SHAPED = ("pluck.width", "pluck.width_hard")
 
 
 class Facts(QWidget):
@@ -187,7 +225,8 @@ class Facts(QWidget):
 class StringKnobs(QWidget):
     """Gestures emit `changed`; `show_patch` shows what became of them."""
 
-    changed = Signal(str, float)  # a field of a patch and its new value
+    changed = Signal(str, object)  # a field of a patch and its new value
+    figure_asked = Signal(str, float)  # a knob's field, and the figure that it is to have, in the unit that is shown
     drag_started = Signal()
     drag_ended = Signal()
 
@@ -195,6 +234,8 @@ class StringKnobs(QWidget):
         super().__init__(parent)
         self.setAccessibleName("Knobs of the string")
         self.knobs: dict[str, Knob] = {}
+        self.shape = shape_box()
+        self.shape.activated.connect(lambda row: self.changed.emit("pluck.shape", SHAPES[row]))
         self.facts = Facts()
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
@@ -217,9 +258,13 @@ class StringKnobs(QWidget):
         head.setFixedHeight(HEAD_HEIGHT)
         row = QHBoxLayout()
         row.setSpacing(0)
+        if turned[0].field == "pluck.position":
+            row.addLayout(self._shape_column())
         for each in turned:
             knob = Knob(each.name, each.limits, each.tip)
             knob.set_low(True)
+            knob.set_width(WIDTHS.get(each.field, NARROW_WIDTH))
+            knob.figure_asked.connect(lambda value, field=each.field: self.figure_asked.emit(field, value))
             knob.value_asked.connect(lambda value, field=each.field: self._ask(field, value))
             knob.drag_started.connect(self.drag_started)
             knob.drag_ended.connect(self.drag_ended)
@@ -231,36 +276,53 @@ class StringKnobs(QWidget):
         column.addLayout(row)
         return column
 
+    def _shape_column(self) -> QVBoxLayout:
+        name = Label("SHAPE")
+        name.setObjectName("knob")
+        name.setFixedHeight(14)  # as a knob's name
+        column = QVBoxLayout()
+        column.setContentsMargins(0, 0, 4, 0)
+        column.setSpacing(4)
+        column.addWidget(name, alignment=Qt.AlignmentFlag.AlignHCenter)
+        column.addWidget(self.shape)
+        column.addStretch(1)
+        return column
+
     def _ask(self, field: str, value: float) -> None:
-        self.changed.emit(field, float(round(value)) if field == WHOLE else value)
+        self.changed.emit(field, round(value) if field == WHOLE else value)
 
     def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
         """`saved`: the values that a double-click resets to."""
         for field, knob in self.knobs.items():
             value = _value(patch, field)
-            knob.setEnabled(value is not None)
+            knob.set_barred(_why_barred(patch, field))
             if value is not None:
                 knob.set_value(value)
             before = None if saved is None else _value(saved, field)
             if before is not None:
                 knob.limits = replace(knob.limits, default=before)
-        for field in SHAPED:
-            self.knobs[field].setEnabled(patch.pluck.shape != "triangular")
-        self.knobs["damping.release_t60_s"].setEnabled(not patch.damping.let_ring)
-        self._show_a4(bool(patch.tuning.keymap.strip()))
-
-    def _show_a4(self, mapped: bool) -> None:
-        """`mapped`: whether a keyboard mapping, with a reference pitch of its own, leaves nothing to this knob."""
-        knob = self.knobs["tuning.a4_hz"]
-        knob.setEnabled(not mapped)
-        if mapped:
-            knob.setToolTip(NO_A4)
-        else:
-            knob.set_name("A4", "Pitch of A4")
+        with QSignalBlocker(self.shape):
+            self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
-        """The resulting string: names and values with their units ("tension": "72.3 N"), in order."""
+        """The resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""
         self.facts.show_facts(facts)
+
+    def show_figures(self, figures: Mapping[str, str]) -> None:
+        """What knobs amount to in that string, by field ("knobs.tension": "72.3 N"); the others show their values."""
+        for field, knob in self.knobs.items():
+            knob.show_figure(figures.get(field, ""))
+
+
+def _why_barred(patch: Patch, field: str) -> str:
+    """Why a field means nothing in this patch; "" where it does."""
+    if field in SHAPED and patch.pluck.shape == "triangular":
+        return NO_WIDTH
+    if field == "damping.release_t60_s" and patch.damping.let_ring:
+        return LETS_RING
+    if field == "tuning.a4_hz" and patch.tuning.keymap.strip():
+        return NO_A4
+    return MONO if _value(patch, field) is None else ""
 
 
 def _value(patch: Patch, field: str) -> float | None:

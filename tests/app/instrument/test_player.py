@@ -23,7 +23,7 @@ from app.instrument.events import (
 from app.instrument.loudness import k_weight
 from app.instrument.offline import render_events, render_note
 from app.instrument.player import Player, Struck
-from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, Room
+from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
@@ -98,6 +98,32 @@ def test_velocity_is_level_and_timbre(patch: Patch, preset: Preset) -> None:
     assert level_db(hard, 0, 0.5) - level_db(soft, 0, 0.5) > 12
     shapes = [np.abs(np.fft.rfft(sound)) / np.linalg.norm(sound) for sound in (soft, hard)]
     assert np.linalg.norm(shapes[0] - shapes[1]) / np.linalg.norm(shapes[0]) > 0.3
+
+
+def brightness_hz(sound: NDArray[np.float64]) -> float:
+    """The centre of its spectrum."""
+    spectrum = np.abs(np.fft.rfft(sound)) ** 2
+    return float((spectrum * np.fft.rfftfreq(len(sound), 1 / RATE_HZ)).sum() / spectrum.sum())
+
+
+@pytest.mark.parametrize("source", ["model", "truth"])
+@pytest.mark.parametrize(("shape", "wide", "narrow"), [("raised_cosine", 0.3, 0.08), ("gaussian", 0.08, 0.04)])
+def test_a_harder_key_is_narrower_and_brighter_however_far_it_pulls(
+    patch: Patch, preset: Preset, shape: str, wide: float, narrow: float, source: str
+) -> None:
+    widths = {"width": wide, "width_hard": narrow, "softest_mm": 0.1, "hardest_mm": 0.1}
+    shaped = changed(patch, pluck=PluckChoices(shape=shape, **widths))
+    struck: list[Struck] = []
+    player = Player(shaped, preset, RATE_HZ, struck.append, (source,))
+    for velocity in (1, 64, 127):
+        player.handle(NoteOn(45, velocity))
+    assert [each.pluck.width for each in struck] == pytest.approx([wide, (wide + narrow) / 2, narrow])
+    heard_hz = [brightness_hz(play(shaped, preset, 0.3, (0.0, NoteOn(45, v)), source=source)) for v in (1, 64, 127)]
+    assert heard_hz[0] < heard_hz[1] < heard_hz[2]
+    assert heard_hz[2] > 1.3 * heard_hz[0]
+    triangle = changed(patch, pluck=PluckChoices(shape="triangular", **widths))
+    soft, hard = (play(triangle, preset, 0.3, (0.0, NoteOn(45, velocity)), source=source) for velocity in (1, 127))
+    np.testing.assert_array_equal(soft, hard)  # it has no width
 
 
 def test_letting_go_damps_and_the_pedal_holds(patch: Patch, preset: Preset) -> None:
@@ -196,6 +222,55 @@ def test_a_knob_changes_strings_that_ring(patch: Patch, preset: Preset) -> None:
     free = play(patch, preset, 1.5, (0.0, NoteOn(57, 60))) / struck[0].gain
     fallen = level_db(after.astype(np.float64), 0.8, 0.9) - level_db(free, 1.3, 1.4)
     assert fallen < -3
+
+
+TURNS = {
+    "knobs.stiffness": 4.0,
+    "knobs.decay": 8.0,
+    "knobs.brightness_decay": 6.0,
+    "knobs.modulus": 3.0,
+    "knobs.density": 2.0,
+    "knobs.gauge": 1.6,
+    "knobs.tension": 3.0,
+    "knobs.length": 0.6,
+    "tuning.a4_hz": 466.16,
+}
+
+
+def test_every_knob_of_the_string_is_turned_here() -> None:
+    assert {f"knobs.{name}" for name in Knobs.model_fields} < TURNS.keys()
+
+
+@pytest.mark.parametrize("field", TURNS)
+def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_a_click(
+    patch: Patch, preset: Preset, field: str
+) -> None:
+    section, _, name = field.partition(".")
+    part = getattr(patch, section).model_copy(update={name: TURNS[field]})
+    sounds = {}
+    for turned in (changed(patch, **{section: part}), patch):
+        struck: list[Struck] = []
+        player = Player(patch, preset, RATE_HZ, struck.append)
+        player.handle(NoteOn(57, 100))
+        mixers = {source: Mixer(RATE_HZ, limited=False) for source in ("model", "truth")}
+        for source, mixer in mixers.items():
+            mixer.add(struck[0].voices[source])
+        before = {source: mixer.render(RATE_HZ // 2) for source, mixer in mixers.items()}
+        player.set_patch(turned)
+        for source, mixer in mixers.items():
+            whole = np.concatenate([before[source], mixer.render(RATE_HZ // 2)])[:, 0]
+            sounds[source, turned is patch] = whole.astype(np.float64)
+    at, glide = RATE_HZ // 2, round(0.1 * RATE_HZ)
+    for source in ("model", "truth"):
+        sound, free = sounds[source, False], sounds[source, True]
+        np.testing.assert_array_equal(sound[:at], free[:at])
+        edges = np.abs(np.diff(sound, 2))
+        beside = max(edges[at - glide : at - 2].max(), edges[at + glide : at + 2 * glide].max())  # higher partials
+        assert edges[at - 2 : at + glide].max() < 1.3 * beside, source
+        after = slice(at + glide, None)
+        assert np.linalg.norm((sound - free)[after]) > 0.03 * np.linalg.norm(free[after]), source
+    model, truth = sounds["model", False], sounds["truth", False]
+    assert float(((model - truth)[at:] ** 2).sum() / (truth[at:] ** 2).sum()) < 1e-5
 
 
 def test_an_impossible_knob_leaves_what_rings_and_is_told_by_the_next_key(patch: Patch, preset: Preset) -> None:

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from app.instrument.loud_keys import on_string
 from app.instrument.strings import Strings, bent, damped, fretted, pitch_hz_of, slid, turned
 from app.patches.patch import Knobs, OpenString, Patch, StringSet, TuningChoice
+from engine.resonators.family import inharmonicity
 from engine.resonators.string import StringParameters
 from tests.app.instrument.conftest import physical
 
@@ -89,6 +91,36 @@ def test_gauge_and_density_leave_pitch_and_decay_and_change_how_stiff_it_is() ->
     assert thick.decay_rate(1) == pytest.approx(STEEL.decay_rate(1))
     assert thick.second_moment_m4 == pytest.approx(1.5**4 * STEEL.second_moment_m4)
     assert turned(STEEL, Knobs()) == STEEL
+
+
+def test_tension_and_length_go_together_at_a_keys_pitch(patch: Patch, guitar: Patch) -> None:
+    for played, key in ((patch, 57), (guitar, 57), (guitar, 30)):
+        own = Strings(played).of_key(key)
+        tight = Strings(played.with_value("knobs.tension", 4.0)).of_key(key)
+        long = Strings(played.with_value("knobs.length", 2.0)).of_key(key)
+        same = Strings(played.with_values({"knobs.tension": 4.0, "knobs.length": 0.5})).of_key(key)
+        assert own is not None and tight is not None and long is not None and same is not None
+        for found in (tight, long):
+            assert abs(cents(pitch_hz_of(found.parameters), own.pitch_hz)) < 1e-3
+            assert found.parameters.tension_n == pytest.approx(4 * own.parameters.tension_n, rel=5e-3)
+            assert found.parameters.length_m == pytest.approx(2 * own.parameters.length_m, rel=5e-3)
+            assert found.shortened == pytest.approx(own.shortened, rel=5e-3)  # pulled as far
+            assert inharmonicity(found.parameters) == pytest.approx(inharmonicity(own.parameters) / 16, rel=1e-2)
+            left = replace(found.parameters, length_m=1.0, tension_n=1.0)
+            assert left == replace(own.parameters, length_m=1.0, tension_n=1.0)
+        assert same.parameters.tension_n == pytest.approx(own.parameters.tension_n)
+        assert same.parameters.length_m == pytest.approx(own.parameters.length_m)
+
+
+def test_a_tight_string_rises_less_in_tension_when_it_is_plucked_hard(patch: Patch) -> None:
+    rises = []
+    for played in (patch, patch.with_value("knobs.tension", 2.0)):
+        found = Strings(played).of_key(57)
+        assert found is not None
+        resonator = found.parameters.resonator(found.modes)
+        pluck = on_string(found, played.pluck.pluck(127))
+        rises.append(float(resonator.relative_tension_rise(resonator.to_modes(pluck.displacement(101)))))
+    assert rises[0] / rises[1] == pytest.approx(4.0, rel=0.02)  # 1 / T₀ℓ²
 
 
 def test_an_impossible_key_is_named(patch: Patch) -> None:

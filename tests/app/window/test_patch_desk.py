@@ -15,6 +15,7 @@ from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, Patch, Pickup, Target, TuningChoice
+from app.shared.key_names import note_name
 from app.window.controller import Controller
 from app.window.patch_desk import NOTE_TOLD_AFTER_MS
 from engine.presets.of_string import STRINGS, read_string
@@ -323,6 +324,52 @@ def test_a_scala_scale_is_shown_and_removed(played: Controller) -> None:
     assert now.tuning == TuningChoice(a4_hz=432.0)
     played.history.undo()
     assert played.session.choices.patch == tuned
+
+
+def test_knobs_tell_the_string_that_was_struck_last_and_take_figures(qtbot: QtBot, played: Controller) -> None:
+    knobs = played.window.instrument.knobs
+    tension, length = knobs.knobs["knobs.tension"], knobs.knobs["knobs.length"]
+    patch = played.session.choices.patch
+    assert patch is not None
+    middle = sum(patch.range) // 2
+    assert knobs.facts.accessibleDescription().startswith(f"key {note_name(middle)}, ")
+    played.window.instrument.pressed.emit(50, 100)
+    qtbot.waitUntil(lambda: knobs.facts.accessibleDescription().startswith("key D3, pitch 146.8 Hz"), timeout=5_000)
+    long_mm = float(length.accessibleDescription().split()[0])
+    knobs.figure_asked.emit("knobs.tension", 200.0)
+    assert tension.accessibleDescription().startswith("200 N (× ")
+    turned = played.session.choices.patch
+    assert turned is not None
+    now_mm = float(length.accessibleDescription().split()[0])
+    assert now_mm == pytest.approx(long_mm * turned.knobs.tension**0.5, rel=0.01)
+    knobs.figure_asked.emit("knobs.tension", 1e9)
+    changed = played.session.choices.patch
+    assert changed is not None
+    assert changed.knobs.tension == pytest.approx(16.0)
+
+
+def test_the_pluck_of_a_patch_is_given_a_shape(played: Controller) -> None:
+    knobs = played.window.instrument.knobs
+    assert knobs.shape.currentText() == "Triangle"
+    assert not knobs.knobs["pluck.width_hard"].isEnabled()
+    for shape, named in (("gaussian", "Gaussian"), ("raised_cosine", "Raised cosine")):
+        knobs.changed.emit("pluck.shape", shape)
+        patch = played.session.choices.patch
+        assert patch is not None
+        assert (patch.pluck.shape, knobs.shape.currentText()) == (shape, named)
+        assert knobs.knobs["pluck.width_hard"].isEnabled()
+        assert played.history.undo_words == "pluck shape"
+    played.window.instrument.pressed.emit(60, 100)
+    player = played.performance.live._player
+    assert player is not None
+    assert [each.pluck.shape for each in player.sounding()] == ["raised_cosine"]
+
+
+def test_transposition_is_turned_by_whole_keys(played: Controller) -> None:
+    played.window.instrument.knobs.knobs["tuning.transpose"].value_asked.emit(2.2)
+    patch = played.session.choices.patch
+    assert patch is not None
+    assert patch.tuning.transpose == 2
 
 
 def heard(played: Controller) -> Patch:

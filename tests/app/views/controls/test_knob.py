@@ -141,3 +141,28 @@ def test_what_became_of_it_is_seen_and_said(knob: Knob) -> None:
     assert knob.accessibleDescription() == "11.00 mm"
     knob.setEnabled(False)
     assert knob.grab().toImage() != before
+
+
+def test_a_figure_is_shown_instead_of_the_value_and_typed(qtbot: QtBot, knob: Knob) -> None:
+    figures: list[float] = []
+    knob.figure_asked.connect(figures.append)
+    before = knob.grab().toImage()
+    knob.show_figure("72.3 N")
+    assert knob.grab().toImage() != before
+    assert knob.accessibleDescription() == "72.3 N (4.00 mm)"
+    assert "72.3 N (4.00 mm)" in knob.toolTip()
+    qtbot.keyClicks(knob, "8")
+    assert knob._editor is not None
+    qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
+    assert (figures, knob.value) == ([8.0], 4.0)
+    knob.show_figure("")
+    assert knob.accessibleDescription() == "4.00 mm"
+
+
+def test_a_barred_knob_says_why(knob: Knob) -> None:
+    knob.set_barred("A triangle has no width")
+    assert not knob.isEnabled()
+    assert knob.toolTip() == "amplitude\nA triangle has no width"
+    knob.set_barred("")
+    assert knob.isEnabled()
+    assert "no width" not in knob.toolTip()

@@ -66,9 +66,39 @@ def test_what_a_patch_does_not_have_cannot_be_turned(knobs: StringKnobs, guitar:
     knobs.show_patch(mono)
     off = {field for field, knob in knobs.knobs.items() if not knob.isEnabled()}
     assert off == {"pickup.points.1", "pluck.width", "pluck.width_hard", "damping.release_t60_s"}
+    assert "no width" in knobs.knobs["pluck.width"].toolTip()
+    assert "in mono" in knobs.knobs["pickup.points.1"].toolTip()
+    assert "ring" in knobs.knobs["damping.release_t60_s"].toolTip()
     gaussian = mono.model_copy(update={"pluck": mono.pluck.model_copy(update={"shape": "gaussian"})})
     knobs.show_patch(gaussian)
     assert knobs.knobs["pluck.width"].isEnabled()
+    assert "no width" not in knobs.knobs["pluck.width"].toolTip()
+
+
+def test_the_shape_of_the_pluck_is_chosen_in_words(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
+    knobs.show_patch(guitar)
+    box = knobs.shape
+    assert box.currentText() == "Raised cosine"
+    assert [box.itemText(row) for row in range(box.count())] == ["Gaussian", "Triangle", "Raised cosine"]
+    with qtbot.waitSignal(knobs.changed) as told:
+        box.activated.emit(box.findText("Triangle"))
+    assert told.args == ["pluck.shape", "triangular"]
+
+
+def test_a_knob_shows_what_it_makes_of_the_string_and_asks_for_a_figure(
+    qtbot: QtBot, knobs: StringKnobs, guitar: Patch
+) -> None:
+    knobs.show_patch(guitar.with_value("knobs.tension", 1.5))
+    knobs.show_figures({"knobs.tension": "107 N"})
+    tension = knobs.knobs["knobs.tension"]
+    assert tension.accessibleDescription() == "107 N (× 1.50)"
+    assert knobs.knobs["knobs.length"].accessibleDescription() == "× 1.00"
+    qtbot.keyClicks(tension, "9")
+    assert tension._editor is not None
+    with qtbot.waitSignal(knobs.figure_asked) as told:
+        qtbot.keyClick(tension._editor, Qt.Key.Key_Return)
+    assert told.args == ["knobs.tension", 9.0]
+    assert tension.value == 1.5
 
 
 def test_the_facts_are_told_in_their_units(knobs: StringKnobs) -> None:

@@ -1,0 +1,111 @@
+"""A key's string in figures, in the units of those who make strings; and from such a figure back to its knob."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from app.instrument.strings import KeyString, Strings
+from app.patches.patch import Patch
+from app.shared.key_names import note_name
+from engine.resonators.family import BRIGHT_HZ, inharmonicity
+from engine.resonators.string import StringParameters
+
+HALVINGS = 40  # of a knob's range, until it stands at a wanted figure
+SLOWEST = 1e-9  # decay rate in 1/s, of which a string without damping is told
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What a knob of the string changes, as it is measured on one.
+
+    Attributes:
+        unit: of what `of` gives; "" where it has none.
+        of: the figure of a string.
+        falls: whether it falls while the knob rises.
+    """
+
+    unit: str
+    of: Callable[[StringParameters], float]
+    falls: bool = False
+
+
+def bright_mode(string: StringParameters) -> int:
+    """The mode near BRIGHT_HZ; the first of a string that is higher."""
+    return max(1, round(BRIGHT_HZ * math.tau / string.undamped_frequency(1)))
+
+
+def t60_s(string: StringParameters, mode: int) -> float:
+    """How long a mode takes to fall by 60 dB."""
+    return math.log(1000) / max(string.decay_rate(mode), SLOWEST)
+
+
+FIGURES: Mapping[str, Figure] = {  # by the field of the patch
+    "knobs.tension": Figure("N", lambda string: string.tension_n),
+    "knobs.length": Figure("mm", lambda string: 1000 * string.length_m),
+    "knobs.gauge": Figure("mm", lambda string: 2000 * math.sqrt(string.area_m2 / math.pi)),
+    "knobs.density": Figure("kg/m³", lambda string: string.density_kg_m3),
+    "knobs.modulus": Figure("GPa", lambda string: string.youngs_modulus_pa / 1e9),
+    "knobs.stiffness": Figure("", inharmonicity),
+    "knobs.decay": Figure("s", lambda string: t60_s(string, 1), falls=True),
+    "knobs.brightness_decay": Figure("s", lambda string: t60_s(string, bright_mode(string)), falls=True),
+}
+
+
+def facts_of(string: KeyString) -> dict[str, str]:
+    """What no knob shows of a key's string: values with their units, by name."""
+    parameters = string.parameters
+    return {
+        "key": note_name(string.key),
+        "pitch": f"{string.pitch_hz:.1f} Hz",
+        "mass": told(1000 * parameters.mass_per_length_kg_m, "g/m"),
+        "stress": told(parameters.tension_n / parameters.area_m2 / 1e6, "MPa"),
+    }
+
+
+def figures_of(string: StringParameters) -> dict[str, str]:
+    """The figures of a string with their units, by field."""
+    return {field: told(figure.of(string), figure.unit) for field, figure in FIGURES.items()}
+
+
+def told(figure: float, unit: str) -> str:
+    """Three digits and the unit: "70.3 N"."""
+    if figure == 0:
+        text = "0"
+    elif 1e-3 <= figure < 1e6:
+        text = f"{figure:.{max(0, 2 - math.floor(math.log10(figure)))}f}"
+    else:
+        text = f"{figure:.1e}"
+    return f"{text} {unit}".rstrip()
+
+
+def knob_for(
+    patch: Patch, key: tuple[int, int | None], field: str, wanted: float, limits: tuple[float, float]
+) -> float:
+    """Where a knob makes a figure of a key's string what is wanted, or as near to it as it goes.
+
+    Args:
+        key: and on which string of the set it is played, as in `Strings.of_key`.
+        field: one of FIGURES.
+        wanted: in the figure's unit.
+        limits: of the knob.
+
+    Raises:
+        ValueError: the key is silent.
+    """
+    figure, name = FIGURES[field], field.removeprefix("knobs.")
+    low, high = limits
+    for _ in range(HALVINGS):
+        middle = math.sqrt(low * high)
+        turned = patch.model_copy(update={"knobs": patch.knobs.model_copy(update={name: middle})})
+        try:
+            found = Strings(turned).of_key(*key)
+        except ValueError:  # there is no such string, as there is one at 1
+            above = middle > 1
+        else:
+            if found is None:
+                raise ValueError(f"key {key[0]} of {patch.name} is silent; choose another")
+            above = (figure.of(found.parameters) > wanted) != figure.falls
+        low, high = (low, middle) if above else (middle, high)
+    return math.sqrt(low * high)
