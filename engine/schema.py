@@ -35,14 +35,14 @@ class SchemaError(ValueError):
         super().__init__(one_line(message))
 
 
-def parse_json(text: str | bytes, where: str) -> Any:
+def parse_json(text: str | bytes, where: str, most_bytes: int = bounds.LARGEST_TEXT_BYTES) -> Any:
     """The plain data of a JSON text from anywhere; `where` names it in errors.
 
     Raises:
-        SchemaError: not JSON, or longer or nested deeper than `engine.bounds` allows.
+        SchemaError: not JSON, longer than it may be, or nested deeper, or with more entries, than `bounds` allows.
     """
-    if len(text) > bounds.LARGEST_TEXT_BYTES:
-        raise SchemaError(f"{where}: longer than {bounds.LARGEST_TEXT_BYTES // 2**10} KiB")
+    if len(text) > most_bytes:
+        raise SchemaError(f"{where}: longer than {most_bytes // 2**10} KiB")
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them

@@ -157,7 +157,7 @@ def read_recipe(path: Path) -> Recipe:
             f"{path}: has no recipe; it was not exported by {PROGRAM}, or another program has removed its tags"
         )
     try:
-        return Recipe.model_validate(parse_json(text, "the recipe"))
+        return Recipe.model_validate(parse_json(text, "the text"))
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         field = ".".join(map(str, first["loc"])) or "the text"

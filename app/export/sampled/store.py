@@ -25,6 +25,7 @@ from engine.schema import parse_json
 
 INDEX = "index.json"
 LOCK = ".index.lock"
+LARGEST_INDEX_BYTES = 8 * 2**20  # of every key at the most layers: 2 MiB
 SampledProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known
 _OURS = re.compile(r"key\d{3}_vel\d{3}\.(flac|wav)")
 _DIGEST = Field(pattern="^[0-9a-f]{64}$")
@@ -219,8 +220,8 @@ def read_index(path: Path) -> SampleIndex | None:
         ExportError: there is one that is not the index of samples, or one of another version.
     """
     try:
-        raw = read_bounded(path, bounds.LARGEST_TEXT_BYTES)
-        return SampleIndex.model_validate(parse_json(raw, str(path)))
+        raw = read_bounded(path, LARGEST_INDEX_BYTES)
+        return SampleIndex.model_validate(parse_json(raw, str(path), LARGEST_INDEX_BYTES))
     except FileNotFoundError:
         return None
     except UnusableFile as error:

@@ -144,7 +144,7 @@ def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(pl
     workers = Script(lambda task, tries: row_of(task))
     folder = options.results
     folder.mkdir()
-    with pytest.raises(OSError):
+    with pytest.raises(SchemaError, match="not an ordinary file"):
         sweep(plan(), workers, options)
     folder.rmdir()
     folder.write_text("something else\n", encoding="utf-8")
