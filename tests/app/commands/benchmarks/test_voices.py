@@ -12,9 +12,9 @@ def test_bench_voices_tells_costs_and_errors_of_every_studio_preset(bench, monke
     found = bench("voices")
     names = {path.stem for path in voices.preset_files(voices.SHIPPED) if path.stem.startswith("studio_")}
     assert {(v["preset"], v["kind"]) for v in found["voices"]} == {(n, k) for n in names for k in ("model", "truth")}
-    assert all(
-        0 < v["error"] < 3e-4 for v in found["voices"]
-    )  # 1.9e-4 of the harp's C6, the highest; else below 1e-4
+    # the harp's C6, the highest of all, is beyond what was trained, and its truth at 1.9e-4
+    most = {"studio_any_harp_c6": 3e-4}
+    assert all(0 < v["error"] < most.get(v["preset"], 1e-4) for v in found["voices"])
     assert {s["preset"] for s in found["strikes"]} == names
     assert all(0 < s["median_ms"] <= s["worst_ms"] for s in found["strikes"])
 
