@@ -51,6 +51,17 @@ def cheap(read: Callable[[], object]) -> None:
     assert (costs.largest_mb or 0) <= MOST_MB, costs
 
 
+def refused(read: Callable[[Path], object], path: Path, error: type[Exception]) -> None:
+    """Cheaply, and by the reader's own error, which names the file."""
+
+    def attempt() -> None:
+        with pytest.raises(error) as caught:
+            read(path)
+        assert str(path) in str(caught.value)
+
+    cheap(attempt)
+
+
 DOTTED = {
     "bare": "a." * 30_000 + "a=1",
     "quoted": '"=".' * 15_000 + "a=1",
@@ -69,13 +80,7 @@ DOTTED = {
 def test_a_key_of_many_parts(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "string.toml"
     path.write_text(DOTTED[kind])
-
-    def attempt() -> None:
-        with pytest.raises(SchemaError) as caught:
-            read_toml(path)
-        assert str(path) in str(caught.value)
-
-    cheap(attempt)
+    refused(read_toml, path, SchemaError)
 
 
 def test_ordinary_dots_are_read(tmp_path: Path) -> None:
@@ -97,13 +102,7 @@ MIDI = {
 def test_midi_files(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "song.mid"
     path.write_bytes(MIDI[kind])
-
-    def attempt() -> None:
-        with pytest.raises(MidiFileError) as caught:
-            read_midi(path)
-        assert str(path) in str(caught.value)
-
-    cheap(attempt)
+    refused(read_midi, path, MidiFileError)
 
 
 def test_the_largest_song_is_read_at_an_ordinary_cost(tmp_path: Path) -> None:
@@ -147,24 +146,14 @@ def test_settings_with_some_faults_keep_the_rest(tmp_path: Path) -> None:
 def test_a_record_with_very_many_faults(tmp_path: Path) -> None:
     path = tmp_path / "abx_1.json"
     path.write_text(many("trials", 1))
-
-    def attempt() -> None:
-        with pytest.raises(RecordError):
-            load_record(path)
-
-    cheap(attempt)
+    refused(load_record, path, RecordError)
 
 
 @pytest.mark.parametrize("text", ["\n" * 2**21, ",\n" * 2**20, "digest\n" + "a\n" * 2**20])
 def test_tables_of_nothing(text: str, tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     path.write_text(text)
-
-    def attempt() -> None:
-        with pytest.raises(SchemaError):
-            read_results(path)
-
-    cheap(attempt)
+    refused(read_results, path, SchemaError)
     cheap(lambda: _read_rows(path))
 
 
