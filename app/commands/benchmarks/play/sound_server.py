@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.commands.benchmarks.play.children import Missing, child
+from app.shared.thread_priority import put_first
 
 RATE_HZ = 48_000
 CHANNELS = 2
@@ -42,8 +43,7 @@ class SoundServer:
         socket, log_path = self.folder / SOCKET, self.folder / "pulse.log"
         socket.unlink(missing_ok=True)  # of one that was killed
         protocol = f"module-native-protocol-unix socket={socket} auth-anonymous=1"
-        # First among all processes where the system permits it, as a desktop's: its own lateness is not to be
-        # measured.
+        # First among all processes where the system permits it: its own lateness is not to be measured.
         options = ["--daemonize=no", "--exit-idle-time=-1", "--use-pid-file=no", "--high-priority=yes"]
         command = ["pulseaudio", "-n", *options, "--realtime=yes", "-L", " ".join(_CARD), "-L", protocol]
         log = self._processes.enter_context(log_path.open("wb"))
@@ -53,6 +53,7 @@ class SoundServer:
             time.sleep(0.02)
         if not socket.exists():
             raise Missing(f"PulseAudio did not start: {log_path.read_text(errors='replace')[-300:]}")
+        put_first({process.pid})  # its main thread, which takes the sound of its clients; the sinks' threads are
         self._play_silence()
 
     def end(self) -> None:
