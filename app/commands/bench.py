@@ -496,6 +496,9 @@ def soak(
     minutes: Annotated[float, typer.Option(min=0.01, metavar="MIN", help="Duration in minutes.")] = 10.0,
     playing: Annotated[bool, typer.Option("--playing", help="Twelve keys per second, without a pause.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the random plucks and changes.")] = 0,
+    buffer: Annotated[
+        str, typer.Option(help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
+    ] = "medium",
 ) -> None:
     """Holes, memory, threads and faults of a long session.
 
@@ -505,7 +508,7 @@ def soak(
     from app.commands.benchmarks.soak import soak as run_soak
 
     with progress("bench soak") as report:
-        found = run_soak(60 * minutes, seed, playing, report)
+        found = run_soak(60 * minutes, seed, playing, _buffer(buffer), report)
     if json:
         print_json({**asdict(found), "holes": {**asdict(found.holes), "a_minute": found.holes.a_minute}})
     else:
@@ -520,6 +523,8 @@ def soak(
             ("longest hole, ms", holes.longest_ms, 0),
             ("holes of another process's steady tone", holes.control, None),
             ("these together, ms", holes.control_ms, None),
+            ("a thread that only wakes, later than 3 ms", holes.late, None),
+            ("the latest, ms", holes.latest_ms, None),
             ("gaps that the mixer tells", sum(holes.told.values()), 0),
             *((f"of them {cause}", count, None) for cause, count in holes.told.items()),
             ("longest stall of the window, s", found.longest_stall_s, 0.1),

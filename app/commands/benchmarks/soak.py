@@ -42,11 +42,11 @@ from PySide6.QtCore import (
 )
 from PySide6.QtGui import QKeyEvent
 
-from app.audio.choices import SoundChoice
+from app.audio.choices import Buffer, SoundChoice
 from app.commands.benchmarks.machine import Machine
 from app.commands.benchmarks.play import analysis, hands
 from app.commands.benchmarks.play.children import Missing, need_programs
-from app.commands.benchmarks.play.control import steady_tone_aside
+from app.commands.benchmarks.play.control import late_wakes_ms, steady_tone_aside
 from app.commands.benchmarks.play.recording import recording_aside
 from app.commands.benchmarks.play.sound_server import RATE_HZ, sound_server
 from app.commands.benchmarks.random_changes import Repertoire, random_change
@@ -81,6 +81,8 @@ class Holes:
         heard_at_s: since the recording began.
         told: by the app's mixer, by cause; of very many the latest.
         control: of a steady tone that another process plays meanwhile in the same way: the machine's, not the app's.
+        late: how often a thread of that process which only wakes, in real time, was later than 3 ms.
+        latest_ms: by how much at most; 0 where never.
     """
 
     seconds: float
@@ -91,6 +93,8 @@ class Holes:
     told: dict[str, int]
     control: int
     control_ms: float
+    late: int
+    latest_ms: float
 
     @property
     def a_minute(self) -> float:
@@ -117,6 +121,7 @@ class Soak:
     platform: str
     seed: int
     playing: bool
+    buffer: Buffer
     seconds: float
     plucks: int
     changes: int
@@ -132,15 +137,15 @@ class Soak:
     notices: tuple[tuple[str, int], ...]
 
 
-def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str], None]) -> Soak:
-    """The window for so long, then closed. `playing`: without a pause, instead of restlessly.
+def soak(seconds: float, seed: int, playing: bool, buffer: Buffer, report: Callable[[float, str], None]) -> Soak:
+    """The window for so long, then closed. `playing`: without a pause, instead of restlessly. `buffer`: the device's.
 
     Raises:
         Missing: a program is not there, or the app does not play into the private sound card.
     """
     need_programs(*PROGRAMS)
     threads_before = set(threading.enumerate())
-    settings = Settings(sound=SoundChoice(rate_hz=RATE_HZ))
+    settings = Settings(sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
     random = Random(seed)
     with tempfile.TemporaryDirectory(prefix="soak") as folder, sound_server(Path(folder)) as server, server.adopted():
         file = Path(folder) / "recording"
@@ -151,7 +156,7 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
             watch = _Watch(stage, seconds, report)
             gaps_before = len(stage.controller.sound.status().gaps)
             with (
-                steady_tone_aside(server, Path(folder), settings.sound.buffer) as tone,
+                steady_tone_aside(server, Path(folder), buffer) as tone,
                 recording_aside(server, file),
             ):
                 if playing:
@@ -164,13 +169,15 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
                 memory_mib = watch.at_each_minute()
             notices, platform = stage.window.notices.notices, stage.platform
             faults.update({notice.details: notice.times for notice in notices if "Traceback" in notice.details})
-        holes = _holes(file, tone, playing, Counter(gap.cause for gap in gaps))
+        late_ms = late_wakes_ms(Path(folder))
+        holes = _holes(file, tone, playing, Counter(gap.cause for gap in gaps), late_ms)
     left = [thread.name for thread in threading.enumerate() if thread not in threads_before]
     return Soak(
         Machine.here(),
         platform,
         seed,
         playing,
+        buffer,
         seconds,
         plucks,
         changes,
@@ -187,7 +194,7 @@ def soak(seconds: float, seed: int, playing: bool, report: Callable[[float, str]
     )
 
 
-def _holes(file: Path, tone: Path, playing: bool, told: Counter[str]) -> Holes:
+def _holes(file: Path, tone: Path, playing: bool, told: Counter[str], late_ms: list[float]) -> Holes:
     sound, control = (np.memmap(each, np.float32, "r", shape=(each.stat().st_size // 4,)) for each in (file, tone))
     found = [silence for silence in analysis.silences(sound, RATE_HZ) if playing or silence.sharp]
     lengths_ms = [1000 * silence.frames / RATE_HZ for silence in found]
@@ -201,6 +208,8 @@ def _holes(file: Path, tone: Path, playing: bool, told: Counter[str]) -> Holes:
         dict(told),
         len(controls_ms),
         sum(controls_ms),
+        len(late_ms),
+        max(late_ms, default=0.0),
     )
 
 

@@ -2,6 +2,9 @@
 
 Where the tone has holes too, the computer or the sound server was late, not the app. It plays into a null sink of its
 own, through PortAudio, with the app's buffer, compiled mixer and thread priority.
+
+One thread of that process does nothing but wake every millisecond, in real time too: where even this one is late, the
+computer was held up as a whole, as a virtual one is by its neighbours.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,11 +24,16 @@ from app.commands.benchmarks.play.analysis import silences
 from app.commands.benchmarks.play.children import child
 from app.commands.benchmarks.play.recording import Recording, recording, recording_aside
 from app.commands.benchmarks.play.sound_server import CHANNELS, FORMAT, RATE_HZ, SoundServer
+from app.shared.thread_priority import put_first
 
 SINK = "control"
+LOG = "control.log"
+LATE = "late by, ms: "
 TONE_HZ = 440
 LEVEL = 0.1
 PATIENCE_S = 20.0
+WAKES_EVERY_S = 0.001
+LATE_S = 0.003
 
 
 @contextlib.contextmanager
@@ -45,6 +54,16 @@ def steady_tone_aside(server: SoundServer, folder: Path, buffer: Buffer) -> Iter
         yield path
 
 
+def late_wakes_ms(folder: Path) -> list[float]:
+    """By how much a thread that only wakes was late, where by more than `LATE_S`, since the tone began.
+
+    Args:
+        folder: the tone's.
+    """
+    lines = (folder / LOG).read_text(encoding="utf-8", errors="replace").splitlines()
+    return [float(line.removeprefix(LATE)) for line in lines if line.startswith(LATE)]
+
+
 def _make_sink(server: SoundServer) -> None:
     load = ["pactl", "load-module", "module-null-sink", f"sink_name={SINK}", f"rate={RATE_HZ}", f"format={FORMAT}"]
     subprocess.run([*load, f"channels={CHANNELS}"], env=server.environment, check=True, capture_output=True)
@@ -54,7 +73,7 @@ def _make_sink(server: SoundServer) -> None:
 def _tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[None]:
     command = [sys.executable, "-m", "app.commands.benchmarks.play.control", str(buffer)]
     environment = {**server.environment, "PULSE_SINK": SINK}
-    with (folder / "control.log").open("wb") as log, child(command, environment, stdout=log, stderr=log):
+    with (folder / LOG).open("wb") as log, child(command, environment, stdout=log, stderr=log):
         yield
 
 
@@ -81,8 +100,13 @@ def main(buffer: str) -> None:
         pair = Pair(sound.mixer, {"tone": tone})
         pair.select("tone")
         pair.play()
+        put_first({threading.get_native_id()})
         while True:
-            time.sleep(1)
+            began_s = time.monotonic()
+            time.sleep(WAKES_EVERY_S)
+            late_s = time.monotonic() - began_s - WAKES_EVERY_S
+            if late_s > LATE_S:
+                print(f"{LATE}{1000 * late_s:.2f}", flush=True)
 
 
 if __name__ == "__main__":

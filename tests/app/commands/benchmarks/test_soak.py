@@ -47,7 +47,7 @@ def test_a_short_soak_plays_into_the_private_card_and_reports(
     (tmp_path / "presets").mkdir()
     for name in ("first", "second"):
         shutil.copy(small_preset, tmp_path / "presets" / f"{name}.safetensors")
-    words = ["bench", "soak", "--minutes", "0.03", "--seed", "3", "--json", *how]
+    words = ["bench", "soak", "--minutes", "0.03", "--seed", "3", "--buffer", "high", "--json", *how]
     done = subprocess.run(
         [sys.executable, "-c", RUN, str(tmp_path / "presets"), *words],
         env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -65,7 +65,7 @@ def test_a_short_soak_plays_into_the_private_card_and_reports(
     assert found["end_mib"] > 0
     assert found["drift_mib"] == max(abs(mib - found["settled_mib"]) for mib in found["memory_mib"])
     assert len(found["memory_mib"]) >= 2 and found["peak_mib"] > 0
-    assert found["seed"] == 3
+    assert (found["seed"], found["buffer"]) == (3, "high")
     assert found["holes"]["seconds"] > 1.0  # it was recorded
     assert found["holes"]["heard"] == len(found["holes"]["heard_at_s"])
 
@@ -81,8 +81,9 @@ def test_the_recording_is_judged_by_who_played(tmp_path: Path) -> None:
     tone[30_000:30_096] = 0
     (tmp_path / "tone").write_bytes(tone.tobytes())
     files = (tmp_path / "recording", tmp_path / "tone")
-    playing, restless = (_holes(*files, playing, told) for playing in (True, False))
+    playing, restless = (_holes(*files, playing, told, [3.5, 8.25]) for playing in (True, False))
     assert (playing.control, playing.control_ms) == (1, 2.0)
+    assert (playing.late, playing.latest_ms) == (2, 8.25)
     assert (playing.heard, restless.heard) == (2, 1)
     assert restless.heard_ms == pytest.approx(10, abs=0.1)
     assert playing.longest_ms == pytest.approx(20, abs=0.1)
