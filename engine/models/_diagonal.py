@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
+from engine.models._dense import Dense, linear
 from engine.models.base import AnyFrameModel, Physics
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
@@ -101,7 +102,7 @@ def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor
     """
     real, imaginary = weight.chunk(2, dim=-1)
     interleaved = torch.stack([real, imaginary], dim=-1).flatten(-2)
-    return nn.functional.linear(torch.view_as_real(latents).flatten(-2), interleaved, bias)
+    return linear(torch.view_as_real(latents).flatten(-2), interleaved, bias)
 
 
 def read_weight(weight: Tensor, readout: Tensor | None) -> Tensor:
@@ -164,7 +165,7 @@ def perceptron(*widths: int) -> nn.Sequential:
     """Dense layers of these widths with SELU between."""
     layers: list[nn.Module] = []
     for wide_in, wide_out in pairwise(widths):
-        layers += [nn.Linear(wide_in, wide_out), nn.SELU()]
+        layers += [Dense(wide_in, wide_out), nn.SELU()]
     return nn.Sequential(*layers[:-1])
 
 

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
+from engine.models._dense import Dense, linear
 from engine.models._diagonal import (
     DiagonalModel,
     KoopmanState,
@@ -74,7 +75,7 @@ class Koopman(DiagonalModel):
         n = configuration.state_size
         self.encoder = perceptron(configuration.grid_points, *configuration.encoder_widths, 2 * n)
         if configuration.mixing_layer:
-            self.encoder.append(nn.Linear(2 * n, 2 * n))
+            self.encoder.append(Dense(2 * n, 2 * n))
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.decoder = perceptron(2 * n, *configuration.decoder_widths, configuration.grid_points)
@@ -92,7 +93,7 @@ class Koopman(DiagonalModel):
         hidden = dense(modulated, first.weight, first.bias)
         for layer in others[:-1]:
             hidden = layer(nn.functional.selu(hidden))
-        return nn.functional.linear(nn.functional.selu(hidden), *read_layer(others[-1], readout))
+        return linear(nn.functional.selu(hidden), *read_layer(others[-1], readout))
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         return self.decode(self.successive_latents(origin, first, count), readout)

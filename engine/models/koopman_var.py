@@ -20,6 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
+from engine.models._dense import Dense
 from engine.models._diagonal import (
     FRAMES_AT_ONCE,
     SEGMENT,
@@ -78,11 +79,11 @@ class KoopmanVar(DiagonalModel):
         self.grid_points = configuration.grid_points
         self.multiplier_tolerance = 1e-5
         n = configuration.state_size
-        self.encoder = nn.Linear(configuration.grid_points, 2 * n)
+        self.encoder = Dense(configuration.grid_points, 2 * n)
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.multiplier = perceptron(n, *configuration.multiplier_widths, 2 * n)
-        self.decoder = nn.Linear(2 * n, configuration.grid_points)
+        self.decoder = Dense(2 * n, configuration.grid_points)
 
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(pack(self.encoder(displacement)), 0)

@@ -20,6 +20,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from engine.models._dense import Dense, linear
 from engine.models.base import LINEAR_STRING, Physics, StringModel, check_initialisation
 from engine.models.eigenvalues import powers, slope_at_rest
 
@@ -185,7 +186,7 @@ class DiagonalSSM(nn.Module, ABC):
 
     def input(self, inputs: Tensor, matrix: Tensor) -> Tensor:
         """`matrix` u, complex (..., states), of real inputs (..., inputs)."""
-        return torch.view_as_complex(functional.linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
+        return torch.view_as_complex(linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
 
     def diagonal(self) -> tuple[Tensor, Tensor]:
         """Around the diagonal recurrence: B̄ (2 states, inputs), and the matrix of Re(C̄ x) (outputs, 2 states).
@@ -200,7 +201,7 @@ class DiagonalSSM(nn.Module, ABC):
         matrix = (
             torch.conj_physical(torch.view_as_complex(self.C)) * self.conjugates
         )  # Re(c x) = c_re x_re - c_im x_im
-        return functional.linear(torch.view_as_real(states).flatten(-2), torch.view_as_real(matrix).flatten(1))
+        return linear(torch.view_as_real(states).flatten(-2), torch.view_as_real(matrix).flatten(1))
 
     def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """y (steps, batch, outputs) for u (steps, batch, inputs), and the last x."""
@@ -219,7 +220,7 @@ class Block(nn.Module):
         super().__init__()
         self.normalization = nn.BatchNorm1d(features)
         self.seq = seq
-        self.gate = nn.Linear(features, 2 * features)  # the source's out1, then its out2
+        self.gate = Dense(features, 2 * features)  # the source's out1, then its out2
 
     def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         normalised = self.normalization(inputs.flatten(0, 1)).view_as(inputs)

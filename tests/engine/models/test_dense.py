@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import pytest
+import torch
+from torch.nn import functional
+
+from engine.models._dense import FEWEST_ROWS, WIDTHS, linear
+
+
+@pytest.mark.parametrize("shape", [(32, 100), (100, 32), (3200,), (2053,), (4, 8)])
+@pytest.mark.parametrize("has_bias", [True, False])
+def test_it_is_torch_s_layer_with_its_gradients(shape: tuple[int, ...], has_bias: bool) -> None:
+    """Rows that make images, a prime number of them, and few."""
+    generator = torch.Generator().manual_seed(0)
+    inputs = torch.randn(*shape, 101, generator=generator, requires_grad=True)
+    weight = torch.randn(64, 101, generator=generator, requires_grad=True)
+    bias = torch.randn(64, generator=generator, requires_grad=True) if has_bias else None
+    given = [tensor for tensor in (inputs, weight, bias) if tensor is not None]
+    slope = torch.randn(*shape, 64, generator=generator)
+    found, wanted = linear(inputs, weight, bias), functional.linear(inputs, weight, bias)
+    assert torch.allclose(found, wanted, atol=1e-4)
+    gradients = torch.autograd.grad(found, given, slope), torch.autograd.grad(wanted, given, slope)
+    for ours, theirs in zip(*gradients, strict=True):
+        assert torch.allclose(ours, theirs, rtol=1e-4, atol=1e-5 * float(theirs.abs().max()))
+
+
+def test_rendering_takes_the_product_itself() -> None:
+    """What a preset sounds like does not follow from how it is trained."""
+    inputs, weight = torch.randn(FEWEST_ROWS, 101), torch.randn(64, 101)
+    assert FEWEST_ROWS % WIDTHS[0] == 0
+    with torch.no_grad():
+        assert torch.equal(linear(inputs, weight), functional.linear(inputs, weight))
