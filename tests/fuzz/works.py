@@ -55,7 +55,7 @@ horizons = [60]
 """
 MANY = 100  # times that a small file is saved
 WORKS = ("render", "batch", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
-UNLIKE = ("seconds", "training_seconds", "finished")  # of two runs, however equal
+UNLIKE = ("seconds", "training_seconds", "finished", "commit")  # of two runs, however equal; the tree may be edited meanwhile
 
 
 def render(folder: Path) -> None:
@@ -133,7 +133,7 @@ def _content(path: Path) -> object:
         preset = load_preset(path)
         return replace(preset.info, training_seconds=None), save(preset.model.state_dict())
     if path.name == "rows.csv":
-        return [replace(row, seconds=None, finished="") for row in read_results(path)]
+        return [replace(row, seconds=None, finished="", commit="") for row in read_results(path)]
     if path.name == "row.json":
         return {name: value for name, value in json.loads(path.read_text()).items() if name not in UNLIKE}
     if path.name in ("log.csv", "index.csv"):  # a batch tells which files it kept
