@@ -55,7 +55,8 @@ horizons = [60]
 """
 MANY = 100  # times that a small file is saved
 WORKS = ("render", "batch", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
-UNLIKE = ("seconds", "training_seconds", "finished", "commit")  # of two runs, however equal; the tree may be edited meanwhile
+# of two runs, however equal; whoever works on the code may commit meanwhile
+UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
 
 def render(folder: Path) -> None:
