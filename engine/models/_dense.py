@@ -1,8 +1,8 @@
 """Dense layers over many frames in training on a CPU, as convolutions of width one.
 
 That is the same product, taken by oneDNN instead of the BLAS: on processors of another make than the BLAS's it is
-two to three times as fast (AMD EPYC, one thread, 20,000 × 128 by 128 × 128: 58 GFLOP/s as a product, 185 as a
-convolution), and a training step takes a third less time.
+two to three times as fast (AMD EPYC, one thread, 20,000 × 128 by 128 × 128, timed by hand: 58 GFLOP/s as a product,
+185 as a convolution), and a training step takes a third less time.
 """
 
 from __future__ import annotations

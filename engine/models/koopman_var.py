@@ -83,7 +83,7 @@ class KoopmanVar(DiagonalModel):
         self.nu_log = nn.Parameter(torch.zeros(n))
         self.theta_log = nn.Parameter(torch.zeros(n))
         self.multiplier = perceptron(n, *configuration.multiplier_widths, 2 * n)
-        self.decoder = Dense(2 * n, configuration.grid_points)
+        self.decoder = nn.Linear(2 * n, configuration.grid_points)
 
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(pack(self.encoder(displacement)), 0)

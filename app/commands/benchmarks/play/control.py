@@ -3,8 +3,8 @@
 Where the tone has holes too, the computer or the sound server was late, not the app. It plays into a null sink of its
 own, through PortAudio, with the app's buffer, compiled mixer and thread priority.
 
-One thread of that process does nothing but wake every millisecond, in real time too: where even this one is late, the
-computer was held up as a whole, as a virtual one is by its neighbours.
+One thread of that process does nothing but wake every millisecond, in real time where the system grants it: where
+even this one is late, the computer was held up as a whole, as a virtual one is by its neighbours.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class SoundServer:
             time.sleep(0.02)
         if not socket.exists():
             raise Missing(f"PulseAudio did not start: {log_path.read_text(errors='replace')[-300:]}")
-        put_first({process.pid})  # its main thread, which takes the sound of its clients; the sinks' threads are
+        put_first({process.pid})  # its main thread, which takes its clients' sound; the sinks' already go first
         self._play_silence()
 
     def end(self) -> None:
