@@ -151,8 +151,12 @@ def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
         found = {row.digest: row for row in read_results(path)}
         for row in rows:
             old = found.get(row.digest)
-            if old is None or _rank(row) >= _rank(old):
+            if old is None or _rank(row) > _rank(old):
                 found[row.digest] = row
+            elif _rank(row) == _rank(old):  # the same run, of which one may have been measured again
+                lacking = {name: value for name in COLUMNS if (value := getattr(old, name)) is not None}
+                given = {name: value for name in COLUMNS if (value := getattr(row, name)) is not None}
+                found[row.digest] = Row(**(lacking | given))
         merged = sorted(found.values(), key=lambda row: (row.name, row.digest))
         with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")

@@ -25,8 +25,8 @@ from engine.excitation import (
     WIDTH_RANGE,
 )
 from engine.metrics import ErrorSums, RelativeError
-from engine.presets import Preset, PresetInfo, TrainedRange, load_preset, save_preset
-from engine.schema import read, write
+from engine.presets import Preset, PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
+from engine.schema import SchemaError, read, write
 from engine.whole_file import naming, whole_file
 from training import provenance
 from training.configuration import DatasetConfiguration, TrainingConfiguration
@@ -36,7 +36,7 @@ from training.fitting.fit import Diverged, FitResult, Progress, fit
 from training.knowledge import initialisation_of, knowledge_of
 from training.migration import carried_over
 from training.results import QUARTERS, Row
-from training.row_errors import row_errors
+from training.row_errors import configuration_of, row_errors
 
 LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
 REPEAT_TOLERANCE = 1e-5  # relative; a sum in another order moves a float32 error by less
@@ -122,6 +122,8 @@ def run_row(
 ) -> Row:
     """A run as a row of the results file. Where it was done before, its row is read and nothing is trained.
 
+    Where the preset of a run that was done is elsewhere, it is written again from the run's checkpoint.
+
     A run that diverges is a result too: a row that says so.
 
     Args:
@@ -138,10 +140,11 @@ def run_row(
     with _held(folder / "run.lock", waits):
         file = folder / "row.json"
         output = preset or folder / f"{name}.safetensors"
-        if file.exists() and output.exists():
-            row = carried_over(_read_row(file), configuration)
-            if row.digest == configuration.digest:
-                return row
+        known = carried_over(_read_row(file), configuration) if file.exists() else None
+        if known is not None and known.digest != configuration.digest:
+            known = None
+        if known is not None and _made_by(configuration, output):
+            return known
         dataset = load_dataset(configuration.data, cache)
         facts: dict[str, Any] = {
             "digest": configuration.digest,
@@ -173,9 +176,19 @@ def run_row(
         except Diverged as error:
             return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
         row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, dataset))
+        if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
+            return known  # the preset alone was missing: where and when it was trained stays
         with whole_file(file) as unfinished:
             unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
         return row
+
+
+def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
+    """Whether a file is the preset of this run."""
+    try:
+        return configuration_of(read_info(preset), str(preset)).digest == configuration.digest
+    except (PresetError, SchemaError):
+        return False
 
 
 @contextmanager

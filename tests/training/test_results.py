@@ -85,6 +85,16 @@ def test_what_is_done_is_replaced_by_no_failure(path: Path) -> None:
     assert add_rows(path, [failed]) == [done]
 
 
+def test_an_older_copy_of_a_row_takes_nothing_from_it(path: Path) -> None:
+    """As from another machine, after the row was measured again here."""
+    known = replace(row(), rel_mse_se=0.25)
+    for order in ([known, row()], [row(), known]):
+        path.unlink(missing_ok=True)
+        for each in order:
+            add_rows(path, [each])
+        assert read_results(path) == [known]
+
+
 def test_nothing_added_changes_nothing(path: Path) -> None:
     add_rows(path, [row("b"), row("a")])
     before = path.read_bytes()

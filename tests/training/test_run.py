@@ -144,6 +144,24 @@ def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_pa
         run_row(CELL.name, "ours", configuration(), **places)
 
 
+def test_a_preset_that_is_elsewhere_is_written_again_and_its_row_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As `train` leaves a run in which `sweep` finds it, on another day and machine."""
+    places = {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
+    monkeypatch.setattr("training.provenance.commit", lambda: "first")
+    row = run_row(CELL.name, "ours", configuration(), **places, preset=tmp_path / "elsewhere.safetensors")
+    monkeypatch.setattr("training.provenance.commit", lambda: "second")
+    own = tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors"
+    for _ in range(2):
+        assert run_row(CELL.name, "ours", configuration(), **places) == row
+        assert own.read_bytes() == (tmp_path / "elsewhere.safetensors").read_bytes()
+    other = configuration(seed=1)
+    run_row("other", "ours", other, **places, preset=own)  # over it
+    assert run_row(CELL.name, "ours", configuration(), **places) == row
+    assert own.read_bytes() == (tmp_path / "elsewhere.safetensors").read_bytes()
+
+
 def test_a_run_that_diverges_is_a_row_that_says_so(tmp_path: Path) -> None:
     wild = configuration(peak_learning_rate=1e30, clip_norm=1e30, schedule="constant")
     row = run_row(CELL.name, "ours", wild, tmp_path / "runs", cache=tmp_path / "cache")

@@ -20,6 +20,8 @@ from training.cell import MODEL_NAMES
 from training.configuration import DatasetConfiguration, read_configuration
 from training.data.dataset import draw_initial, split_rows
 
+STARTS = {"gaussian": "Gaussian plucks", "noise": "noise-like starts", "pluck": "plucks of three shapes"}
+
 FRAMES_AT_ONCE = 2048
 TRAJECTORIES_AT_ONCE = 10
 
@@ -49,7 +51,17 @@ def data_of(presets: Sequence[Preset]) -> DatasetConfiguration:
         raise PresetError("no preset was given; a figure needs at least one")
     first, *others = [_data_of(preset) for preset in presets]
     for preset, data in zip(presets[1:], others, strict=True):
-        for name in ("tension_modulated", "initial", "rate_hz", "modes", "grid_points", "string", "seed", "count"):
+        for name in (
+            "tension_modulated",
+            "initial",
+            "rate_hz",
+            "modes",
+            "grid_points",
+            "string",
+            "seed",
+            "count",
+            "largest_tension_rise",
+        ):
             mine, its = getattr(first, name), getattr(data, name)
             if mine != its:
                 raise PresetError(
@@ -62,8 +74,7 @@ def data_of(presets: Sequence[Preset]) -> DatasetConfiguration:
 def describe(data: DatasetConfiguration) -> str:
     """The data set in words, for a title."""
     string = "tension-modulated" if data.tension_modulated else "linear"
-    start = "Gaussian plucks" if data.initial == "gaussian" else "noise-like starts"
-    return f"{string} string, {start}, {data.rate_hz / 1000:g} kHz"
+    return f"{string} string, {STARTS[data.initial]}, {data.rate_hz / 1000:g} kHz"
 
 
 def labels(presets: Sequence[Preset]) -> list[str]:

@@ -226,7 +226,9 @@ class _Run:
     @property
     def ended(self) -> bool:
         patience = self._recipe.patience
-        tired = patience > 0 and self.epoch - self._best_epoch >= patience
+        # while the latents are learned there is no prediction, and so none that is no better
+        since = max(self._best_epoch, self._latent_steps // self._per_epoch)
+        tired = patience > 0 and self.epoch - since >= patience
         return self.ends_epoch and (self.epoch >= self._recipe.epochs or tired)
 
     @property

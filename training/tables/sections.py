@@ -186,7 +186,7 @@ def _entry(rows: Sequence[Row], horizon: int) -> Entry:
 def _figure(rows: Sequence[Row], metric: str, horizon: int) -> Figure | None:
     name = metric if all(row.horizon == horizon for row in rows) else f"{metric}_{SHORT_HORIZON}"
     values, errors = _known(rows, name), _known(rows, f"{name}_se")
-    if not values:
+    if not values or len(values) < len(rows):  # of a split on which a seed runs away there is no mean
         return None
     # of the seeds' mean: they are measured on the same trajectories, whose draw moves them all alike
     split = math.sqrt(fmean(error**2 for error in errors)) if errors else None

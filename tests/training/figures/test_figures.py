@@ -127,6 +127,7 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
         ("rate_hz", 8000),
         ("modes", 4),
         ("seed", 1),
+        ("largest_tension_rise", 0.1),
     ],
 )
 def test_presets_of_different_data_are_refused(field: str, other: Any) -> None:
@@ -134,6 +135,15 @@ def test_presets_of_different_data_are_refused(field: str, other: Any) -> None:
     for draw in (evolution.evolution, extrapolation.extrapolation, error):
         with pytest.raises(PresetError, match=f"one and two were trained on different data \\({field}: "):
             draw(pair)  # type: ignore[operator]
+
+
+def test_the_starts_of_a_data_set_are_named() -> None:
+    told = [motions.describe(motions.data_of([preset(initial=kind)])) for kind in ("gaussian", "noise", "pluck")]
+    assert [words.split(", ")[1] for words in told] == [
+        "Gaussian plucks",
+        "noise-like starts",
+        "plucks of three shapes",
+    ]
 
 
 def test_what_a_figure_cannot_be_made_of_is_told() -> None:

@@ -186,6 +186,13 @@ def test_early_stopping_ends_when_nothing_gets_better(
     assert len(seen) == 3 and again.epochs == 3  # a run that has ended stays ended
 
 
+def test_patience_begins_when_there_is_a_prediction(small_dataset: Dataset, runs: Path) -> None:
+    """Not while Koopman's encoder learns the fitted latents."""
+    found = fit(small("koopman", epochs=8, latent_epochs=5, latent_polish=1, patience=3), small_dataset, runs)
+    assert found.epochs >= 5
+    assert math.isfinite(found.validation.rel_mae)
+
+
 def test_the_mean_of_the_weights_is_what_is_kept(small_dataset: Dataset, runs: Path) -> None:
     found = fit(small("koopman_var", average_decay=0.99), small_dataset, runs)
     assert not torch.equal(found.model.state_dict()["decoder.weight"], weights(runs)["decoder.weight"])

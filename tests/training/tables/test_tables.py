@@ -80,6 +80,14 @@ def test_one_seed_has_no_deviation_and_small_errors_keep_their_digits() -> None:
     assert line(cells, "LRU", "our recipe")[:2] == ["5.12e-06 **better**, 1 seed", "1.5 **worse**, 1 seed"]
 
 
+def test_a_seed_that_runs_away_on_the_test_split_is_not_left_out_of_its_mean() -> None:
+    first, second = seeds(2)
+    tame, wild = (row(name, 0.01, test_rel_mse=test) for name, test in ((first, 0.01), (second, None)))
+    assert line(table(as_markdown([tame]), "Non-linear", 4000), "LRU", "… test split")[0] == "0.01 **better**"
+    both = table(as_markdown([tame, wild]), "Non-linear", 4000)
+    assert not [entry for entry in both if entry[:2] == ["LRU", "… test split"]]
+
+
 def test_which_strings_are_in_the_split_counts_beside_the_seeds() -> None:
     first, second = seeds(2)
     alone = line(table(as_markdown([row(first, 0.02, rel_mse_se=0.005)]), "Non-linear", 4000), "LRU", "our recipe")
