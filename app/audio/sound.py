@@ -245,8 +245,7 @@ class Sound:
         mixer = self.mixer
         if rate_hz != mixer.rate_hz or channels != mixer.channels:
             mixer = Mixer(rate_hz, channels)
-            mixer.set_volume(10 ** (self._volume_db / 20))
-            mixer.set_effects(self._effects)
+            self._set_up(mixer)  # or its first frames would be loud
         old = self._output
         old.close()
         try:
@@ -255,7 +254,16 @@ class Sound:
             self._output = ClockOutput(self.mixer)
             raise
         self.mixer, self._wish, self._stalled = mixer, wish, False
+        self._set_up(mixer)  # what was set while the device was being opened went to the old one
         self._status = replace(self._status, problem=None)
+
+    def _set_up(self, mixer: Mixer) -> None:
+        """Gives it volume and effects, the latest where another thread sets them meanwhile."""
+        given: object = None
+        while given != (wished := (self._volume_db, self._effects)):
+            mixer.set_volume(10 ** (wished[0] / 20))
+            mixer.set_effects(wished[1])
+            given = wished
 
     def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
         """Opens the device again as before a change that was refused; if that fails too, it counts as lost."""

@@ -109,6 +109,8 @@ def evaluate(
     from training.family.errors import Player, by_cell, by_rise, knowing_physics, measure, player
 
     torch.set_num_threads(1)
+    if tenth > strings:
+        raise typer.BadParameter(f"is {tenth} of {strings} strings; give at most as many", param_hint="--tenth")
     if picture is not None:
         from training.figures.style import check_format
 

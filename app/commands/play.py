@@ -10,7 +10,7 @@ import typer
 
 from app.commands import arguments
 from app.commands.console import Failure, progress, say
-from app.commands.render import BitsOption
+from app.commands.render import SILENT_DB, BitsOption
 from engine.plain_text import one_line
 
 DEFAULT_RATE_HZ = 48_000
@@ -44,7 +44,7 @@ def play(
 
     try:
         chosen = find_patch(patch).patch
-        song = read_song(midi, chosen.mode)
+        song = read_song(midi, chosen)
     except (MidiFileError, PatchError) as error:
         raise Failure(str(error)) from error
     from app.instrument.effects import body_problem
@@ -75,6 +75,8 @@ def play(
             )
     except (ValueError, WriteError) as error:
         raise Failure(str(error)) from error
+    if written.level.peak_db < SILENT_DB:
+        say("note: the file is silent")
     took_s, level = time.monotonic() - began_s, written.level
     print(
         f"{one_line(str(out))}: {written.seconds:.1f} s of {source} in {took_s:.1f} s, "

@@ -47,6 +47,7 @@ Normalise = Annotated[
 
 
 def render(
+    context: typer.Context,
     preset: Annotated[
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
@@ -84,9 +85,11 @@ def render(
     PRESET, OUT.wav, --position, --amplitude-mm and --seconds are needed, except with --recipe.
     """
     if recipe is not None:
-        if out is not None or any(value is not None for value in (position, amplitude_mm, seconds, string, modes)):
+        sources = {name: context.get_parameter_source(name) for name in context.params}
+        given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+        if out is not None or given - {"preset", "recipe"}:
             raise typer.BadParameter(
-                "holds preset, string, pluck and duration already; give OUT.wav alone beside it",
+                "holds all that its sound was made with; give OUT.wav alone beside it",
                 param_hint="--recipe",
             )
         _render_again(recipe, Path(preset) if preset else None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from collections.abc import Iterator
@@ -142,7 +143,7 @@ def measure(
 
     file = results or RESULTS
     rows = {row.digest: row for row in read_results(file)}
-    found = [find_preset(name) for name in presets] if presets else preset_files()
+    found = [find_preset(name) for name in presets] if presets else _of_one_string(preset_files())
     pairs = [(path, rows.get(configuration_of(read_info(path), str(path)).digest)) for path in found]
     for path, row in pairs:
         if row is None:
@@ -153,6 +154,18 @@ def measure(
         add_rows(file, [whole])
         gained = sum(old is None and new is not None for old, new in zip(astuple(row), astuple(whole), strict=True))
         print(one_line(f"{row.name}: {gained} figures added"))
+
+
+def _of_one_string(files: list[Path]) -> list[Path]:
+    """Those that can be read and are no model of many strings, which has no row."""
+    from engine.presets import PresetError, read_info
+
+    found = []
+    for file in files:
+        with contextlib.suppress(PresetError):
+            if read_info(file).family is None:
+                found.append(file)
+    return found
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:

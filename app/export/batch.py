@@ -61,7 +61,8 @@ class BatchPlan:
         modes: how many a preset of many strings has; None: all below 20 kHz. Its model plays at the files' rate.
 
     Raises:
-        ValueError: a list is empty or has a value twice, or a pluck is out of its range.
+        ValueError: a list is empty or has a value twice, a pluck is out of its range, or two sounds would have the
+            same file.
     """
 
     presets: tuple[Path, ...]
@@ -90,8 +91,15 @@ class BatchPlan:
                 raise ValueError(f"{word}: one is given twice")
         if len({string.name for string in self.strings}) < len(self.strings):
             raise ValueError("strings: one is given twice")
-        for _ in self.plucks():
-            pass
+        names: set[str] = set()
+        for instrument in self.instruments():
+            for pluck in self.plucks():
+                name = default_file_name(instrument.name, pluck, 0, "model").casefold()
+                if name in names:
+                    raise ValueError(
+                        f"two sounds would have the same file: {instrument.name}; rename a preset or string"
+                    )
+                names.add(name)
 
     @property
     def files(self) -> int:

@@ -18,6 +18,7 @@ from engine.read_file import read_bounded
 
 INDEX = "index.csv"
 Status = Literal["written", "kept", "failed"]
+_BEGINNING = b"file,status,"  # of every index
 STATUSES: tuple[Status, ...] = get_args(Status)
 
 
@@ -50,7 +51,11 @@ class BatchRow:
 
 
 class BatchIndex:
-    """The CSV file; `rows`, by file name, has those of earlier batches in the same folder too."""
+    """The CSV file; `rows`, by file name, has those of earlier batches in the same folder too.
+
+    Raises:
+        ExportError: a table that is no index has its name, or it cannot be read.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -59,6 +64,8 @@ class BatchIndex:
     def add(self, rows: Sequence[BatchRow]) -> None:
         """Adds rows to the file as it is now, as another batch may write into the same folder; none: does nothing.
 
+        What failed does not replace the row of a file that is still there.
+
         Raises:
             ExportError: the file cannot be written.
         """
@@ -66,10 +73,15 @@ class BatchIndex:
             return
         try:
             with FileLock(self._path.with_name(f".{self._path.name}.lock")):
-                self.rows |= _read_rows(self._path) | {row.file: row for row in rows}
+                self.rows |= _read_rows(self._path)
+                self.rows |= {row.file: row for row in rows if row.status != "failed" or not self._have(row.file)}
                 self._write()
         except OSError as error:
             raise ExportError(explain(self._path, error)) from error
+
+    def _have(self, file: str) -> bool:
+        row = self.rows.get(file)
+        return row is not None and row.status != "failed" and (self._path.parent / file).exists()
 
     def _write(self) -> None:
         text = io.StringIO()
@@ -84,11 +96,23 @@ class BatchIndex:
 
 
 def _read_rows(path: Path) -> dict[str, BatchRow]:
-    """By file name; empty where there is no index, or one that cannot be read and will be replaced."""
+    """By file name; empty where there is no index, or a damaged one, which will be replaced.
+
+    Raises:
+        ExportError: it is another table.
+    """
     try:
-        text = read_bounded(path, bounds.LARGEST_TABLE_BYTES).decode("utf-8")
+        raw = read_bounded(path, bounds.LARGEST_TABLE_BYTES)
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise ExportError(explain(path, error)) from error
+    if not _BEGINNING.startswith(raw[: len(_BEGINNING)]):
+        raise ExportError(f"{path}: is there already, and no index of a batch; choose another folder")
+    try:
+        text = raw.decode("utf-8")
         return {row.file: row for row in map(_read_row, csv.DictReader(io.StringIO(text, newline="")))}
-    except (OSError, ValueError, KeyError, TypeError, StopIteration, csv.Error):
+    except (ValueError, KeyError, TypeError, StopIteration, csv.Error):
         return {}
 
 

@@ -100,7 +100,7 @@ def export_sounds(
     progress: Progress = lambda share: None,
     cancelled: Cancelled = lambda: False,
 ) -> tuple[list[WavReport], Voices]:
-    """Renders a pluck once and writes a file for each source, with one gain for all.
+    """Renders a pluck once and writes a file for each source, model and truth with one gain.
 
     Args:
         request: its own `source` is ignored.
@@ -136,7 +136,8 @@ def export_sounds(
         except OSError as error:  # the recordings lie in temporary files
             raise ExportError(explain(Path(tempfile.gettempdir()), error)) from error
         sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
-        beside: list[Sound] = [*voices.sounds.values(), *sounds.values()] if settings.normalise else []
+        # of each file the gain follows from its own recipe, whatever else is written beside it
+        beside: list[Sound] = list(voices.sounds.values()) if settings.normalise else []
         reports = []
         for source, file in opened.items():
             path, sound = paths[source], sounds[source]

@@ -91,18 +91,24 @@ def recorded_files(path: Path) -> tuple[Path, Path]:
     return sound, sound.with_suffix(".mid")
 
 
-def write_recorded(path: Path, played: Played, preset: Preset) -> str:
-    """Writes both `recorded_files` and returns in words what was written. Raises as `write_played`."""
+def write_recorded(
+    path: Path, played: Played, preset: Preset, advanced: Callable[[float], None] = lambda seconds: None
+) -> str:
+    """Writes both `recorded_files` and returns in words what was written. Raises as `write_played`.
+
+    The MIDI file is there at once; the sound takes a part of the time in which it was played.
+    """
     sound_file, midi_file = recorded_files(path)
+    with whole_file(midi_file) as file:
+        file.write(midi_bytes(played.events))
     written = write_played(
         sound_file,
         played.patch,
         preset,
         played.events,
         played.source,
+        advanced=advanced,
         difference_gain_db=played.difference_gain_db,
     )
-    with whole_file(midi_file) as file:
-        file.write(midi_bytes(played.events))
     level = f"peak {written.level.peak_db:.1f} dBFS"
     return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s of {played.source_words}, {level}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from engine.resonators.string import StringParameters
 
 BRIGHT_HZ = 3_000.0  # where the second decay time is told
-NEAR = 1.01  # of a range's end: nothing changes there
+NEAR = 1.03  # of a range's end: nothing changes there
 
 Bounds = tuple[float, float]
 
@@ -38,10 +38,13 @@ class StringFamily:
         """How a string differs from these, in plain words; empty where it does not."""
         sigma, omega = (float(rates[0]) for rates in (string.decay_rates(1), string.undamped_frequencies(1)))
         pitch_hz = math.sqrt(max(0.0, omega**2 - sigma**2)) / (2 * math.pi)
+        bright = max(2, round(BRIGHT_HZ / max(pitch_hz, 1.0)))
+        bright_sigma = float(string.decay_rates(bright)[-1])
         told = (
             ("pitch", pitch_hz, self.pitch_hz, " Hz"),
             ("inharmonicity", inharmonicity(string), self.inharmonicity, ""),
             ("decay time", math.log(1000) / max(sigma, 1e-9), (self.t60_s,), " s"),
+            ("decay time near 3 kHz", math.log(1000) / max(bright_sigma, 1e-9), (self.bright_t60_s,), " s"),
         )
         return [
             f"{name} {value:.3g}{unit} is outside the trained "

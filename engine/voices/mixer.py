@@ -45,7 +45,7 @@ class Mixer:
         self._voices: list[Voice] = []  # handed over and not over yet: their memory is in use
         self._gaps_read = 0
         self._effects_lock = threading.Lock()  # not the voices': a key never waits for a room
-        self._effects = Effects()
+        self.effects = Effects()
         self._convolver: NDArray[np.float64] | None = None
         self._impulses: dict[int, NDArray[np.float64]] = {}  # by address: those that may be in use
         memory[at.M_RATE] = rate_hz
@@ -98,7 +98,7 @@ class Mixer:
 
         effects = effects or Effects()
         with self._effects_lock:
-            if effects == self._effects:
+            if effects == self.effects:
                 return
             address = 0
             if not effects.neutral:
@@ -109,7 +109,7 @@ class Mixer:
                 self._impulses[address] = memory
             if self._convolver is not None:
                 publish(self.memory, self._convolver.ctypes.data, address)
-            self._effects = effects
+            self.effects = effects
             self._forget_impulses()
 
     def _forget_impulses(self) -> None:

@@ -105,7 +105,7 @@ class Voice:
         return bool(self._counts[at.STATE] in (at.OVER, at.RUNAWAY))
 
     def refuse(self) -> None:
-        """It is over before it was handed over."""
+        """It is over, and no mixer has it: it was not handed over, or its mixer is not in use any more."""
         self._counts[at.STATE] = at.OVER
 
     @property
@@ -158,6 +158,13 @@ class Voice:
     def release_at(self, frame: int) -> None:
         """It fades out from this frame of the mixer on; 0: it does not."""
         self._counts[at.RELEASE_AT] = frame
+
+    def fade_out_by(self, seconds: float) -> None:
+        """Before it is handed over: it has faded to silence by then, where it does not end earlier."""
+        end, fade = (round(each * self.program.rate_hz) for each in (seconds, FADE_S))
+        if self._counts[at.ENDS_AT] + self._counts[at.ENDS_IN] > end:
+            self._counts[at.ENDS_AT] = max(0, min(int(self._counts[at.ENDS_AT]), end - fade))
+            self._counts[at.ENDS_IN] = fade
 
     @property
     def began_frame(self) -> int:

@@ -253,10 +253,13 @@ def scala_or_bytes(whole: bytes, draw: random.Random) -> bytes:
     return "\n".join(lines).encode()
 
 
+MPE = read_patch(PATCHES / "long_wire.json").model_copy(update={"mode": "mpe"})
+
+
 def song(path: Path) -> None:
     """Reads a MIDI file, and writes what it says."""
     events = read_midi(path)
-    assert read_song(path, "mpe").events == events
+    assert read_song(path, MPE).events == events
     assert all(0 <= each.time_s <= LONGEST_S for each in events) and len(events) <= MOST_EVENTS
     for each in events:
         if isinstance(each.event, Bend):

@@ -19,6 +19,7 @@ from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
 from app.commands.console import Failure
 from app.export.batch_index import _read_rows
+from app.export.files import ExportError
 from app.export.recipe import RecipeError, read_recipe
 from app.export.sampled.store import read_index
 from app.instrument.midi_file import MOST_EVENTS, MidiFileError, read_midi
@@ -154,6 +155,8 @@ def test_tables_of_nothing(text: str, tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     path.write_text(text)
     refused(read_results, path, SchemaError)
+    refused(_read_rows, path, ExportError)
+    path.write_text("file,status,\n" + text[:-100])
     cheap(lambda: _read_rows(path))
 
 

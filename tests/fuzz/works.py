@@ -16,7 +16,7 @@ from safetensors.torch import save
 
 from app.commands.cli import main
 from app.patches.library import SHIPPED as PATCHES
-from app.patches.library import read_patch, save_patch
+from app.patches.library import own_patches, read_patch, save_patch
 from app.patches.patch import Patch
 from app.window.settings import Settings, save_settings
 from engine.kernels import warm
@@ -106,7 +106,7 @@ def sweep(folder: Path) -> None:
 def save_patches(folder: Path) -> None:
     os.environ["LEARNED_STRINGS_PRESETS"] = str(folder)
     for number in range(MANY, -1, -1):
-        save_patch(patch_of(number), replace=True)
+        save_patch(patch_of(number), own_patches() / "mine.json")
 
 
 def save_many_settings(folder: Path) -> None:

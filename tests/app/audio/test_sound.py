@@ -14,6 +14,7 @@ from app.audio import sound as sound_module
 from app.audio.devices import AudioDevice
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
+from engine.effects import Effects, Room
 from engine.voices import Mixer, Voice, plain_program
 
 TIMEOUT_S = 10.0  # a busy computer's; nothing here takes so long
@@ -142,6 +143,26 @@ def test_another_rate_has_another_mixer_as_loud(sound: Sound, desk: Desk, speake
     assert sound.mixer is not before
     assert (sound.rate_hz, sound.mixer.rate_hz, sound.status().rate_hz) == (44_100, 44_100, 44_100)
     assert sound.mixer.voices == []
+    lasting(sound)
+    found = sound.mixer.render(20_000)
+    np.testing.assert_allclose(found[-100:], 0.025, rtol=1e-5)
+
+
+def test_what_is_set_while_a_device_is_being_opened_is_heard(sound: Sound, desk: Desk, speakers: AudioDevice) -> None:
+    """A device may take a second to open, in which the window sets volume, body and room."""
+    opened(sound)
+    open_output = desk.open_output
+    effects = Effects(room=Room(0.3, 1.0))
+
+    def slow(device: AudioDevice, buffer_s: float, mixer: Mixer) -> FakeOutput:
+        sound.set_volume_db(-20.0)
+        sound.set_effects(effects)
+        return open_output(device, buffer_s, mixer)
+
+    sound._open_output = slow
+    opened(sound, speakers)
+    assert (sound.rate_hz, sound.mixer.effects) == (44_100, effects)
+    sound.set_effects(None)
     lasting(sound)
     found = sound.mixer.render(20_000)
     np.testing.assert_allclose(found[-100:], 0.025, rtol=1e-5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -74,7 +75,7 @@ def test_files_without_their_rows_are_made_again_as_they_were(run, words: list[o
     """As a kill between files and index leaves them: a row of a kept file would lack levels and errors."""
     run(*words)
     before = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
-    (folder / "out" / "index.csv").write_text("something else")
+    (folder / "out" / "index.csv").write_text("file,status,preset\nnothing of use")
     assert "4 written, 0 kept" in run(*words).out
     assert {path.name: path.read_bytes() for path in (folder / "out").iterdir()} == before
 
@@ -90,6 +91,32 @@ def test_another_sound_of_the_name_is_told_and_stays(run, words: list[object], f
     assert run(*words, "--listen", 0.2, "--overwrite").status == 0
     with soundfile.SoundFile(path) as file:
         assert json.loads(file.comment)["listen"] == 0.2
+
+
+def test_the_figures_of_a_file_that_stays_stay(run, words: list[object], folder: Path) -> None:
+    run(*words)
+    before = index(folder)
+    assert run(*words, "--listen", 0.2).status == 1
+    assert index(folder) == before
+
+
+def test_a_table_of_another_program_is_not_replaced(run, words: list[object], folder: Path) -> None:
+    (folder / "out").mkdir()
+    table = folder / "out" / "index.csv"
+    table.write_text("song,bpm\nAve Maria,72\n")
+    found = run(*words)
+    assert found.status == 1
+    assert "index.csv: is there already, and no index of a batch; choose another folder" in found.err
+    assert table.read_text() == "song,bpm\nAve Maria,72\n"
+    assert list((folder / "out").iterdir()) == [table]
+
+
+def test_two_presets_of_one_name_are_not_one_file(small_preset: Path, folder: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other" / small_preset.name
+    other.parent.mkdir()
+    shutil.copy(small_preset, other)
+    with pytest.raises(ValueError, match="same file: small"):
+        replace(plan(small_preset, folder), presets=(small_preset, other))
 
 
 def test_a_broken_preset_hinders_no_other(run, words: list[object], folder: Path, tmp_path: Path) -> None:

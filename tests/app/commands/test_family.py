@@ -83,3 +83,8 @@ def test_a_baseline_is_trained_and_stands_beside_the_preset(
         in run("family", "evaluate", "studio_any_string", "--runs", folder / "none", *few).failure
     )
     assert "is not one of koopman_var, dmsp" in run("family", "baseline", "lru").usage
+
+
+def test_more_strings_for_the_tenth_second_than_there_are_is_told_at_once(run) -> None:
+    found = run("family", "evaluate", "studio_any_string", "--strings", 1, "--tenth", 2)
+    assert "is 2 of 1 strings; give at most as many" in found.usage

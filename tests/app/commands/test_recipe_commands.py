@@ -117,8 +117,9 @@ def test_files_without_a_usable_recipe_are_told_in_one_line(run, folder: Path) -
 
 
 def test_recipe_and_other_choices_exclude_each_other(run, folder: Path) -> None:
-    assert "--recipe: holds preset" in run("render", "a", "b.wav", "--recipe", "c.wav").usage.replace("'", "")
-    assert "--recipe: holds preset" in run("render", "--recipe", "c.wav", "--position", 0.3).usage.replace("'", "")
+    others = ("--position=0.3", "--source=model", "--bits=16", "--normalise", "--listen=0.37", "--shape=gaussian")
+    for more in (("a", "b.wav"), *((other,) for other in others)):
+        assert "--recipe: holds all" in run("render", "--recipe", "c.wav", *more).usage.replace("'", "")
     assert "PRESET: is missing" in run("render").usage.replace("'", "")
     assert "--seconds: is missing" in run(
         "render", "a", "b.wav", "--position", 0.3, "--amplitude-mm", 1
@@ -270,6 +271,4 @@ def test_a_string_beyond_the_family_is_rendered_to_a_file_and_told(run, folder: 
 def test_a_preset_of_one_string_plays_no_other(run, installed: Path, folder: Path) -> None:
     told = run("render", "good", folder / "a.wav", *PLUCK, "--string", "steel_g3").failure
     assert "choose a preset of many strings" in told
-    assert "--recipe: holds preset" in run("render", "--recipe", "c.wav", "--string", "steel_g3").usage.replace(
-        "'", ""
-    )
+    assert "--recipe: holds all" in run("render", "--recipe", "c.wav", "--string", "steel_g3").usage.replace("'", "")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import io
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,6 +17,7 @@ from app.commands import sweep as command
 from app.commands.sweep import Board
 from app.shared.whole_file import REMEDIES
 from engine.metrics import RelativeError
+from engine.presets import find_preset
 from tests.app.commands.conftest import FullDisk
 from training.cell import Cell, configuration_of
 from training.fitting.fit import Progress
@@ -241,6 +243,23 @@ def test_rows_are_filled_from_presets(run, tmp_path: Path) -> None:
     assert run(*words).out == f"{name}: 0 figures added\n"
     file.unlink()
     assert f"{preset}: {file} has no row of its run" in run(*words).failure
+
+
+def test_presets_without_a_row_do_not_hinder_the_others(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model of many strings has none, and a folder may hold anything."""
+    name, places = NAMES[1], {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
+    made = configuration_of(Cell.parse(name) or pytest.fail(), {"count": 10, "steps": 60}, {"epochs": 1})
+    folder, file = tmp_path / "shipped", tmp_path / "results.csv"
+    folder.mkdir()
+    row = run_row(name, "ours", made, **places, preset=folder / f"{name}.safetensors")
+    shutil.copy(find_preset("studio_any_nylon_e2"), folder)
+    (folder / "damaged.safetensors").write_bytes(b"none")
+    add_rows(file, [replace(row, rel_mse_se=None)])
+    monkeypatch.setattr("engine.presets.finding.SHIPPED", folder)
+    assert (
+        run("results", "measure", "--results", file, "--cache", tmp_path / "cache").out
+        == f"{name}: 1 figures added\n"
+    )
 
 
 def test_the_time_left_follows_what_is_known() -> None:

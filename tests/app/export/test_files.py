@@ -132,6 +132,18 @@ def test_normalising_keeps_the_ratio_of_model_and_truth(request_: SoundRequest, 
     assert len(gains) == 1
 
 
+def test_the_gain_of_a_file_does_not_depend_on_what_is_written_beside_it(
+    request_: SoundRequest, tmp_path: Path
+) -> None:
+    request, settings = replace(request_, difference_gain_db=80.0), WavSettings("24", normalise=True)
+    paths = {source: tmp_path / f"{source}.wav" for source in ("model", "difference")}
+    export_sounds(request, paths, settings)  # type: ignore[arg-type]
+    alone = tmp_path / "alone.wav"
+    for source, path in paths.items():
+        export_sound(replace(request, source=source), alone, settings)  # type: ignore[arg-type]
+        assert (soundfile.read(alone)[0] == soundfile.read(path)[0]).all()
+
+
 def test_progress_rises_to_one(request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(offline, "BLOCK_FRAMES", 100)
     shares: list[float] = []

@@ -148,7 +148,7 @@ def test_only_the_last_of_many_wishes_is_kept_and_heard() -> None:
     found = np.concatenate([mixer.render(WINDOW) for _ in range(10)])
     mixer.forget_ended()
     assert len(mixer._impulses) == 1
-    expected = apply(mixer._effects, samples, RATE_HZ)[640 : 640 + len(found)]
+    expected = apply(mixer.effects, samples, RATE_HZ)[640 : 640 + len(found)]
     np.testing.assert_allclose(found[6 * WINDOW :], expected[6 * WINDOW :], atol=1e-6)
 
 
