@@ -79,6 +79,23 @@ def let_go(channels: Iterable[int]) -> list[Event]:
     return events
 
 
+def still_down(events: Iterable[Event]) -> list[Event]:
+    """What lets go the keys that are down and the pedals after these events."""
+    down: dict[NoteOff | Controller, None] = {}  # in their order
+    for event in events:
+        if isinstance(event, NoteOn | NoteOff):
+            off = NoteOff(event.key, event.channel)
+            down.pop(off, None)
+            if isinstance(event, NoteOn) and event.velocity > 0:
+                down[off] = None
+        elif isinstance(event, Controller) and event.number == SUSTAIN:
+            up = Controller(SUSTAIN, 0, event.channel)
+            down.pop(up, None)
+            if event.value >= PEDAL_DOWN:
+                down[up] = None
+    return list(down)
+
+
 @dataclass(frozen=True)
 class TimedEvent:
     """An event and its time from the beginning."""

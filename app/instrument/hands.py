@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from app.instrument import events
-from app.instrument.events import KEYS, Controller
+from app.instrument.events import KEYS, Bend, Controller, Event
 from app.patches.patch import Patch, StringSet
 
 FIRST = 0
@@ -81,6 +81,31 @@ class Hands:
             del self.channels[each]
         if self.speaks_for(patch, channel, self._wheel_by):
             self.wheel = 0
+
+    def events(self) -> list[Event]:
+        """What brings all of them, which are at rest, where these stand."""
+        found: list[Event] = []
+        for channel, hand in sorted(self.channels.items()):
+            if hand.range_semitones is not None:
+                semitones, cents = divmod(round(100 * hand.range_semitones), 100)
+                for number, value in (
+                    (events.REGISTERED, _BEND_RANGE[0]),
+                    (events.FINE_REGISTERED, _BEND_RANGE[1]),
+                    (events.VALUE, semitones),
+                    (events.FINE_VALUE, cents),
+                    (events.REGISTERED, _NONE[0]),
+                    (events.FINE_REGISTERED, _NONE[1]),
+                ):
+                    found.append(Controller(number, value, channel))
+            if hand.bend:
+                found.append(Bend(hand.bend, channel))
+            if hand.pedal:
+                found.append(Controller(events.SUSTAIN, 127, channel))
+            if hand.slide is not None:
+                found.append(Controller(events.SLIDE, hand.slide, channel))
+        if self.wheel:
+            found.append(Controller(events.MOD_WHEEL, self.wheel, self._wheel_by))
+        return found
 
     def rest(self) -> None:
         """Puts wheels at rest and forgets ranges; feet stay on their pedals."""

@@ -26,11 +26,11 @@ class LoudKey:
 
 
 class LoudKeys:
-    """Of one patch, heard at `ear`, on a model's grid."""
+    """Of one patch, heard at `ear`, on a model's grid. A soloed mode is as loud as it is in the whole note."""
 
     def __init__(self, patch: Patch, ear: Ear, grid_points: int) -> None:
         """Raises ValueError: the tuning is impossible."""
-        self._patch, self._ear, self._grid_points = patch, ear, grid_points
+        self._patch, self._ear, self._grid_points = patch, replace(ear, solo=0), grid_points
         self._strings, self._response = Strings(patch), body_response(patch)
 
     def of_key(self, key: int, string: int | None = None) -> LoudKey | None:

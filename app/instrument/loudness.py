@@ -57,9 +57,11 @@ def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | 
 
 
 def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
-    """The factor that brings a pluck at the reference velocity to the wanted level."""
+    """The factor that brings a pluck at the reference velocity to the wanted level; 1 where it is silent."""
     with torch.inference_mode():
         found = level_db(resonator, pluck, ear, response)
+    if found == -math.inf:  # at a fixed end: it would be far too loud anywhere else
+        return 1.0
     low, high = GAIN_RANGE_DB
     return float(10 ** (min(max(WANTED_DB - found, low), high) / 20))
 

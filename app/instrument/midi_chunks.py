@@ -1,12 +1,13 @@
-"""A look through the bytes of a MIDI file before a library makes an object of each of its messages.
+"""A way through the bytes of a MIDI file before a library makes an object of each of its messages.
 
 Source: Standard MIDI Files 1.0. The library reads a number of any length, in a time that grows with its square, and
-counts nothing.
+counts nothing; and it refuses a file for a key or a text that it cannot read, which do not matter here.
 """
 
 from __future__ import annotations
 
 LONGEST_NUMBER = 4  # bytes of a number of variable length, by the standard
+TEMPO, END_OF_TRACK, ANY = 0x51, 0x2F, 0x7F  # kinds of meta messages; "any" is what each program puts there
 META, SYSTEM_EXCLUSIVE = 0xFF, (0xF0, 0xF7)
 _DATA_BYTES = {
     0x8: 2,
@@ -22,12 +23,13 @@ _DATA_BYTES = {
 }  # by kind, or status
 
 
-def check_chunks(raw: bytes, most: int) -> None:
-    """Goes through the messages of all tracks, as the library would, and keeps nothing of them.
+def checked_chunks(file: bytes, most: int) -> bytes:
+    """Goes through the messages of all tracks, as the library would; the file without the kinds that do not matter.
 
     Raises:
         ValueError: the bytes are no MIDI file, or one with more than `most` messages.
     """
+    raw = bytearray(file)
     if raw[:4] != b"MThd" or len(raw) < 14:
         raise ValueError("is no MIDI file: it does not begin with MThd")
     place, left = 8 + int.from_bytes(raw[4:8], "big"), most
@@ -38,10 +40,14 @@ def check_chunks(raw: bytes, most: int) -> None:
             raise ValueError("is no MIDI file, or not a whole one: a track is missing, or ends too soon")
         left = _walk(raw, place, place + length, left)
         place += length
+    return bytes(raw)
 
 
-def _walk(raw: bytes, place: int, end: int, left: int) -> int:
-    """Goes through the messages of one track; returns how many of those that are allowed are left."""
+def _walk(raw: bytearray, place: int, end: int, left: int) -> int:
+    """Goes through the messages of one track, and renames meta messages but for tempo and end.
+
+    Returns how many of the messages that are allowed are left.
+    """
     running = 0
     while place < end:
         left -= 1
@@ -59,7 +65,10 @@ def _walk(raw: bytes, place: int, end: int, left: int) -> int:
             place += 1
             running = status if status != META else running
         if status == META:  # a kind, a length, as many bytes
-            length, place = _number(raw, place + 1, end)
+            kind = place
+            length, place = _number(raw, kind + 1, end)
+            if raw[kind] not in (TEMPO, END_OF_TRACK):
+                raw[kind] = ANY
             place += length
         elif status in SYSTEM_EXCLUSIVE:
             length, place = _number(raw, place, end)
@@ -71,7 +80,7 @@ def _walk(raw: bytes, place: int, end: int, left: int) -> int:
     return left
 
 
-def _number(raw: bytes, place: int, end: int) -> tuple[int, int]:
+def _number(raw: bytearray, place: int, end: int) -> tuple[int, int]:
     """A number of variable length, and the place after it."""
     value = 0
     for here in range(place, min(place + LONGEST_NUMBER, end)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -9,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
-from app.instrument.midi_chunks import check_chunks
-from app.patches.patch import Mode
+from app.instrument.midi_chunks import checked_chunks
+from app.instrument.strings import Strings
+from app.patches.patch import Patch
+from app.shared.key_names import note_name
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 
@@ -67,8 +70,7 @@ def read_midi(path: Path) -> list[TimedEvent]:
     import mido
 
     try:
-        raw = read_bounded(path, LARGEST_BYTES)
-        check_chunks(raw, MOST_EVENTS)
+        raw = checked_chunks(read_bounded(path, LARGEST_BYTES), MOST_EVENTS)
     except UnusableFile as error:
         raise MidiFileError(f"{path}: {error.strerror}; give a smaller MIDI file") from error
     except OSError as error:
@@ -121,8 +123,8 @@ def _in_time(song: Any) -> Iterator[tuple[float, Any]]:
         yield time_s, message
 
 
-def read_song(path: Path, mode: Mode) -> Song:
-    """What a patch of that mode plays of a MIDI file: all but drums, which are no strings.
+def read_song(path: Path, patch: Patch | None) -> Song:
+    """What a patch plays of a MIDI file: all but drums, which are no strings, and notes for which it has none.
 
     In MPE channel 10 is one as the others. In guitar mode a file whose notes are all on one channel is no guitar's,
     whichever channel that is: it plays any key.
@@ -130,7 +132,7 @@ def read_song(path: Path, mode: Mode) -> Song:
     Raises:
         MidiFileError: as `read_midi`; or it holds only drums.
     """
-    timed = read_midi(path)
+    timed, mode = read_midi(path), patch.mode if patch is not None else "poly"
     notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
     channels = notes_on - drums
@@ -140,7 +142,21 @@ def read_song(path: Path, mode: Mode) -> Song:
         timed = [each for each in timed if channels_in([each.event]) != drums]
     if mode == "guitar" and len(channels) == 1:
         timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
-    return Song(timed, f"{path.name} is played without its drums (channel 10)" if drums else "")
+    left_out = ["its drums (channel 10)"] if drums else []
+    keys = [each.event.key for each in timed if isinstance(each.event, NoteOn)]
+    if patch is not None and (silent := _silent(patch, keys)):
+        low, high = (note_name(key) for key in patch.range)
+        left_out.append(f"{silent} of its {len(keys)} notes, for which {patch.name} has no string ({low} to {high})")
+    return Song(timed, f"{path.name} is played without {' and '.join(left_out)}" if left_out else "")
+
+
+def _silent(patch: Patch, keys: Sequence[int]) -> int:
+    """For how many of these keys a patch has no string."""
+    strings, known = Strings(patch), dict.fromkeys(keys, False)
+    for key in known:
+        with contextlib.suppress(ValueError):  # an impossible string is told when it is struck
+            known[key] = strings.of_key(key) is None
+    return sum(known[key] for key in keys)
 
 
 def _on_keys(event: Event) -> Event:

@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.effects import channels_of, effects_of
-from app.instrument.events import Event, NoteOff, NoteOn, PatchTurned, TimedEvent, moves_effects
+from app.instrument.events import (
+    MOD_WHEEL,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+    moves_effects,
+)
 from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
@@ -136,8 +145,10 @@ def render_events(
 
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
     """How many channels `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
-    turned = (each.event.patch for each in timed if isinstance(each.event, PatchTurned))
-    return max(channels_of(each) for each in (patch, *turned))
+    events = [each.event for each in timed]
+    turned = (event.patch for event in events if isinstance(event, PatchTurned))
+    wheeled = any(isinstance(event, Controller) and event.number == MOD_WHEEL for event in events)
+    return max(channels_of(each, wheeled) for each in (patch, *turned))
 
 
 def _gains(source: str, difference_gain_db: float) -> dict[str, float]:

@@ -170,6 +170,12 @@ class Player:
         return self._wheeled("body.", "room.")
 
     @property
+    def at_hand(self) -> list[Event]:
+        """The events that bring wheels and pedals of a new player where they stand."""
+        with self._lock:
+            return self._hands.events()
+
+    @property
     def preset(self) -> Preset:
         return self._preset
 
@@ -249,6 +255,15 @@ class Player:
                     voice.release(seconds)
             self._ringing.clear()
             self._all.clear()
+
+    def gain_of(self, struck: Struck) -> float:
+        """The factor that its string would be struck with now; the one it has where its key has another string now.
+
+        Raises:
+            ValueError: the key has no possible string.
+        """
+        key = self._key(struck.event.key, self._on(struck))
+        return key.gain if key is not None and key.string == struck.key.string else struck.gain
 
     def sounding(self) -> list[Struck]:
         """The strings that ring, one for each place."""

@@ -10,7 +10,7 @@ import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.patches.patch import CATEGORIES, Patch, explained
+from app.patches.patch import CATEGORIES, LONGEST_NAME, Patch, explained
 from app.presets.folders import user_folder
 from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
@@ -80,9 +80,13 @@ def read_patch(path: Path) -> Patch:
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
     """The usable patches, sorted by category and name, and a line for each file that cannot be used. Never raises.
 
-    `folders`: by default the shipped and the user's. Of two files of one name, that of the first folder is used.
+    Of two patches of one name the later one is given a number, as a file that was copied has the name of the first.
+
+    Args:
+        folders: by default the shipped and the user's. Of two files of one name, that of the first folder is used.
     """
     entries: dict[str, PatchEntry] = {}
+    names: set[str] = set()
     problems = []
     for folder in folders or (SHIPPED, own_patches()):
         try:
@@ -95,12 +99,23 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
                 patch = read_patch(path)
                 if path.stem in entries:
                     raise PatchError(f"{path}: a patch of this name exists already; rename the file to use it")
-                entries[path.stem] = PatchEntry(path, patch)
+                name = _other_than(names, patch.name)
+                names.add(name.casefold())
+                entries[path.stem] = PatchEntry(path, patch.model_copy(update={"name": name}))
             except PatchError as error:
                 problems.append(str(error))
             except Exception as error:  # so that the other files are listed
                 problems.append(one_line(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file"))
     return sorted(entries.values(), key=_order), problems
+
+
+def _other_than(taken: set[str], name: str) -> str:
+    """`name`, with a number where it is taken."""
+    number, found = 2, name
+    while found.casefold() in taken:
+        end = f" {number}"
+        number, found = number + 1, name[: LONGEST_NAME - len(end)] + end
+    return found
 
 
 def find_patch(name_or_path: str) -> PatchEntry:
@@ -121,21 +136,21 @@ def find_patch(name_or_path: str) -> PatchEntry:
     raise PatchError(f"no patch {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
 
 
-def save_patch(patch: Patch, *, replace: bool = False) -> PatchEntry:
+def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
     """Writes it into the user's folder, which is made if need be; whole or not at all.
 
     Args:
-        replace: whether a patch of the user's with this name may be overwritten; a shipped one never is.
+        replace: the file of a patch of the user's that it replaces; None: it is a new one, with a file of its own.
 
     Raises:
-        PatchError: the name is that of another patch.
+        PatchError: the name is that of another patch, or the one to replace is shipped.
         WriteError: the folder or the file cannot be written.
     """
-    path = own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
+    path = replace or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
     if (SHIPPED / path.name).exists():
         raise PatchError(f"{patch.name}: a shipped patch has this name; choose another")
-    if path.exists() and not replace:
-        raise PatchError(f"{patch.name}: a patch of this name exists already; choose another, or replace it")
+    if replace is None and path.exists():
+        raise PatchError(f"{patch.name}: a patch of this name or a like one exists already; choose another")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -159,7 +174,7 @@ def rename_patch(entry: PatchEntry, name: str) -> PatchEntry:
     except ValueError as error:
         raise PatchError(explained(error)) from error
     same = file_stem(renamed.name) == entry.name
-    saved = save_patch(renamed, replace=same)
+    saved = save_patch(renamed, entry.path if same else None)
     if not same:
         try:
             entry.path.unlink(missing_ok=True)

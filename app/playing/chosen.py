@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 
 from app.playing.stroke import Mix, Stroke
-from app.presets.library import Library, PresetEntry
+from app.presets.library import Library
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
 from app.session.ears import heard_ear
 from app.session.slots import other_preset
 from app.shared.vocabulary import DIFFERENCE
-from engine.presets import PresetInfo
-from engine.presets.of_string import info_of_string
 
 
 def mix_of(choices: Choices) -> Mix:
@@ -25,14 +22,6 @@ def mix_of(choices: Choices) -> Mix:
 def subject_of(choices: Choices, preset: Path) -> Subject:
     """The string that is plucked: the preset's own, or the one that is chosen for a preset of many."""
     return preset if choices.string is None else StringOf(preset, choices.string.parameters)
-
-
-def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
-    """The preset's info for the string that is plucked; for its own where it cannot play that one."""
-    if choices.string is not None and entry.info.family is not None:
-        with contextlib.suppress(ValueError):
-            return info_of_string(entry.info, choices.string.parameters)
-    return entry.info
 
 
 def stroke_of(choices: Choices, preset: Path, library: Library) -> Stroke:

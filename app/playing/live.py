@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import Controller, Event, NoteOn, PatchTurned, TimedEvent, moves_effects
+from app.instrument.events import (
+    Controller,
+    Event,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+    moves_effects,
+    still_down,
+)
 from app.instrument.player import SOURCES, Player, Struck
 from app.patches.patch import Patch, Pickup
 from app.playing.notes import Note, Notes
@@ -61,7 +70,7 @@ class Live:
         self._dry = False
         self._told_body = ""  # the fault of the body that was reported last
         self._preparing: object = None
-        self._loud: tuple[StringParameters, float] | None = None  # the string that was played last, and its gain
+        self._struck: Struck | None = None  # the last one
         self.seconds = 4.0  # how long the motion of a note is shown
 
     @property
@@ -146,8 +155,12 @@ class Live:
 
     def gain_of(self, string: StringParameters) -> float:
         """The factor of the string that a key played last, so that a pluck by hand is as loud; 1 for any other."""
-        loud = self._loud
-        return loud[1] if loud is not None and loud[0] == string else 1.0
+        struck, player = self._struck, self._player
+        if struck is None or struck.key.string.parameters != string:
+            return 1.0
+        with contextlib.suppress(ValueError):  # told when it is struck
+            return struck.gain if player is None else player.gain_of(struck)
+        return struck.gain
 
     def hear_dry(self, dry: bool) -> None:
         """Whether body and room are left out, as while models are compared with the truth."""
@@ -200,11 +213,18 @@ class Live:
             self._recorded, self._recording_began_s, self._told_full = [], time.monotonic(), False
             if self._player is not None:
                 self._note_down_patch(self._player.patch)
+                for event in self._player.at_hand:
+                    self._note_down(event)
 
     def end_recording(self) -> list[TimedEvent]:
-        """The events, with times in s from the first note on; empty where there was no note."""
+        """The events, with times in s from the first note on; empty where there was no note.
+
+        Keys that are down and pedals are let go at its end.
+        """
         with self._lock:
             events, self._recorded = self._recorded or [], None
+            end_s = time.monotonic() - self._recording_began_s
+        events += [TimedEvent(end_s, event) for event in still_down(each.event for each in events)]
         first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
         if first is None:
             return []
@@ -247,6 +267,6 @@ class Live:
     def _deliver(self, struck: Struck) -> None:
         """In the event's thread, within `handle`."""
         subject = StringOf(self._path, struck.key.string.parameters)
-        self._loud = subject.string, struck.gain
+        self._struck = struck
         stroke = Stroke(subject, struck.pluck, struck.ear, self.seconds, SOURCES, gain=struck.gain)
         self._made = struck, self._notes.adopt(stroke, struck.voices, self._struck_s)

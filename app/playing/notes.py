@@ -111,6 +111,12 @@ class Note:
         for voice in self.voices.values():
             voice.release_at(frame)
 
+    def end(self) -> None:
+        """Cuts it, where no device plays its voices any more; they are over."""
+        self.cut = True
+        for voice in self.voices.values():
+            voice.refuse()
+
     def release(self, seconds: float) -> None:
         """Lets it fade out within so many seconds, from now on."""
         self.released = True
@@ -180,7 +186,7 @@ class Notes:
         with self._lock:
             self._notes.append(note)
         if not self._hand_over(note, self._sound.mixer):
-            note.cut = True
+            note.end()
         return note
 
     def now_s(self) -> float:
@@ -330,7 +336,7 @@ class Notes:
                 note.pending, note.handed_over = True, False
                 self._submit(self._guarded(lambda note=note: self._begin(note, 0.0), note))  # type: ignore[misc]
             else:
-                note.cut = True
+                note.end()
 
     def _begin(self, note: Note, struck_s: float) -> None:
         """Makes the voices and hands them over; again where the device changes its rate meanwhile."""
@@ -371,6 +377,7 @@ class Notes:
                 voices[source] = Voice(program, initial_m, stroke.ear, 0.0, begin=begin)
                 continue
             voice = voices[source] = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds, model.rate_hz, begin)
+            voice.fade_out_by(stroke.seconds)  # behind it there are no samples
             ahead.append(
                 AheadVoice(
                     voice,

@@ -10,7 +10,7 @@ from app.presets.library import Library
 from app.rendering import SOURCES, Take
 from app.session.choices import VOLUME_RANGE_DB, Choices
 from app.session.ears import heard_ear
-from app.session.slots import other_preset
+from app.session.slots import info_of, other_preset
 from engine.presets import outside_training
 from engine.resonators.sine_transform import to_modes
 
@@ -79,9 +79,10 @@ def _why_solo_silent(choices: Choices, library: Library) -> str:
     entry = library.find(other_preset(choices.source_heard) or choices.preset)
     if choices.solo == 0 or entry is None:
         return ""
-    if choices.solo > entry.info.modes:
-        return f"silent: mode {choices.solo} is soloed, and this string has {entry.info.modes}"
-    amplitudes = to_modes(choices.pluck.displacement(entry.info.grid_points), choices.solo).abs()
+    info = info_of(choices, entry)
+    if choices.solo > info.modes:
+        return f"silent: mode {choices.solo} is soloed, and this string has {info.modes}"
+    amplitudes = to_modes(choices.pluck.displacement(info.grid_points), choices.solo).abs()
     if float(amplitudes[-1]) < 1e-4 * choices.amplitude_mm / 1000:
         return f"silent: this pluck does not excite mode {choices.solo}, which is soloed"
     return ""

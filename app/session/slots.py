@@ -1,10 +1,14 @@
-"""What the two slots of the A/B comparison hold."""
+"""What the two slots of the A/B comparison hold, and what is known of it for the string that is plucked."""
 
 from __future__ import annotations
 
-from app.presets.library import Library
+import contextlib
+
+from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
 from app.shared.vocabulary import OTHER
+from engine.presets import PresetInfo
+from engine.presets.of_string import info_of_string
 
 
 def other_preset(source: str) -> str:
@@ -18,6 +22,14 @@ def source_title(source: str, library: Library) -> str:
         entry = library.find(name)
         return entry.title if entry else name
     return source
+
+
+def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
+    """The preset's info for the string that is plucked; for its own where it cannot play that one."""
+    if choices.string is not None and entry.info.family is not None:
+        with contextlib.suppress(ValueError):
+            return info_of_string(entry.info, choices.string.parameters)
+    return entry.info
 
 
 def missing_presets(choices: Choices, library: Library) -> dict[str, str]:

@@ -19,7 +19,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from app.analysis.abx.subject import subject_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
-from app.instrument.events import Event
+from app.instrument.events import Event, NoteOn
 from app.instrument.player import Struck
 from app.playing.chosen import mix_of
 from app.presets.library import Library, PresetEntry
@@ -234,12 +234,16 @@ class Controller(QObject):
 
     def _handle(self, event: Event) -> Struck | None:
         """An event of an instrument; called in the instrument's thread."""
-        return self.performance.handle(event) if self._abx is None else None
+        if self._abx is not None and isinstance(event, NoteOn):
+            return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
+        return self.performance.handle(event)
 
     def play_or_stop(self) -> None:
         if self._abx is None:
+            played = self.patches.playing
             self.patches.stop()
-            self.performance.play_or_stop()
+            if self.performance.playing or not played:  # in a rest of a file nothing rings
+                self.performance.play_or_stop()
             self.window.transport.show_playing(self.performance.playing)
 
     def export(self) -> None:
@@ -277,6 +281,7 @@ class Controller(QObject):
     def _listening_test_ended(self) -> None:
         dialog, self._abx = self._abx, None
         self.performance.hear_dry(False)
+        self.sound.set_volume_db(self.session.choices.volume_db)
         assert dialog is not None
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
         dialog.deleteLater()
@@ -369,7 +374,7 @@ class Controller(QObject):
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
         self.sampled.choices_changed(names)
-        if "volume_db" in names:
+        if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)
         self._wake()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from app.patches.library import (
     rename_patch,
     save_patch,
 )
-from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice
+from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice, explained
 from app.patches.tuning import SCALA_FILES, read_scala
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
 from app.playing.playback import Playback
@@ -144,6 +144,7 @@ class PatchDesk(QObject):
             self.told.emit(problem)
         self._panel.bar.set_bodies(body_titles())
         self._show_entries()
+        self._show_patch()
 
     # Intents
 
@@ -208,23 +209,36 @@ class PatchDesk(QObject):
         patch, entry = self.patch, self.entry
         if patch is None:
             return
-        name = patch.name
-        replace = entry is not None and entry.own
-        if not replace:
-            name, wanted = QInputDialog.getText(self._panel, "Save patch", "Name of the patch:", text=f"{name} 2")
+        if entry is not None and entry.own:
+            self._save(patch, entry.path)
+        else:
+            self._ask("Save patch", "Name of the patch:", f"{patch.name} 2", lambda name: self._save_as(patch, name))
+
+    def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
+        """Asks for a name and does what it is for; again, with the reason, where the name is impossible."""
+        reason = ""
+        while True:
+            name, wanted = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
             if not wanted:
                 return
-        self._save(patch, name, replace)
+            try:
+                do(name)
+                return
+            except ValueError as error:
+                reason = f"{one_line(explained(error))}.\n\n"
 
-    def _save(self, patch: Patch, name: str, replace: bool) -> None:
+    def _save_as(self, patch: Patch, name: str) -> None:
+        """Raises ValueError: the name is impossible or taken."""
+        self._save(Patch.model_validate({**dict(patch), "name": name}))
+
+    def _save(self, patch: Patch, replace: Path | None = None) -> None:
         try:
-            named = Patch.model_validate({**dict(patch), "name": name})
-            save_patch(named, replace=replace)
-        except (ValueError, WriteError) as error:
-            self.told.emit(str(error).splitlines()[0])
+            save_patch(patch, replace)
+        except WriteError as error:
+            self.told.emit(one_line(str(error)))
             return
         self.reload()
-        self._session.update(patch=named)
+        self._session.update(patch=patch)
         self._show_patch()
 
     def rename(self, name: str = "") -> None:
@@ -233,14 +247,17 @@ class PatchDesk(QObject):
         if entry is None or not entry.own:
             self.told.emit("Only patches of your own can be renamed: save this one first.")
             return
-        new, wanted = QInputDialog.getText(self._panel, "Rename patch", "New name:", text=entry.patch.name)
-        if not wanted:
-            return
+        self._ask("Rename patch", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
+
+    def _rename(self, entry: PatchEntry, name: str) -> None:
+        """Raises ValueError: the name is impossible or taken."""
         try:
-            renamed = rename_patch(entry, new)
-        except (ValueError, WriteError) as error:
-            self.told.emit(str(error).splitlines()[0])
+            renamed = rename_patch(entry, name)
+        except WriteError as error:
+            self.told.emit(one_line(str(error)))
             return
+        if entry.name in self.favourites:
+            self.favourites = self.favourites - {entry.name} | {renamed.name}
         if self.patch is not None and self.patch.name == entry.patch.name:
             self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
         self.reload()
@@ -254,6 +271,8 @@ class PatchDesk(QObject):
             entry.path.unlink()
         except OSError as error:
             self.told.emit(f"{entry.path}: cannot be deleted ({error.strerror}).")
+        else:
+            self.favourites = self.favourites - {entry.name}
         self.reload()
 
     def revert(self) -> None:
@@ -282,7 +301,7 @@ class PatchDesk(QObject):
             self.told.emit(one_line(str(error)))
 
     def _play_file(self, file: Path) -> None:
-        song = read_song(file, "poly" if self.patch is None else self.patch.mode)
+        song = read_song(file, self.patch)
         if song.left_out:
             self.informed.emit(f"{song.left_out}.")
         self._playback.play(song.events)

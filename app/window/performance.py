@@ -287,12 +287,15 @@ class Performance(QObject):
 
     def _turn(self) -> None:
         """Hands the next turn of the loop to the mixer, LOOP_AHEAD_S before it begins."""
-        note, take, turn = self._shown.note, self._shown.take, self._next_turn
+        # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
+        note, take, turn = self._shown.note or self._latest, self._shown.take, self._next_turn
         if note is None or take is None or not note.began:
             return
         if turn is not None:
             if turn.began and not turn.cut:
-                self._latest = self._shown.note = turn
+                self._latest = turn
+                if self._is_of(turn, self._session.choices):
+                    self._shown.note = turn
             if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another
                 self._next_turn = None
             return

@@ -23,6 +23,10 @@ FILES = "WAV and MIDI (*.wav)"
 WAIT_S = 30.0  # for files that are being written, when the window is closed
 
 
+class _Abandoned(Exception):
+    """The window is closed before the sound is written, as the user wanted."""
+
+
 class Recordings(QObject):
     """Lives in the window's thread, as long as the window. The button of `bar` records, ends, saves and discards.
 
@@ -39,6 +43,7 @@ class Recordings(QObject):
         self._began_s = 0.0
         self._unsaved: list[Played] = []
         self._writers: list[threading.Thread] = []
+        self._abandoned = threading.Event()  # what is being written
         bar.record_asked.connect(self.record)
         bar.recording_save_asked.connect(self.save)
         bar.recording_discard_asked.connect(self.discard)
@@ -88,9 +93,15 @@ class Recordings(QObject):
             return
         preset_file = entry.path
 
+        def go_on(seconds: float) -> None:
+            if self._abandoned.is_set():
+                raise _Abandoned
+
         def work() -> None:
             try:
-                self._written.emit(write_recorded(path, played, load_preset(preset_file)))
+                self._written.emit(write_recorded(path, played, load_preset(preset_file), go_on))
+            except _Abandoned:
+                pass
             except (ValueError, PresetError, WriteError, OSError) as error:
                 self._not_written.emit(played, str(error).splitlines()[0])
 
@@ -105,11 +116,24 @@ class Recordings(QObject):
 
     def may_close(self) -> bool:
         """Whether the window may be closed; asks where that would lose what was played."""
-        if not self._unsaved and not self._live.recording:
+        lost = []
+        if self._unsaved or self._live.recording:
+            lost.append("What was played is not saved.")
+        if self._writing:
+            lost.append("The sound of a recording is still being written; its notes are in the MIDI file already.")
+        if not lost:
             return True
-        question = "What was played is not saved. Close the window, and lose it?"
-        answer = QMessageBox.question(self._bar, "Recording not saved", question)
-        return answer == QMessageBox.StandardButton.Yes
+        question = "Close the window, and lose it?"
+        answer = QMessageBox.question(self._bar, "Recording not saved", " ".join([*lost, question]))
+        if answer != QMessageBox.StandardButton.Yes:
+            return False
+        if self._writing:
+            self._abandoned.set()
+        return True
+
+    @property
+    def _writing(self) -> bool:
+        return any(thread.is_alive() for thread in self._writers)
 
     def close(self) -> None:
         """Waits until files are written, WAIT_S at most; may be called again."""
@@ -129,6 +153,8 @@ class Recordings(QObject):
         source = "model" if other_preset(choices.source_heard) else choices.source_heard
         self._unsaved.append(Played(patch, tuple(events), source, choices.difference_gain_db))
         self._show_unsaved()
+        if choices.solo:
+            self.informed.emit(f"The recording has all modes, although mode {choices.solo} is soloed.")
         self.save()
 
     def _take_back(self, played: Played, message: str) -> None:

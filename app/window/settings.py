@@ -26,6 +26,7 @@ from engine.schema import SchemaError, parse_json
 from engine.whole_file import whole_file
 
 # at the top of the browser at a first start: strings at full bandwidth, trained on plucks anywhere
+MOST_FAULTS = 50  # of a file that is kept for the rest of it
 FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
 
 
@@ -86,7 +87,7 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         if isinstance(error, ValidationError):
             faults = error.errors(include_url=False, include_input=False)
             why = f"{'.'.join(map(str, faults[0]['loc'])) or 'the file'}: {faults[0]['msg']}"
-            kept = _without(text, [[str(part) for part in fault["loc"]] for fault in faults])
+            kept = _usable(text)
         told = (
             f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
@@ -128,17 +129,24 @@ def _parsed(text: bytes) -> Settings:
     return Settings.model_validate(parse_json(text, "the file"))
 
 
-def _without(text: bytes, fields: list[list[str]]) -> Settings | None:
-    """The settings less the fields at these paths of keys; None where nothing is left to keep."""
-    if any(field[:1] in ([], ["version"]) for field in fields):  # no settings, or those of another version
-        return None
+def _usable(text: bytes) -> Settings | None:
+    """The settings less what is wrong in them; None where nothing is left to keep.
+
+    One fault at a time: what is dropped for one may end others, or lack in what holds it.
+    """
     try:
         data: dict[str, Any] = parse_json(text, "settings")
-        for field in fields:
-            _drop(data, field)
-        return Settings.model_validate(data)
-    except (ValidationError, SchemaError, OverflowError):
-        return None
+        for _ in range(MOST_FAULTS):
+            try:
+                return Settings.model_validate(data)
+            except ValidationError as error:
+                path = [str(part) for part in error.errors(include_url=False, include_input=False)[0]["loc"]]
+            if path[:1] in ([], ["version"]):  # no settings, or those of another version
+                return None
+            _drop(data, path)
+    except (SchemaError, OverflowError):
+        pass
+    return None
 
 
 def _drop(data: dict[str, Any], field: list[str]) -> None:

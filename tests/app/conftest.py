@@ -6,6 +6,7 @@ import gc
 import shutil
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -114,3 +115,14 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
     window.close()
     left = [t.name for t in threading.enumerate() if t.name in OWN_THREADS]
     assert left == []
+
+
+AWAITED_MS = 60_000  # what comes at all comes within a second on a quiet machine; on a crowded one it may take longer
+
+
+@pytest.fixture
+def qtbot(qtbot: QtBot) -> QtBot:
+    """pytest-qt's, but more patient: a test waits for what happens, not for how soon."""
+    for name in ("waitUntil", "waitSignal", "waitSignals", "waitExposed"):
+        setattr(qtbot, name, partial(getattr(qtbot, name), timeout=AWAITED_MS))
+    return qtbot

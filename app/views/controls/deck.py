@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 
@@ -14,6 +14,7 @@ class Deck(QTabWidget):
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName(name)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its tab bar has it; both would hold the Tab key
         self.tabBar().setAccessibleName(name)
         self.setDocumentMode(True)
         self.setUsesScrollButtons(True)

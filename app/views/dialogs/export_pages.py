@@ -114,6 +114,8 @@ class SoundPage(QWidget):
     def paths(self) -> dict[Source, Path]:
         """The files that will be written, by source."""
         path, source = Path(self.path.text().strip()), self.source.currentData()
+        if path.name and path.suffix.lower() != ".wav":
+            path = path.with_name(f"{path.name}.wav")
         if source != "files":
             return {source: path}
         stem = path.stem.removesuffix("_model").removesuffix("_truth")
@@ -156,7 +158,8 @@ class BatchPage(QWidget):
             item.setCheckState(Qt.CheckState.Checked if entry.name in checked else Qt.CheckState.Unchecked)
             self.presets.addItem(item)
         self.presets.setCurrentRow(next((row for row, e in enumerate(self._entries) if e.name in checked), 0))
-        self.what = faint(f"{_shape_text(choices)}, {_heard_text(choices)}")
+        self.what = faint(f"{_shape_text(choices)}, {_heard_text(choices)}{_dry_text(choices)}")
+        self.what.setWordWrap(True)
         self.positions = _line("Positions", batch.positions or f"{choices.position:g}", "0.1, 0.2, 0.35")
         self.amplitudes = _line("Amplitudes in mm", batch.amplitudes or f"{choices.amplitude_mm:g}", "1, 2, 5")
         self.sources = {
@@ -244,7 +247,15 @@ def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
     pluck = f"{_shape_text(choices)}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
     modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
     string = f", a string of {string_word(choices)}" if choices.string else ""
-    return f"{preset.title}{string}: {pluck}, {_heard_text(choices)}{modes}"
+    return f"{preset.title}{string}: {pluck}, {_heard_text(choices)}{modes}{_dry_text(choices)}"
+
+
+def _dry_text(choices: Choices) -> str:
+    """What of the chosen patch is heard in the window and is not in these files, which are to be compared."""
+    if choices.patch is None:
+        return ""
+    left_out = "body, room and level" if choices.patch.body.name or choices.patch.room.mix > 0 else "level"
+    return f". The string alone, without the {left_out} that {choices.patch.name} gives it"
 
 
 def _shape_text(choices: Choices) -> str:

@@ -58,7 +58,8 @@ TOUR = (
     ),
     (
         "Export",
-        "Ctrl+E saves WAV files that store their settings. Drop one on the window to restore them. Ctrl+Shift+E "
+        "Ctrl+E saves plucks of the string alone as WAV files that store their settings; drop one on the window to "
+        "restore them. What you play through a patch, with its body and room, is saved by Record. Ctrl+Shift+E "
         "exports the patch as an instrument for samplers.",
     ),
 )

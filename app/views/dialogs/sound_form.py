@@ -43,7 +43,7 @@ class SoundForm(QWidget):
         self.bits.setToolTip("16 bits are dithered; floating point never clips")
         self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
         self.normalise.setMinimumHeight(28)
-        self.normalise.setToolTip("Off: 10 mm of displacement is full scale, as in playback at 0 dB")
+        self.normalise.setToolTip("Off: 10 mm of displacement is full scale, as played at 0 dB without a patch")
         self.normalise.setChecked(export.normalise)
         self.gain = spin_box(
             "Gain of the difference", *DIFFERENCE_GAIN_RANGE_DB, export.difference_gain_db, " dB", 0, 6

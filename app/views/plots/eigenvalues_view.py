@@ -55,6 +55,7 @@ class EigenvaluesView(QWidget):
         self.plane.pointed.connect(self._tell)
         self.plane.taken.connect(self._take)
         self.plane.escaped.connect(self.solo_ended)
+        theme.changes.theme_changed.connect(self._take_theme)
         for control in (self._axes, self._layer):
             control.setStyleSheet(SMALL)
         head = QHBoxLayout()
@@ -85,6 +86,9 @@ class EigenvaluesView(QWidget):
         self._draw()
         if figure is None:
             self._words.say(words)
+
+    def _take_theme(self) -> None:
+        self._draw(keep_view=True)  # points have pens and brushes of their own
 
     def set_solo(self, mode: int) -> None:
         """The soloed mode; 0: none, all are heard."""

@@ -36,6 +36,7 @@ class ComparePanel(Panel):
         self._stopped = False
         self._stale = False  # the table is of choices that have changed since
         view.set_presets(library.entries)
+        library.changed.connect(self._library_changed)
         view.set_computing(None)
         view.preset_toggled.connect(self._toggle)
         view.same_string_asked.connect(lambda: self._choose(None))
@@ -55,6 +56,10 @@ class ComparePanel(Panel):
                 self.view.set_computing(None)
                 self._stopped = False
             self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
+
+    def _library_changed(self) -> None:
+        self.view.set_presets(self.library.entries)
+        self._show()
 
     def take_started(self, take: Take) -> None:
         self._background.give_way_to(take)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
-from app.playing.chosen import info_of
 from app.presets.library import Library
 from app.presets.words import shape_word
 from app.rendering import Take
@@ -14,6 +13,7 @@ from app.rendering.take import Listened
 from app.session.choices import Choices, Session
 from app.session.shown import LEGEND_FIELDS, shown_sources
 from app.session.silence import why_difference_silent, why_silent
+from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck

@@ -7,8 +7,13 @@ import pytest
 
 from app.instrument.events import KEYS, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
 from app.instrument.midi_file import MidiFileError, Song, event_of, midi_bytes, read_midi, read_song
+from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch
 
+PATCHES = {
+    mode: read_patch(SHIPPED / "long_wire.json").model_copy(update={"mode": mode, "range": (0, 127)})
+    for mode in ("mpe", "guitar")
+}
 PLAYED = [
     TimedEvent(0.0, NoteOn(60, 90, 2)),
     TimedEvent(0.25, Bend(-0.5, 2)),
@@ -114,23 +119,42 @@ def notes_of(song: Song) -> list[tuple[int, int]]:
 
 
 def test_drums_are_no_strings_and_that_is_told(tmp_path: Path) -> None:
-    found = read_song(song(tmp_path, (60, 0), (36, 9), (62, 1)), "poly")
+    found = read_song(song(tmp_path, (60, 0), (36, 9), (62, 1)), None)
     assert notes_of(found) == [(60, 0), (62, 1)]
     assert channels_in(each.event for each in found.events) == {0, 1}
     assert found.left_out == "song.mid is played without its drums (channel 10)"
-    with_drums = read_song(song(tmp_path, (60, 1), (36, 9)), "mpe")  # there channel 10 is a member
+    with_drums = read_song(song(tmp_path, (60, 1), (36, 9)), PATCHES["mpe"])  # there channel 10 is a member
     assert (notes_of(with_drums), with_drums.left_out) == ([(60, 1), (36, 9)], "")
-    assert read_song(song(tmp_path, (60, 0)), "poly").left_out == ""
+    assert read_song(song(tmp_path, (60, 0)), None).left_out == ""
     with pytest.raises(MidiFileError, match="only drums"):
-        read_song(song(tmp_path, (36, 9)), "poly")
+        read_song(song(tmp_path, (36, 9)), None)
 
 
 def test_a_file_of_one_channel_is_no_guitars(tmp_path: Path) -> None:
     one = song(tmp_path, (60, 3), (64, 3), (36, 9))
-    assert notes_of(read_song(one, "guitar")) == [(60, KEYS), (64, KEYS)]
-    assert channels_in(each.event for each in read_song(one, "guitar").events) == {KEYS}
-    assert notes_of(read_song(one, "poly")) == [(60, 3), (64, 3)]
-    assert notes_of(read_song(song(tmp_path, (60, 3), (64, 0)), "guitar")) == [(60, 3), (64, 0)]
+    assert notes_of(read_song(one, PATCHES["guitar"])) == [(60, KEYS), (64, KEYS)]
+    assert channels_in(each.event for each in read_song(one, PATCHES["guitar"]).events) == {KEYS}
+    assert notes_of(read_song(one, None)) == [(60, 3), (64, 3)]
+    assert notes_of(read_song(song(tmp_path, (60, 3), (64, 0)), PATCHES["guitar"])) == [(60, 3), (64, 0)]
+
+
+def test_notes_for_which_there_is_no_string_are_told(tmp_path: Path, guitar: Patch) -> None:
+    narrow = guitar.model_copy(update={"mode": "poly", "range": (40, 76)})
+    found = read_song(song(tmp_path, (10, 0), (60, 0), (120, 0), (36, 9)), narrow)
+    words = "its drums (channel 10) and 2 of its 3 notes, for which test has no string (E2 to E5)"
+    assert found.left_out == f"song.mid is played without {words}"
+    assert read_song(song(tmp_path, (60, 0)), narrow).left_out == ""
+
+
+def test_what_does_not_matter_may_be_wrong(tmp_path: Path) -> None:
+    """A key signature that nobody knows, and a text in no encoding."""
+    file = song(tmp_path, (60, 0))
+    raw = file.read_bytes()
+    start = raw.index(b"MTrk") + 8
+    odd = b"\x00\xff\x59\x02\x00\x02" + b"\x00\xff\x58\x00" + b"\x00\xff\x01\x02\xff\xfe"
+    length = int.from_bytes(raw[start - 4 : start], "big") + len(odd)
+    file.write_bytes(raw[: start - 4] + length.to_bytes(4, "big") + odd + raw[start:])
+    assert read_midi(file) == read_midi(song(tmp_path, (60, 0)))
 
 
 def test_keys_of_the_computer_are_written_on_the_first_channel(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from app.instrument.events import (
     TimedEvent,
 )
 from app.instrument.loudness import k_weight
-from app.instrument.offline import render_events, render_note
+from app.instrument.offline import channels_played, render_events, render_note
 from app.instrument.player import Player, Struck
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
 from engine.presets import Preset, load_preset
@@ -322,6 +322,8 @@ def test_the_wheel_brings_the_room(patch: Patch, preset: Preset) -> None:
 
     assert tail(0) < 1e-5
     assert tail(127) > 1e-4
+    turned, still = ([TimedEvent(0.0, Controller(MOD_WHEEL, 127))], [TimedEvent(0.0, NoteOn(50, 100))])
+    assert [channels_played(wheel, events) for events in (turned, still)] == [2, 1], "its echo has two sides"
 
 
 def test_all_sound_off_ends_everything(patch: Patch, preset: Preset) -> None:

@@ -55,14 +55,37 @@ def test_a_patch_is_replaced_only_where_that_is_meant(make_patch: Make) -> None:
     save_patch(make_patch(name="Mine"))
     with pytest.raises(PatchError, match=r"mine: .* exists already; choose another"):
         save_patch(make_patch(name="mine", level_db=3))
-    assert read_patch(save_patch(make_patch(name="mine", level_db=3), replace=True).path).level_db == 3
+    file = own_patches() / "mine.json"
+    assert read_patch(save_patch(make_patch(name="mine", level_db=3), file).path).level_db == 3
+
+
+def test_a_patch_replaces_its_own_file_and_no_other(make_patch: Make, own: Path) -> None:
+    """A file that was put there may have any name, whatever the patch in it is called."""
+    save_patch(make_patch(name="My-Bass"))
+    friends = write(own / "friend.json", make_patch(name="My bass").model_dump(mode="json"))
+    saved = save_patch(make_patch(name="My bass", level_db=3), friends)
+    assert (saved.path, read_patch(friends).level_db) == (friends, 3)
+    assert read_patch(own / "my_bass.json").name == "My-Bass"
+
+
+def test_two_patches_of_one_name_are_told_apart(make_patch: Make, own: Path) -> None:
+    save_patch(make_patch(name="Mine"))
+    long = "M" * 60
+    for name, file in (("Mine", "mine (copy)"), ("mine", "mine_3"), (long, "long"), (long, "longer")):
+        write(own / f"{file}.json", make_patch(name=name).model_dump(mode="json"))
+    entries, problems = list_patches(own)
+    assert not problems
+    names = {entry.name: entry.patch.name for entry in entries}
+    assert len({name.casefold() for name in names.values()}) == 5
+    assert {names["mine (copy)"], names["mine"]} == {"Mine", "Mine 2"}
+    assert names["longer"] == f"{'M' * 58} 2"
 
 
 def test_a_shipped_patch_is_neither_overwritten_nor_renamed(make_patch: Make, own: Path) -> None:
     shipped = list_patches(SHIPPED)[0][0]
-    for replace in (False, True):
+    for replace in (None, shipped.path):
         with pytest.raises(PatchError, match="shipped"):
-            save_patch(make_patch(name=shipped.patch.name), replace=replace)
+            save_patch(make_patch(name=shipped.patch.name), replace)
     with pytest.raises(PatchError, match="shipped"):
         rename_patch(shipped, "Other")
     assert not own.exists()

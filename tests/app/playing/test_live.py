@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from app.instrument.events import KEYS, SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.player import Player
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
@@ -107,6 +109,63 @@ def test_what_is_played_is_recorded_from_its_first_note_on(live: Live, patch: Pa
     assert events[1].time_s == 0
     live.begin_recording()
     assert live.end_recording() == []
+
+
+def test_a_recording_begins_and_ends_as_the_hands_are(live: Live) -> None:
+    """With the pedal down and a wheel turned; and no key of it is down for ever."""
+    for event in (Controller(SUSTAIN, 127), Bend(0.5), Controller(101, 0), Controller(100, 0), Controller(6, 12)):
+        live.handle(event)
+    heard = live.handle(NoteOn(50, 60))
+    assert heard is not None
+    live.begin_recording()
+    live.handle(NoteOn(45, 60))
+    live.handle(NoteOff(45))
+    live.handle(NoteOn(52, 60))
+    events = live.end_recording()
+    assert [each.event for each in events[-2:]] == [Controller(SUSTAIN, 0), NoteOff(52)]
+    assert live._player is not None
+    again = Player(live._player.patch, live._player.preset, 48_000, lambda struck: None)
+    for each in events[:-2]:
+        again.handle(each.event)
+    as_heard, played = ({struck.event.key: struck for struck in one.sounding()} for one in (live._player, again))
+    assert played.keys() == {45, 52}
+    for key, struck in played.items():
+        assert (struck.parameters, struck.damped) == (as_heard[key].parameters, False)
+    assert played[45].parameters.tension_n > played[45].key.string.parameters.tension_n
+
+
+def test_a_soloed_mode_is_as_loud_as_in_the_note(live: Live, sound: Any, notes: Notes) -> None:
+    """So that the other modes do not thunder when the solo ends, and a pluck by hand does not either."""
+    made = live.handle(NoteOn(45, 100))
+    assert made is not None
+    whole = made[0].gain
+    live.listen(replace(EAR, solo=5))
+    made = live.handle(NoteOn(45, 100))
+    assert made is not None
+    assert made[0].gain == pytest.approx(whole)
+    live.listen(Ear((0.0,)))
+    made = live.handle(NoteOn(45, 100))
+    assert made is not None
+    assert made[0].gain <= 1, "nothing is heard of it: no gain would help"
+    live.listen(EAR)
+    assert live.gain_of(made[0].key.string.parameters) == pytest.approx(whole)
+
+
+@pytest.mark.parametrize(("rate_hz", "channels"), [(48_000, 1), (44_100, 2)])
+def test_keys_of_a_device_that_is_gone_go_out_and_leave_no_motion(
+    live: Live, sound: Any, notes: Notes, rate_hz: int, channels: int
+) -> None:
+    live.handle(NoteOn(45, 127))
+    sound.mixer.render(4_800)
+    assert live.sounding()
+    sound.mixer = type(sound.mixer)(rate_hz, channels)
+    notes.poll()
+    assert live.sounding() == {}
+    live.handle(NoteOn(45, 1))
+    soft = np.abs(sound.mixer.render(rate_hz // 10)).max()
+    live.handle(NoteOff(45))
+    live.handle(NoteOn(57, 1))
+    assert soft < 3 * np.abs(sound.mixer.render(rate_hz // 10)).max()
 
 
 def test_the_strings_end_with_the_devices_rate_and_new_ones_sound(live: Live, sound: Any, notes: Notes) -> None:

@@ -415,6 +415,19 @@ def test_a_model_that_is_rendered_begins_when_enough_is_there(
     assert notes.latencies_s == (), "rendering is no latency"
 
 
+def test_a_model_that_is_rendered_fades_out_where_its_samples_end(
+    notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait
+) -> None:
+    note = notes.strike(stroke_of(small_preset, seconds=0.5, sources=("model",)))
+    wait(lambda: not note.pending and all(each.finished for each in note.ahead))
+    heard = seconds_of(sound.mixer, 0.7)
+    end = int(np.nonzero(np.abs(heard) > 1e-6)[0][-1])
+    assert end == pytest.approx(0.5 * RATE_HZ, abs=0.005 * RATE_HZ)
+    assert np.abs(heard[end - 2_400 : end - 1_200]).max() > 0.003, "it still rang"
+    steps = np.abs(np.diff(heard, 2))
+    assert steps[end - 100 : end + 100].max() < 0.2 * steps[end - 2_400 : end - 1_200].max()
+
+
 def test_a_model_that_is_rendered_can_be_stopped_before_it_sounds(
     notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait, slow_model: None
 ) -> None:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.patches.patch import PhysicalString
 from app.presets.library import Library, list_presets
 from app.rendering import Take
 from app.session.choices import Choices
 from app.session.ears import heard_ear
 from app.session.silence import why_difference_silent, why_ran_away, why_silent
 from engine.pluck import Pluck
-from engine.presets import read_info
+from engine.presets import find_string, read_info
+from engine.presets.finding import SHIPPED
+from engine.presets.of_string import read_string
 from engine.voices import Ear
 
 
@@ -22,6 +26,16 @@ from engine.voices import Ear
 def library(small_preset: Path) -> Library:
     """The preset `small`."""
     return Library(list_presets(small_preset.parent)[0])
+
+
+def test_modes_are_those_of_the_string_that_is_plucked() -> None:
+    """Not those of the string that a preset of many was measured with."""
+    library = Library(list_presets(SHIPPED)[0])
+    for name, solo, words in (("nylon_e2", 60, ""), ("piano_c4", 55, "this string has 53")):
+        string = PhysicalString(**asdict(read_string(find_string(name))))
+        found = why_silent(Choices(preset="studio_any_string", string=string, solo=solo, position=0.113), library)
+        assert words in found
+        assert bool(found) == bool(words)
 
 
 @pytest.mark.parametrize(

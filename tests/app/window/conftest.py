@@ -19,6 +19,6 @@ def played(
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
     controller.library.refresh()
     controller.patches.choose("steel_string_acoustic")
-    qtbot.waitUntil(lambda: controller.performance.live.ready, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.live.ready)
     controller.window.setFocus()
     return controller

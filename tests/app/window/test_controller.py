@@ -47,10 +47,7 @@ def gains(controller: Controller) -> dict[str, float]:
 
 
 def wait_for_take(qtbot: QtBot, controller: Controller) -> None:
-    qtbot.waitUntil(
-        lambda: "error of this pluck" in controller.window.error_label.text(),
-        timeout=20_000,
-    )
+    qtbot.waitUntil(lambda: "error of this pluck" in controller.window.error_label.text())
 
 
 def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller) -> None:
@@ -64,8 +61,8 @@ def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller)
     qtbot.mouseRelease(string, LEFT, pos=QPoint(x, string.height() // 4))
     assert controller.session.choices.position == pytest.approx(0.6, abs=0.01)
     assert 1 < controller.session.choices.amplitude_mm < 5
-    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
-    qtbot.waitUntil(lambda: controller.performance.position_s > 0.05, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing)
+    qtbot.waitUntil(lambda: controller.performance.position_s > 0.05)
 
 
 def test_the_listening_point_is_dragged_by_its_marker(qtbot: QtBot, controller: Controller) -> None:
@@ -100,13 +97,13 @@ def test_the_motion_can_be_switched_off(qtbot: QtBot, controller: Controller) ->
     string = view(controller, "string")
     wait_for_take(qtbot, controller)
     controller.performance.seek(0.1)
-    qtbot.waitUntil(lambda: string._frame is not None and bool(string._frame.envelopes), timeout=20_000)
+    qtbot.waitUntil(lambda: string._frame is not None and bool(string._frame.envelopes))
     qtbot.mouseClick(string._toggles[1], LEFT)
     assert not controller.session.choices.envelope
-    qtbot.waitUntil(lambda: not string._frame.envelopes, timeout=20_000)
+    qtbot.waitUntil(lambda: not string._frame.envelopes)
     controller.session.update(motion=False)
     assert not string._toggles[0].isChecked()
-    qtbot.waitUntil(lambda: string._frame is None, timeout=20_000)
+    qtbot.waitUntil(lambda: string._frame is None)
 
 
 def test_gestures_are_undone_one_by_one(qtbot: QtBot, controller: Controller) -> None:
@@ -141,14 +138,14 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     window, session, string = controller.window, controller.session, view(controller, "string")
     wait_for_take(qtbot, controller)
     qtbot.keyClick(window, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: controller.performance.playing, timeout=5_000)
+    qtbot.waitUntil(lambda: controller.performance.playing)
     qtbot.keyClick(window, Qt.Key.Key_B)
     assert session.source_heard == "truth"
-    qtbot.waitUntil(lambda: gains(controller) == {"model": 0.0, "truth": 1.0}, timeout=5_000)
+    qtbot.waitUntil(lambda: gains(controller) == {"model": 0.0, "truth": 1.0})
     qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert session.choices.loop
     qtbot.keyClick(window, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: not controller.performance.playing, timeout=5_000)
+    qtbot.waitUntil(lambda: not controller.performance.playing)
     qtbot.keyClick(string, Qt.Key.Key_Right)
     assert session.choices.position == pytest.approx(0.36)
     qtbot.keyClick(string, Qt.Key.Key_Up)
@@ -165,10 +162,10 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     for number, key in enumerate((Qt.Key.Key_A, Qt.Key.Key_Semicolon, Qt.Key.Key_A, Qt.Key.Key_A, Qt.Key.Key_L), 1):
         qtbot.keyClick(window, key)
         assert len(notes(controller)) == number, "it is struck before the window knows of it"
-        qtbot.waitUntil(lambda number=number: len(plucks) == number, timeout=5_000)
+        qtbot.waitUntil(lambda number=number: len(plucks) == number)
     assert plucks == pytest.approx([0.3, 0.7, 0.3, 0.3, 0.6556])
     assert not controller.history.undo_words
-    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing)
     qtbot.keyClick(window, Qt.Key.Key_9)
     assert session.choices.amplitude_mm == pytest.approx(10)
     qtbot.keyClick(window, Qt.Key.Key_C)
@@ -190,10 +187,10 @@ def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Contr
     (note,) = notes(controller)
     assert (note.stroke.pluck.position, note.stroke.pluck.amplitude_mm) == pytest.approx((0.7, 10))
     assert controller.session.choices.position == Choices().position, "the window has had no time yet"
-    qtbot.waitUntil(lambda: controller.session.choices.position == pytest.approx(0.7), timeout=5_000)
+    qtbot.waitUntil(lambda: controller.session.choices.position == pytest.approx(0.7))
     assert controller.session.choices.amplitude_mm == pytest.approx(10)
     assert not controller.history.undo_words
-    qtbot.waitUntil(lambda: controller.performance.position_s > 0, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.position_s > 0)
     midi.performed.emit({"width": 0.1})
     assert controller.session.choices.width == 0.1
     qtbot.keyClick(controller.window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
@@ -245,7 +242,7 @@ def test_a_key_waits_for_one_picture_at_a_time(
     for _ in range(4):
         controller._tick()
         assert shown == ["string"]
-        qtbot.waitUntil(lambda: len(shown) > 1, timeout=5_000)
+        qtbot.waitUntil(lambda: len(shown) > 1)
         decks.append(shown[1:])
         shown.clear()
     assert sorted(decks[:2]) == [["spectrum"], ["waveform"]]
@@ -255,13 +252,13 @@ def test_a_key_waits_for_one_picture_at_a_time(
 def test_both_sources_are_drawn(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
     controller.performance.seek(0.1)
-    qtbot.waitUntil(lambda: view(controller, "string")._frame is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: view(controller, "string")._frame is not None)
     frame = view(controller, "string")._frame
     assert frame is not None
     assert set(frame.shapes) == {"model", "truth"}
     for plot in (view(controller, "spectrum"), view(controller, "waveform")):
         for curve in plot._curves.values():
-            qtbot.waitUntil(lambda curve=curve: curve.getData()[0] is not None, timeout=20_000)
+            qtbot.waitUntil(lambda curve=curve: curve.getData()[0] is not None)
             assert np.isfinite(curve.getData()[1]).all()
             assert np.ptp(curve.getData()[1]) > 0
 
@@ -274,9 +271,9 @@ def test_a_pluck_is_struck_before_its_motion_is_rendered(qtbot: QtBot, controlle
     performance, (note,) = controller.performance, notes(controller)
     assert not performance.ready
     assert note.stroke.pluck.position == 0.61
-    qtbot.waitUntil(lambda: any(voice.sounding for voice in note.voices.values()), timeout=20_000)
-    qtbot.waitUntil(lambda: performance.ready, timeout=20_000)
-    qtbot.waitUntil(lambda: performance.position_s == pytest.approx(note.seconds, abs=0.05), timeout=5_000)
+    qtbot.waitUntil(lambda: any(voice.sounding for voice in note.voices.values()))
+    qtbot.waitUntil(lambda: performance.ready)
+    qtbot.waitUntil(lambda: performance.position_s == pytest.approx(note.seconds, abs=0.05))
     assert performance.position_s > 0
 
 
@@ -292,11 +289,11 @@ def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller)
 
 
 def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: Controller) -> None:
-    qtbot.waitUntil(lambda: "without sound" in controller.window.notices.text, timeout=5_000)
+    qtbot.waitUntil(lambda: "without sound" in controller.window.notices.text)
     assert len(controller.window.notices.notices) == 1
     wait_for_take(qtbot, controller)
     controller.pluck()
-    qtbot.waitUntil(lambda: controller.performance.position_s > 0.1, timeout=5_000)
+    qtbot.waitUntil(lambda: controller.performance.position_s > 0.1)
 
 
 def test_a_broken_preset_is_told_and_the_app_goes_on(
@@ -306,7 +303,7 @@ def test_a_broken_preset_is_told_and_the_app_goes_on(
     (preset_folder / "damaged").write_bytes(b"damaged")
     (preset_folder / "damaged").replace(preset_folder / "second.safetensors")  # not in place, while it may be read
     controller.session.update(preset="second")
-    qtbot.waitUntil(lambda: "second.safetensors" in controller.window.notices.text, timeout=5_000)
+    qtbot.waitUntil(lambda: "second.safetensors" in controller.window.notices.text)
     controller.session.update(preset="first", position=0.45)
     wait_for_take(qtbot, controller)
 
@@ -367,12 +364,12 @@ def test_plucks_ring_beside_each_other_and_a_knob_strikes_none(qtbot: QtBot, con
     assert [note.stroke.pluck.position for note in notes(controller)] == [0.35, 0.35, 0.5]
     struck = notes(controller)
     controller.session.update(position=0.6)  # a knob that is turned
-    qtbot.waitUntil(lambda: controller.performance.ready, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.ready)
     assert notes(controller) == struck
     assert controller.performance.position_s == 0, "what is shown is not struck"
     controller.play_or_stop()
     assert not controller.performance.playing
-    qtbot.waitUntil(lambda: all(note.over for note in struck), timeout=5_000)
+    qtbot.waitUntil(lambda: all(note.over for note in struck))
 
 
 def test_another_preset_leaves_what_rings(qtbot: QtBot, controller: Controller) -> None:
@@ -380,14 +377,14 @@ def test_another_preset_leaves_what_rings(qtbot: QtBot, controller: Controller) 
     wait_for_take(qtbot, controller)
     controller.pluck()
     (note,) = notes(controller)
-    qtbot.waitUntil(lambda: note.seconds > 0.05, timeout=20_000)
+    qtbot.waitUntil(lambda: note.seconds > 0.05)
     controller.session.update(preset="second")
-    qtbot.waitUntil(lambda: controller.performance.ready, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.ready)
     assert notes(controller) == [note]
     assert note.stroke.preset.stem == "first"
     assert not controller.performance.moving
     before_s = note.seconds
-    qtbot.waitUntil(lambda: note.seconds > before_s + 0.05, timeout=5_000)
+    qtbot.waitUntil(lambda: note.seconds > before_s + 0.05)
     controller.pluck()
     assert [each.stroke.preset.stem for each in notes(controller)] == ["first", "second"]
 
@@ -400,7 +397,7 @@ def test_plucks_that_are_overtaken_sound_all_the_same(qtbot: QtBot, controller: 
         controller.pluck()
     struck = notes(controller)
     assert [note.stroke.pluck.position for note in struck] == [0.45, 0.55]
-    qtbot.waitUntil(lambda: all(note.seconds > 0 for note in struck), timeout=20_000)
+    qtbot.waitUntil(lambda: all(note.seconds > 0 for note in struck))
 
 
 def test_only_what_concerns_the_sound_is_told_to_the_notes(
@@ -419,7 +416,7 @@ def test_only_what_concerns_the_sound_is_told_to_the_notes(
 
 def test_while_nothing_moves_pictures_are_looked_at_less_often(qtbot: QtBot, controller: Controller) -> None:
     wait_for_take(qtbot, controller)
-    qtbot.waitUntil(lambda: controller._timer.interval() == IDLE_MS, timeout=10_000)
+    qtbot.waitUntil(lambda: controller._timer.interval() == IDLE_MS)
     controller.session.update(listen=0.3)
     assert controller._timer.interval() == FRAME_MS
 
@@ -431,12 +428,12 @@ def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, control
     take, string, (note,) = controller.performance.take, view(controller, "string"), notes(controller)
     at = QPoint(string.width() // 2, string.height() // 4)
     qtbot.mousePress(string, LEFT, pos=at)
-    qtbot.waitUntil(lambda: controller.performance.take is not take, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.take is not take)
     assert notes(controller) == [note]
     qtbot.mouseRelease(string, LEFT, pos=at)
     first, second = notes(controller)
     assert first is note
-    qtbot.waitUntil(lambda: controller.performance._shown.note is second, timeout=5_000)
+    qtbot.waitUntil(lambda: controller.performance._shown.note is second)
 
 
 def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -> None:
@@ -445,7 +442,7 @@ def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -
     slots.change_asked.emit("b", "preset:second")
     controller.pluck()
     (note,) = notes(controller)
-    qtbot.waitUntil(lambda: note.seconds > 0, timeout=20_000)
+    qtbot.waitUntil(lambda: note.seconds > 0)
     assert set(note.voices) == {"model", "preset:second"}
     assert gains(controller) == {"model": 1.0, "preset:second": 0.0}
     qtbot.mouseClick(slots._buttons["b"], LEFT)
@@ -456,11 +453,11 @@ def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -
     assert gains(controller) == {"model": 1.0, "preset:second": 0.0}
     session.update(a="difference", difference_gain_db=30, level_match=False)
     controller.pluck()
-    qtbot.waitUntil(lambda: notes(controller)[-1].seconds > 0, timeout=20_000)
+    qtbot.waitUntil(lambda: notes(controller)[-1].seconds > 0)
     loud = pytest.approx(10 ** (30 / 20))
     assert gains(controller)["model"] == loud
     assert -gains(controller)["truth"] == loud
-    qtbot.waitUntil(lambda: "+30 dB" in slots._buttons["a"].text(), timeout=5_000)
+    qtbot.waitUntil(lambda: "+30 dB" in slots._buttons["a"].text())
 
 
 def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controller) -> None:
@@ -478,14 +475,13 @@ def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controll
     wait_for_take(qtbot, controller)
     session.update(a="preset:second", heard="a")
     title = controller.library.find("second").info.title
-    qtbot.waitUntil(lambda: controller.performance.take.others != {}, timeout=20_000)
-    qtbot.waitUntil(lambda: views[1]._curves["preset:second"].getData()[0] is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.take.others != {})
+    qtbot.waitUntil(lambda: views[1]._curves["preset:second"].getData()[0] is not None)
     assert views[1].legend.text == f"A  {title} · heard   B  difference +20 dB"
     controller.play_or_stop()
     controller.performance.seek(0.2)
     qtbot.waitUntil(
-        lambda: views[0]._frame is not None and set(views[0]._frame.shapes) == {"preset:second", "difference"},
-        timeout=20_000,
+        lambda: views[0]._frame is not None and set(views[0]._frame.shapes) == {"preset:second", "difference"}
     )
 
 

@@ -63,7 +63,7 @@ def drag(qtbot: QtBot, controller: Controller, until: str = "rendered") -> None:
         qtbot.mouseMove(button, FAR + QPoint(next(steps) % 2, 0))
         return bool(ended) if until == "rendered" else until in controller.window.notices.text
 
-    qtbot.waitUntil(moved, timeout=60_000)
+    qtbot.waitUntil(moved)
     qtbot.mouseRelease(button, LEFT, pos=FAR)
     assert QApplication.overrideCursor() is None
 
@@ -77,7 +77,7 @@ def test_it_is_what_the_dialog_writes(
     dialog = ExportDialog(short.library.entries, short.session.choices, short._settings.export)
     qtbot.addWidget(dialog)
     dialog.save.click()
-    qtbot.waitUntil(lambda: "Saved" in dialog.state.text(), timeout=60_000)
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     written = list(dialog.sound.paths().values())
     assert [path.name for path in dropped] == [path.name for path in written]
     assert [path.read_bytes() for path in dropped] == [path.read_bytes() for path in written]

@@ -145,16 +145,25 @@ def test_a_body_that_comes_back_is_heard_again(
     """The patch names it all the time, so that nothing of it changes."""
     heard: list[Effects | None] = []
     told: list[str] = []
+
+    def is_knock() -> bool:
+        """The last body is a sound; the guitar's, which the patch begins with, may come late and has none."""
+        return (
+            bool(heard)
+            and heard[-1] is not None
+            and heard[-1].body is not None
+            and heard[-1].body.impulse is not None
+        )
+
     patched.performance.live._set_effects = heard.append
     patched.performance.live._report = lambda message, details: told.append(message)
     drop(patched, knock(tmp_path / "knock.wav"))
     chosen = patched.session.choices
-    qtbot.waitUntil(lambda: bool(heard) and heard[-1] is not None and heard[-1].body is not None, timeout=20_000)
-    assert heard[-1] is not None and heard[-1].body is not None and heard[-1].body.impulse is not None
+    qtbot.waitUntil(is_knock)
     (own_bodies() / "knock.wav").unlink()
     patched.performance.choices_changed(frozenset({"patch"}))
-    qtbot.waitUntil(lambda: heard[-1] is None or heard[-1].body is None, timeout=20_000)
-    qtbot.waitUntil(lambda: any("played without its body" in line for line in told), timeout=20_000)
+    qtbot.waitUntil(lambda: heard[-1] is None or heard[-1].body is None)
+    qtbot.waitUntil(lambda: any("played without its body" in line for line in told))
     drop(patched, tmp_path / "knock.wav")
-    qtbot.waitUntil(lambda: heard[-1] is not None and heard[-1].body is not None, timeout=20_000)
+    qtbot.waitUntil(is_knock)
     assert patched.session.choices == chosen

@@ -13,6 +13,7 @@ from app.analysis.abx.choices import AbxChoices
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
+from app.instrument import events
 from app.session.choices import Choices
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window.controller import Controller
@@ -45,7 +46,7 @@ def heard(qtbot: QtBot, window: MainWindow, tmp_path: Path, numb_output: Open) -
     abx = AbxChoices(trials=2, folder=str(tmp_path / "records"))
     settings = Settings(choices=Choices(seconds=0.5, volume_db=-6), abx=abx)
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
-    qtbot.waitUntil(lambda: "error of this pluck" in window.error_label.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "error of this pluck" in window.error_label.text())
     return made
 
 
@@ -53,7 +54,7 @@ def open_test(qtbot: QtBot, controller: Controller) -> AbxDialog:
     qtbot.keyClick(controller.window, Qt.Key.Key_T, Qt.KeyboardModifier.ControlModifier)
     dialog = controller.window.findChild(AbxDialog)
     assert dialog is not None
-    qtbot.waitUntil(dialog._setup.start.isEnabled, timeout=5_000)
+    qtbot.waitUntil(dialog._setup.start.isEnabled)
     return dialog
 
 
@@ -65,14 +66,14 @@ def sounds(controller: Controller) -> bool:
 def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> None:
     window = heard.window
     heard.pluck()
-    qtbot.waitUntil(lambda: window.transport.meter._peak_db > -60, timeout=5_000)
+    qtbot.waitUntil(lambda: window.transport.meter._peak_db > -60)
     dialog = open_test(qtbot, heard)
     assert dialog.isModal()
     dialog._setup.start.click()
     before = heard.session.choices
     for key in (Qt.Key.Key_X, Qt.Key.Key_A, Qt.Key.Key_B, Qt.Key.Key_X):
         qtbot.keyClick(dialog._trial, key)
-        qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
+        qtbot.waitUntil(lambda: sounds(heard))
         heard._tick()
         assert window.transport.meter._peak_db == -60
         assert not window.transport.meter.limit_light
@@ -82,17 +83,17 @@ def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> 
 
 def test_the_sound_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:
     heard.pluck()
-    qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
+    qtbot.waitUntil(lambda: sounds(heard))
     dialog = open_test(qtbot, heard)
     assert not heard.performance.playing
-    qtbot.waitUntil(lambda: not sounds(heard), timeout=5_000)
+    qtbot.waitUntil(lambda: not sounds(heard))
     dialog._setup.audition_asked.emit("B")
-    qtbot.waitUntil(lambda: sounds(heard), timeout=5_000)
+    qtbot.waitUntil(lambda: sounds(heard))
     dialog._setup._trials.setValue(25)
     qtbot.keyClick(dialog, Qt.Key.Key_Escape)
-    qtbot.waitUntil(lambda: not sounds(heard), timeout=5_000)
+    qtbot.waitUntil(lambda: not sounds(heard))
     heard.pluck()
-    qtbot.waitUntil(lambda: heard.performance.position_s > 0.3, timeout=5_000)
+    qtbot.waitUntil(lambda: heard.performance.position_s > 0.3)
     heard.window.close()
     assert load_settings(tmp_path / "settings.json")[0].abx.trials == 25
 
@@ -100,7 +101,7 @@ def test_the_sound_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_pat
 def test_instruments_are_silent_meanwhile_and_the_test_keeps_its_pluck(qtbot: QtBot, heard: Controller) -> None:
     dialog = open_test(qtbot, heard)
     heard.instruments.perform({"position": 0.6, "amplitude_mm": 8.0}, True)  # a MIDI keyboard
-    qtbot.waitUntil(lambda: heard.session.choices.position == 0.6, timeout=5_000)
+    qtbot.waitUntil(lambda: heard.session.choices.position == 0.6)
     assert not heard.performance.playing
     assert not sounds(heard)
     first, model = dialog._stimuli, dialog._rendering.result()["model"]
@@ -108,6 +109,32 @@ def test_instruments_are_silent_meanwhile_and_the_test_keeps_its_pluck(qtbot: Qt
     dialog._ask_for_sound()  # as after a change of the device's rate
     assert (dialog._rendering.result(20)["model"] == model).all()
     dialog.abandon()
+
+
+def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
+    qtbot: QtBot, heard: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[object] = []
+    monkeypatch.setattr(heard.performance.live, "handle", taken.append)
+    dialog = open_test(qtbot, heard)
+    let_go = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
+    for event in (events.NoteOn(52, 90), *let_go):
+        heard._handle(event)
+    assert taken == let_go
+    dialog.abandon()
+
+
+def test_the_volume_of_a_test_stays_what_it_was_begun_with(qtbot: QtBot, heard: Controller) -> None:
+    """A fader that was taught to it moves what is heard afterwards."""
+    from engine.kernels import layout as at
+
+    heard.session.update(volume_db=-6.0)
+    dialog = open_test(qtbot, heard)
+    heard.instruments.perform({"volume_db": 12.0}, False)
+    qtbot.waitUntil(lambda: heard.session.choices.volume_db == 12.0)
+    assert heard.sound.mixer.memory[at.M_WANTED_VOLUME] == pytest.approx(10 ** (-6 / 20))
+    dialog.abandon()
+    qtbot.waitUntil(lambda: heard.sound.mixer.memory[at.M_WANTED_VOLUME] == pytest.approx(10 ** (12 / 20)))
 
 
 def test_closing_the_window_keeps_an_incomplete_record(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:

@@ -88,6 +88,19 @@ def test_tab_visits_everything_and_returns(controller: Controller) -> None:
     assert len(visited) == len(set(visited))
 
 
+def test_the_tab_key_itself_comes_round(qtbot: QtBot, controller: Controller) -> None:
+    """The chain of focus alone does not tell it: a view may send the focus back."""
+    window = controller.window
+    first = next(b for b in window.presets.findChildren(QAbstractButton) if b in stops(window))
+    first.setFocus()
+    qtbot.waitUntil(lambda: window.focusWidget() is first)
+    for _ in range(len(stops(window)) + 5):
+        qtbot.keyClick(window.focusWidget(), Qt.Key.Key_Tab)
+        if window.focusWidget() is first:
+            return
+    pytest.fail("it never came back")
+
+
 def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
     window = controller.window
     window.notices.tell("Something to dismiss.")

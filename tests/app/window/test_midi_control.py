@@ -155,7 +155,7 @@ def test_pitches_are_played_by_the_patch_with_bends_pedals_and_releases(
     backend.send("pitchwheel", pitch=-8192, channel=3)
     backend.send("control_change", control=64, value=127, channel=3)
     backend.send("note_off", note=60, velocity=0, channel=3)
-    with qtbot.waitSignal(midi.performed, timeout=5_000):
+    with qtbot.waitSignal(midi.performed):
         backend.send("control_change", control=74, value=0, channel=3)  # taught: it turns what it was taught
     assert came == [
         (event, False) for event in (NoteOn(60, 90, 3), Bend(-1.0, 3), Controller(64, 127, 3), NoteOff(60, 3))
@@ -217,7 +217,7 @@ def test_a_pedal_that_is_assigned_while_it_is_down_does_not_stay_down(
     backend.send("control_change", control=64, value=127, channel=1)
     assert came == [Controller(64, 127, 1)]
     heard._learn("listen")
-    with qtbot.waitSignal(heard.performed, timeout=5_000):
+    with qtbot.waitSignal(heard.performed):
         backend.send("control_change", control=64, value=127, channel=1)
     assert came[1:] == let_go([1])
 
@@ -229,7 +229,7 @@ def test_controllers_reach_the_windows_thread(
     midi._remember(midi.choices.learned("width", 74))
     threads = []
     midi.performed.connect(lambda changes: threads.append(threading.current_thread()))
-    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+    with qtbot.waitSignal(midi.performed) as performed:
         backend.send("control_change", control=74, value=0, channel=0)
     assert performed.args == [{"width": pytest.approx(0.02)}]
     assert threads == [threading.main_thread()]
@@ -248,11 +248,11 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     assert midi.choices.port == "Pads:Pads 24:0"
     qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
     assert "Move" in taught.text()
-    with qtbot.waitSignal(midi.performed, timeout=5_000):
+    with qtbot.waitSignal(midi.performed):
         backend.send("control_change", control=74, value=127, channel=0)
     assert midi.choices.controllers == {"width": 74}
     assert taught.text() == "Controller 74"
-    with qtbot.waitSignal(midi.performed, timeout=5_000) as performed:
+    with qtbot.waitSignal(midi.performed) as performed:
         backend.send("control_change", control=74, value=0, channel=0)
     assert performed.args == [{"width": pytest.approx(0.02)}]
     qtbot.mouseClick(forget, Qt.MouseButton.LeftButton)

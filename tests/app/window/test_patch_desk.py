@@ -28,7 +28,7 @@ def press(qtbot: QtBot, controller: Controller, key: Qt.Key) -> None:
 def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_A)
     assert played.performance.live.sounding().keys() == {48}
-    qtbot.waitUntil(lambda: played.session.choices.string is not None, timeout=5_000)
+    qtbot.waitUntil(lambda: played.session.choices.string is not None)
     assert played.session.choices.preset == "studio_any_string"
     wanted_hz = 440 * 2 ** ((48 - 69) / 12)
 
@@ -36,19 +36,19 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
         take = played.performance.take
         return take is not None and take.complete and abs(take.fundamental_hz / wanted_hz - 1) < 1e-3
 
-    qtbot.waitUntil(shown, timeout=20_000)
-    qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1, timeout=5_000)
-    qtbot.waitUntil(lambda: "error of this pluck" in played.window.error_label.text(), timeout=20_000)
+    qtbot.waitUntil(shown)
+    qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1)
+    qtbot.waitUntil(lambda: "error of this pluck" in played.window.error_label.text())
     (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
     assert not struck.damped
     qtbot.keyRelease(played.window, Qt.Key.Key_A)
-    qtbot.waitUntil(lambda: struck.damped, timeout=5_000)
+    qtbot.waitUntil(lambda: struck.damped)
 
 
 def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, played: Controller) -> None:
     played.window.instrument.pressed.emit(52, 100)
     (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
-    qtbot.waitUntil(lambda: played.session.choices.string is not None, timeout=5_000)
+    qtbot.waitUntil(lambda: played.session.choices.string is not None)
     note = played.performance.strike(played.session.choices)
     assert note is not None
     assert note.stroke.gain == struck.gain != 1
@@ -83,7 +83,7 @@ def test_keys_on_the_screen_and_of_the_computer_sound_together_on_a_guitars_patc
 ) -> None:
     played.patches.choose("oud")
     live = played.performance.live
-    qtbot.waitUntil(lambda: live._player is not None and live._player.patch.mode == "guitar", timeout=5_000)
+    qtbot.waitUntil(lambda: live._player is not None and live._player.patch.mode == "guitar")
     for key in (60, 64):  # on one string
         played.window.instrument.pressed.emit(key, 100)
     press(qtbot, played, Qt.Key.Key_X)
@@ -97,7 +97,7 @@ def test_a_files_drums_are_left_out_and_told(qtbot: QtBot, played: Controller, t
     informed: list[str] = []
     played.patches.informed.connect(informed.append)
     played.take_file(song)
-    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding(), timeout=5_000)
+    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding())
     assert 40 not in played.performance.live.sounding()
     assert informed == ["song.mid is played without its drums (channel 10)."]
 
@@ -141,19 +141,65 @@ def test_a_patch_is_saved_renamed_and_deleted(played: Controller, monkeypatch: p
     played.patches.change("knobs.decay", 4.0)
     played.patches.save()  # the user's own, without a question
     assert read_patch(file).knobs.decay == 4.0
+    played.patches.browser.favourite_asked.emit("mine")
     monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Yours", True))
     played.patches.rename()
     assert not file.exists()
     assert read_patch(own_patches() / "yours.json").name == "Yours"
+    bar = played.window.instrument.bar
+    assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (False, True), "it is saved, and one's own"
+    assert "yours" in played.patches.favourites and "mine" not in played.patches.favourites
     played.patches.delete("yours")
     assert not list(own_patches().glob("*.json"))
+    assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
+    assert "yours" not in played.patches.favourites
+
+
+def test_an_impossible_name_is_explained_and_asked_for_again(
+    played: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, str]] = []
+    answers = iter([("AC/DC", True), ("My Bass.", True), ("Classical guitar", True), ("Mine", True)])
+
+    def ask(parent: object, title: str, label: str, text: str) -> tuple[str, bool]:
+        asked.append((label, text))
+        return next(answers)
+
+    monkeypatch.setattr(QInputDialog, "getText", ask)
+    played.patches.save()
+    assert read_patch(own_patches() / "mine.json").name == "Mine"
+    assert [text for _, text in asked[1:]] == ["AC/DC", "My Bass.", "Classical guitar"], "what was typed stays"
+    assert "must not begin or end with a full stop, or hold one of" in asked[1][0]
+    assert "a shipped patch has this name" in asked[3][0]
+
+
+def test_a_copied_patch_is_saved_and_reverted_by_itself(played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(QInputDialog, "getText", lambda *args, **words: ("Mine", True))
+    played.patches.save()
+    first, copy = own_patches() / "mine.json", own_patches() / "mine (copy).json"
+    shutil.copy(first, copy)
+    played.patches.reload()
+    before = first.read_bytes(), copy.read_bytes()
+    played.patches.choose("mine")
+    played.patches.change("knobs.decay", 3.0)
+    played.patches.save()
+    played.patches.revert()
+    assert played.session.choices.patch is not None
+    assert played.session.choices.patch.knobs.decay == 3.0
+    assert (first.read_bytes() == before[0], copy.read_bytes() == before[1]) == (False, True)
+    names = []
+    for _ in range(len(played.patches._entries)):
+        played.patches.step(1)
+        assert played.patches.entry is not None
+        names.append(played.patches.entry.name)
+    assert set(names) == {entry.name for entry in played.patches._entries}
 
 
 def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
     song = tmp_path / "song.mid"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]))
     played.take_file(song)
-    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding(), timeout=5_000)
+    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding())
     played.play_or_stop()
     assert not played.patches.playing
     harp = tmp_path / "harp.json"
@@ -194,7 +240,7 @@ def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, pla
     bar = played.window.instrument.bar
 
     def told(beyond: bool) -> None:
-        qtbot.waitUntil(lambda: ("inharmonicity" in bar.note.toolTip()) == beyond, timeout=5_000)
+        qtbot.waitUntil(lambda: ("inharmonicity" in bar.note.toolTip()) == beyond)
 
     played.patches.change("knobs.stiffness", 10.0)
     played.patches.change("knobs.gauge", 3.0)
@@ -334,7 +380,7 @@ def test_knobs_tell_the_string_that_was_struck_last_and_take_figures(qtbot: QtBo
     middle = sum(patch.range) // 2
     assert knobs.facts.accessibleDescription().startswith(f"key {note_name(middle)}, ")
     played.window.instrument.pressed.emit(50, 100)
-    qtbot.waitUntil(lambda: knobs.facts.accessibleDescription().startswith("key D3, pitch 146.8 Hz"), timeout=5_000)
+    qtbot.waitUntil(lambda: knobs.facts.accessibleDescription().startswith("key D3, pitch 146.8 Hz"))
     long_mm = float(length.accessibleDescription().split()[0])
     knobs.figure_asked.emit("knobs.tension", 200.0)
     assert tension.accessibleDescription().startswith("200 N (× ")

@@ -26,7 +26,7 @@ CONTROL = Qt.KeyboardModifier.ControlModifier
 @pytest.fixture
 def browser(qtbot: QtBot, controller: Controller) -> PresetBrowser:
     """Open, with the keyboard in its search."""
-    qtbot.waitUntil(controller.window.isActiveWindow, timeout=5_000)
+    qtbot.waitUntil(controller.window.isActiveWindow)
     qtbot.keyClick(controller.window, KEY.Key_P, CONTROL)
     found = controller.presets.browser
     assert found.isVisible()
@@ -57,7 +57,7 @@ def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller
     qtbot.keyClick(browser.search, KEY.Key_Space)
     assert browser.isVisible()
     assert browser.search.text() == ""
-    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing)
 
 
 def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(

@@ -1,5 +1,6 @@
 """Settings survive a round trip; a broken file is set aside."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
+from app.patches.library import SHIPPED as PATCHES
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.look import Look
@@ -77,6 +79,22 @@ def test_a_wrong_field_does_not_lose_the_others(tmp_path: Path) -> None:
     )
     assert "choices.position" in notice
     assert "settings.broken.json" in notice
+
+
+def test_a_wrong_string_loses_no_more_than_itself(tmp_path: Path) -> None:
+    """What is dropped for one fault is not there for the next, and may be necessary where it was."""
+    path = tmp_path / "settings.json"
+    patch = json.loads((PATCHES / "classical_guitar.json").read_text())
+    kept = {"volume_db": -12.0, "patch": patch, "string": {"length_m": 0.65}}
+    path.write_text(json.dumps({"choices": kept, "favourites": ["mine"]}))
+    settings, notice = load_settings(path)
+    assert (settings.choices.volume_db, settings.favourites, settings.choices.string) == (-12.0, ("mine",), None)
+    assert settings.choices.patch is not None
+    assert "choices.string" in notice
+    patch["strings"] |= {"kind": "set", "extra": 1}
+    path.write_text(json.dumps({"choices": kept, "favourites": ["mine"]}))
+    settings, _ = load_settings(path)
+    assert (settings.choices.volume_db, settings.favourites, settings.choices.patch) == (-12.0, ("mine",), None)
 
 
 def test_a_file_of_the_first_version_still_loads(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def test_the_menu_names_both_steps_and_takes_them(controller: Controller) -> Non
 
 
 def test_the_key_says_what_it_has_done(qtbot: QtBot, controller: Controller) -> None:
-    qtbot.waitUntil(controller.window.isActiveWindow, timeout=5_000)
+    qtbot.waitUntil(controller.window.isActiveWindow)
     controller.session.update(width=0.2)
     for modifiers, told in (
         (CONTROL, "Undone: pluck width"),

@@ -10,10 +10,13 @@ import pytest
 import soundfile
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QDoubleSpinBox, QListWidget, QTabBar
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
 from app.presets.library import list_presets
 from app.session.choices import Choices
 from app.views.dialogs.export_dialog import ExportDialog
@@ -47,7 +50,7 @@ def dialog(made) -> ExportDialog:
 
 def run(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
     dialog.save.click()
-    qtbot.waitUntil(lambda: words in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: words in dialog.state.text())
 
 
 def wavs(folder: Path) -> list[str]:
@@ -119,7 +122,7 @@ def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Pat
     dialog.save.click()
     assert dialog.close_button.text() == "Cancel"
     dialog.close_button.click()
-    qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text(), timeout=30_000)
+    qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text())
     assert wavs(tmp_path) == []
     assert list(tmp_path.glob(".*.unfinished")) == []
 
@@ -190,6 +193,24 @@ def test_a_batch_says_what_all_its_plucks_have_and_shows_what_is_checked(qtbot: 
     assert dialog.batch.presets.currentItem().checkState() == Qt.CheckState.Checked
 
 
+def test_a_name_without_its_suffix_gets_it(made) -> None:
+    dialog = made({"source": "files"})
+    dialog.sound.path.clear()
+    QTest.keyClicks(dialog.sound.path, "guitar v1.2")
+    assert [path.name for path in dialog.sound.paths().values()] == ["guitar v1.2_model.wav", "guitar v1.2_truth.wav"]
+    dialog.sound.source.setCurrentIndex(0)
+    assert [path.name for path in dialog.sound.paths().values()] == ["guitar v1.2.wav"]
+
+
+def test_what_the_patch_adds_is_said_not_to_be_in_the_files(made) -> None:
+    guitar = read_patch(PATCHES / "classical_guitar.json")
+    dialog = made({}, {"patch": guitar})
+    words = "The string alone, without the body, room and level that Classical guitar gives it"
+    assert words in dialog.sound.what.text()
+    assert words in dialog.batch.what.text()
+    assert "alone" not in made({}).sound.what.text()
+
+
 def test_two_files_are_both_named(made) -> None:
     dialog = made({"source": "files"})
     first, second = (path.name for path in dialog.sound.paths().values())
@@ -204,9 +225,9 @@ def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_p
     dialog = made({"seconds": 2, "batch": {"positions": positions}})
     dialog.tabs.setCurrentIndex(1)
     dialog.save.click()
-    qtbot.waitUntil(lambda: len(wavs(tmp_path / "strings")) > 1, timeout=20_000)
+    qtbot.waitUntil(lambda: len(wavs(tmp_path / "strings")) > 1)
     dialog.close_button.click()
-    qtbot.waitUntil(lambda: "Cancelled; finished files are kept" in dialog.state.text(), timeout=30_000)
+    qtbot.waitUntil(lambda: "Cancelled; finished files are kept" in dialog.state.text())
     assert 1 < len(wavs(tmp_path / "strings")) < 60
     assert list((tmp_path / "strings").glob(".*.unfinished")) == []
 

@@ -98,7 +98,7 @@ def settle(qtbot: QtBot, dialog: SampledDialog) -> None:
 
 def run(qtbot: QtBot, dialog: SampledDialog, words: str) -> None:
     dialog.save.click()
-    qtbot.waitUntil(lambda: words in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: words in dialog.state.text())
 
 
 def test_an_sfz_is_written_as_it_was_told(
@@ -190,13 +190,13 @@ def test_progress_is_shown_and_the_choices_wait(
     dialog.save.click()
     assert not dialog.form.isEnabled()
     assert not dialog.save.isEnabled()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3, timeout=20_000)
-    qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500, timeout=20_000)
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
+    qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
     assert "key 61, velocity 127, about " in dialog.state.text()
     assert " s left. You can play on meanwhile." in dialog.state.text()
     notes.last = 100
     notes.gate.set()
-    qtbot.waitUntil(lambda: "Saved" in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert dialog.form.isEnabled()
     assert dialog.bar.isHidden()
 
@@ -206,14 +206,14 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     notes.last = 3
     dialog = made(form=form)
     dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3, timeout=20_000)
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     assert dialog.close_button.text() == "Cancel"
     dialog.close()  # as its cross does: it stays, to tell what was kept
     assert dialog.isVisible()
     notes.last = 100
     notes.gate.set()
     told = f"of {MADE} samples are kept; export again to go on from there"
-    qtbot.waitUntil(lambda: told in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: told in dialog.state.text())
     kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
     assert kept == len(notes.rendered) < MADE
     assert not dialog.form.out.exists()
@@ -231,7 +231,7 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     notes.last = 3
     dialog = made()
     dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3, timeout=20_000)
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     dialog.close_button.click()
     notes.gate.set()
     notes.last = 100
@@ -239,7 +239,7 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     assert job is not None
     job.wait()  # what it tells has not arrived
     (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
-    qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text())
     assert dialog.state.objectName() == "warning"
     assert dialog.form.isEnabled()
     assert dialog.close_button.text() == "Close"
@@ -292,7 +292,7 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
     dialog.save.click()
     dialog.close_button.click()
     loaded.set()
-    qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text())
     assert list(folder.iterdir()) == [] and notes.rendered == []
 
 
@@ -397,14 +397,14 @@ def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
     notes.last = 1
     dialog = made()
     dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 1, timeout=20_000)
+    qtbot.waitUntil(lambda: len(notes.rendered) == 1)
     dialog.show_patch(patch.with_value("knobs.decay", 3.0), preset)
     notes.last = 100
     notes.gate.set()
-    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text())
     assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}
     run(qtbot, dialog, "Loading")
-    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text(), timeout=20_000)
+    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text())
     assert notes.rendered[-1][0].knobs.decay == 3.0
 
 

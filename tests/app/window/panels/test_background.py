@@ -60,7 +60,7 @@ def test_the_latest_job_alone_is_heard(qtbot: QtBot, background: Background) -> 
     assert under_way.wait(10)
     background.start(lambda job: "skipped")
     background.start(lambda job: "last")
-    qtbot.waitUntil(lambda: heard == ["last"], timeout=10_000)
+    qtbot.waitUntil(lambda: heard == ["last"])
     assert gave_up.is_set()
 
 
@@ -78,7 +78,7 @@ def test_what_was_said_before_a_cancel_does_not_arrive(qtbot: QtBot, background:
     assert said.wait(10)
     background.cancel()  # the signals wait in the window's queue
     background.start(lambda job: "another")
-    qtbot.waitUntil(lambda: heard == ["another"], timeout=10_000)
+    qtbot.waitUntil(lambda: heard == ["another"])
 
 
 def test_a_job_rests_while_a_pluck_is_rendered(qtbot: QtBot, background: Background) -> None:
@@ -110,7 +110,7 @@ def test_a_take_that_no_longer_grows_is_not_waited_for(qtbot: QtBot, background:
         ready_frames = 100
 
     background.give_way_to(Abandoned())  # type: ignore[arg-type]
-    with qtbot.waitSignal(background.finished, timeout=10_000):
+    with qtbot.waitSignal(background.finished):
         background.start(lambda job: job.report(0.5))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +31,13 @@ def is_computed(shown: Any, names: set[str]) -> bool:
 
 
 def test_presets_of_the_same_string_are_compared(qtbot: QtBot, controller: Controller, shown: Any) -> None:
-    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
     assert figures(shown)["first"][1] == figures(shown)["second"][1]
     assert [row.bold for row in shown.table.rows if row.key == "first"] == [True]
     before = figures(shown)["first"][1]
     controller.session.update(position=0.6)
     qtbot.waitUntil(lambda: all(row.grey for row in shown.table.rows))
-    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
     assert figures(shown)["first"][1] != before
 
 
@@ -44,13 +45,19 @@ def test_the_preset_on_screen_is_computed_first_and_what_is_in_a_slot_next(
     qtbot: QtBot, controller: Controller, shown: Any
 ) -> None:
     panel = next(panel for panel in controller.panels if panel.key == "compare")
-    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
     order: list[str] = []
     panel._background.progressed.connect(  # type: ignore[attr-defined]
         lambda _, row: order.append(row.name) if row is not None else None
     )
     controller.session.update(preset="second", position=0.6)
-    qtbot.waitUntil(lambda: order == ["second", "first"], timeout=20_000)
+    qtbot.waitUntil(lambda: order == ["second", "first"])
+
+
+def test_a_preset_that_comes_is_in_the_menu(controller: Controller, shown: Any, preset_folder: Path) -> None:
+    shutil.copy(preset_folder / "first.safetensors", preset_folder / "third.safetensors")
+    controller.library.refresh()
+    assert set(shown._actions) == {"first", "second", "third"}
 
 
 def test_a_row_tells_its_whole_name_and_its_file(shown: Any) -> None:
@@ -59,7 +66,7 @@ def test_a_row_tells_its_whole_name_and_its_file(shown: Any) -> None:
 
 
 def test_figures_of_an_earlier_pluck_are_told(qtbot: QtBot, controller: Controller, shown: Any) -> None:
-    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
     assert shown._words.text() == "2 presets on this pluck, 0.5 s"
     controller.session.update(position=0.6)
     qtbot.waitUntil(lambda: shown._words.text() == "0 of 2 presets on this pluck, 0.5 s; grey: an earlier pluck")
@@ -93,15 +100,15 @@ def test_a_bad_preset_is_a_row_with_the_reason(
     damaged.write_bytes(b"damaged")
     damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
     controller.session.update(amplitude_mm=controller.session.choices.amplitude_mm + 0.5)  # or have read it
-    qtbot.waitUntil(lambda: "second.safetensors" in figures(shown)["second"][-1], timeout=20_000)
+    qtbot.waitUntil(lambda: "second.safetensors" in figures(shown)["second"][-1])
     assert is_computed(shown, {"first"})
 
 
 def test_it_is_stopped_and_goes_on(qtbot: QtBot, controller: Controller, shown: Any) -> None:
     panel = next(panel for panel in controller.panels if panel.key == "compare")
-    qtbot.waitUntil(lambda: panel._background.busy, timeout=20_000)  # type: ignore[attr-defined]
+    qtbot.waitUntil(lambda: panel._background.busy)  # type: ignore[attr-defined]
     qtbot.mouseClick(shown._stop, Qt.MouseButton.LeftButton)
     assert shown.progress.share is None
     assert not panel._background.busy  # type: ignore[attr-defined]
     qtbot.mouseClick(shown._stop, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}), timeout=20_000)
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))

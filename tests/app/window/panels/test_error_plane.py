@@ -36,7 +36,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Pluck]:
 def shown(qtbot: QtBot, asked: list[Pluck], controller: Controller) -> Any:
     controller.session.update(left_view="error_plane")
     view = next(panel.view for panel in controller.panels if panel.key == "error_plane")
-    qtbot.waitUntil(lambda: view._picture is not None and view._picture.spacing == 1, timeout=20_000)
+    qtbot.waitUntil(lambda: view._picture is not None and view._picture.spacing == 1)
     return view
 
 
@@ -44,7 +44,7 @@ def test_a_click_plucks_there(qtbot: QtBot, controller: Controller, shown: Any) 
     plane = shown.map
     at = plane.mapFromScene(plane.getPlotItem().vb.mapViewToScene(QPointF(0.6, math.log10(8))))
     qtbot.mouseMove(plane.viewport(), at)
-    qtbot.waitUntil(lambda: "Pluck at 0.60" in shown.words, timeout=5_000)
+    qtbot.waitUntil(lambda: "Pluck at 0.60" in shown.words)
     assert "error as trained about 5 %" in shown.words
     qtbot.mouseClick(plane.viewport(), Qt.MouseButton.LeftButton, pos=at)
     choices = controller.session.choices
@@ -52,7 +52,7 @@ def test_a_click_plucks_there(qtbot: QtBot, controller: Controller, shown: Any) 
     assert choices.amplitude_mm == pytest.approx(8, rel=0.05)
     qtbot.waitUntil(lambda: shown.map._present == (choices.position, choices.amplitude_mm))
     assert choices.position == round(choices.position, 3)  # no more digits than can be read
-    qtbot.waitUntil(lambda: controller.performance.playing, timeout=20_000)
+    qtbot.waitUntil(lambda: controller.performance.playing)
 
 
 def test_arrows_move_a_cursor_and_enter_plucks(qtbot: QtBot, controller: Controller, shown: Any) -> None:
@@ -94,12 +94,12 @@ def test_another_shape_is_another_map_and_returning_computes_nothing(
     assert count == len(POSITIONS) * len(AMPLITUDES_MM)
     controller.session.update(shape="triangular")
     assert shown._picture is None
-    qtbot.waitUntil(lambda: len(asked) == 2 * count and shown.progress.share is None, timeout=20_000)
+    qtbot.waitUntil(lambda: len(asked) == 2 * count and shown.progress.share is None)
     shown.map._point_at((0.5, 5.0))
     assert "runs away" in shown.words
     controller.session.update(shape="gaussian")
-    qtbot.waitUntil(lambda: shown._picture is not None and shown.progress.share is None, timeout=20_000)
+    qtbot.waitUntil(lambda: shown._picture is not None and shown.progress.share is None)
     assert len(asked) == 2 * count
     controller.session.update(preset="second")  # the same file under another name
-    qtbot.waitUntil(lambda: shown._picture is not None and shown.progress.share is None, timeout=20_000)
+    qtbot.waitUntil(lambda: shown._picture is not None and shown.progress.share is None)
     assert len(asked) == 2 * count

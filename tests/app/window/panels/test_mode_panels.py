@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.views import theme
+from app.views.theme import apply_theme
 from app.window.controller import Controller
 
 LEFT = Qt.MouseButton.LeftButton
@@ -24,7 +26,7 @@ def view(controller: Controller, key: str) -> Any:
 @pytest.fixture
 def eigenvalues(controller: Controller, qtbot: QtBot) -> Any:
     shown = view(controller, "eigenvalues")
-    qtbot.waitUntil(lambda: len(shown.plane._places) > 0, timeout=20_000)
+    qtbot.waitUntil(lambda: len(shown.plane._places) > 0)
     shown.grab()  # axes take their final room when they are first painted
     return shown
 
@@ -32,7 +34,7 @@ def eigenvalues(controller: Controller, qtbot: QtBot) -> Any:
 @pytest.fixture
 def partials(controller: Controller, qtbot: QtBot) -> Any:
     shown = view(controller, "partials")
-    qtbot.waitUntil(lambda: len(shown.table.rows) == 10, timeout=20_000)
+    qtbot.waitUntil(lambda: len(shown.table.rows) == 10)
     return shown
 
 
@@ -48,13 +50,28 @@ def test_a_point_tells_its_mode_and_a_click_lets_it_be_heard_alone(
     plane, session = eigenvalues.plane, controller.session
     at = plane.mapFromScene(plane.getPlotItem().vb.mapViewToScene(plane_point(plane, 2)))
     qtbot.mouseMove(plane.viewport(), at)
-    qtbot.waitUntil(lambda: "nearest to mode 3" in eigenvalues.words, timeout=5_000)
+    qtbot.waitUntil(lambda: "nearest to mode 3" in eigenvalues.words)
     assert "cents" in eigenvalues.words
     assert "T60" in eigenvalues.words
     qtbot.mouseClick(plane.viewport(), LEFT, pos=at)
     assert session.choices.solo == 3
     qtbot.mouseClick(plane.viewport(), LEFT, pos=at)
     assert session.choices.solo == 0
+
+
+def test_eigenvalues_take_the_colours_of_another_theme(
+    controller: Controller, eigenvalues: Any, qapp: QApplication
+) -> None:
+    def colours() -> tuple[str, str]:
+        plane = eigenvalues.plane
+        return plane._learned.points()[0].pen().color().name(), plane._string.points()[0].brush().color().name()
+
+    try:
+        apply_theme(qapp, "light")
+        assert colours() == (theme.MODEL.lower(), theme.TRUTH.lower())
+    finally:
+        apply_theme(qapp, "dark")
+    assert colours() == (theme.MODEL.lower(), theme.TRUTH.lower())
 
 
 def test_eigenvalues_by_keyboard(qtbot: QtBot, controller: Controller, eigenvalues: Any) -> None:
@@ -90,7 +107,7 @@ def test_partials_of_the_take_and_their_windows(qtbot: QtBot, controller: Contro
     assert past != trained
     assert [row.key for row in partials.table.rows if row.grey]  # above half the rate, at least
     controller.session.update(position=0.5)
-    qtbot.waitUntil(lambda: "60 dB" in {r.key: r.values for r in partials.table.rows}[2][-1], timeout=20_000)
+    qtbot.waitUntil(lambda: "60 dB" in {r.key: r.values for r in partials.table.rows}[2][-1])
 
 
 def test_a_row_lets_its_mode_be_heard_alone(qtbot: QtBot, controller: Controller, partials: Any) -> None:
@@ -113,12 +130,12 @@ def test_partials_of_the_pluck_before_are_grey(qtbot: QtBot, controller: Control
 
     assert len(colours()) > 1
     controller.session.update(position=0.6)
-    qtbot.waitUntil(lambda: colours() == {theme.FAINT.lower()}, timeout=20_000)
-    qtbot.waitUntil(lambda: len(colours()) > 1, timeout=20_000)
+    qtbot.waitUntil(lambda: colours() == {theme.FAINT.lower()})
+    qtbot.waitUntil(lambda: len(colours()) > 1)
 
 
 def test_the_words_of_a_measuring_go(qtbot: QtBot, controller: Controller, partials: Any) -> None:
     assert partials.progress.share is None
     controller.session.update(position=0.45)
-    qtbot.waitUntil(lambda: partials._words.text() != "", timeout=20_000)
-    qtbot.waitUntil(lambda: partials._words.text() == "", timeout=20_000)
+    qtbot.waitUntil(lambda: partials._words.text() != "")
+    qtbot.waitUntil(lambda: partials._words.text() == "")

@@ -89,7 +89,7 @@ def watch(qtbot: QtBot, panel: Panel, take: Take, until: Callable[[], bool]) -> 
         panel.show_moment(Moment(take, 0.5, False, 0.016))
         return until()
 
-    qtbot.waitUntil(tick, timeout=10_000)
+    qtbot.waitUntil(tick)
 
 
 def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Take) -> None:
@@ -473,17 +473,12 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
     for left, right in (("spectrogram", "space_time"), ("spectrogram", "error_time")):
         session.update(left_view=left, right_view=right)
         plots = [panels[key].view.plot for key in (left, right)]
-        qtbot.waitUntil(
-            lambda: controller.performance.take is not None, timeout=20_000
-        )  # else there is nothing to seek in
+        qtbot.waitUntil(lambda: controller.performance.take is not None)  # else there is nothing to seek in
         with qtbot.waitSignal(panels[right].seek_asked):
             plots[1].seek_asked.emit(0.3)
-        qtbot.waitUntil(
-            lambda plots=plots: all(plot.line_at == pytest.approx(0.3, abs=1e-3) for plot in plots),
-            timeout=20_000,
-        )
+        qtbot.waitUntil(lambda plots=plots: all(plot.line_at == pytest.approx(0.3, abs=1e-3) for plot in plots))
         plots[1].seek_asked.emit(0.1)
-        qtbot.waitUntil(lambda: controller.performance.position_s < 0.2, timeout=5_000)
+        qtbot.waitUntil(lambda: controller.performance.position_s < 0.2)
 
 
 @pytest.mark.parametrize(
@@ -505,7 +500,7 @@ def test_a_view_that_is_not_looked_at_lets_the_last_take_go(
     del last
     panel.take_started(take)
     gc.collect()
-    qtbot.waitUntil(lambda: gone() is None, timeout=10_000)
+    qtbot.waitUntil(lambda: gone() is None)
 
 
 def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None:
