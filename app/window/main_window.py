@@ -17,6 +17,8 @@ from PySide6.QtGui import (
     QShowEvent,
 )
 from PySide6.QtWidgets import (
+    QAbstractButton,
+    QComboBox,
     QGraphicsView,
     QHBoxLayout,
     QMainWindow,
@@ -59,6 +61,7 @@ KEYS = (  # (key, name of the signal, what it does)
     ("F8", "notices_asked", "notices since the start"),
     ("Ctrl+M", "midi_asked", "MIDI"),
     ("Ctrl+K", "instrument_asked", "show or hide the instrument: keys and patch"),
+    ("F10", "menu_asked", "menu"),
     ("F1", "help_asked", "help"),
     ("Ctrl+Q", "quit_asked", "quit"),
 )
@@ -67,7 +70,8 @@ FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
 WIDE, HIGH = 1100, 560  # pixels: a narrower window hides brand and instrument button; a lower one the patch bar
 ROOMY = 1240  # pixels: in a narrower window the controls are compact
-ALL_HIGH, KNOBS_HIGH = 640, 170  # pixels: least height for views beside the instrument; more with its knobs
+ALL_HIGH, KNOBS_HIGH = 660, 170  # pixels: least height for views beside the instrument; more with its knobs
+NOTICE_HIGH = 52  # pixels: and more with a notice
 FACTS_HEIGHT = 20
 BRIEFLY_MS = 1_800  # a text over the window
 TITLE_BAR = 40  # pixels, at most; its height is known only once the window is shown
@@ -107,6 +111,7 @@ class MainWindow(QMainWindow):
     instrument_asked = Signal()
     browse_asked = Signal()
     file_dropped = Signal(str)  # a path
+    menu_asked = Signal()
     help_asked = Signal()
     about_asked = Signal()
     quit_asked = Signal()
@@ -119,6 +124,7 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(760, 480)
         self.resize(1280, 800)
         self._painted = False
+        self._tabbed_to: QWidget | None = None  # what got the keyboard by the Tab key
         self.may_close: Callable[[], bool] = lambda: True  # asked before it is closed
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
@@ -145,6 +151,7 @@ class MainWindow(QMainWindow):
         self._instrument_button.toggled.connect(self.show_instrument)
         self.instrument_asked.connect(self._instrument_button.toggle)
         self.instrument.surface_changed.connect(self._share_height)
+        self.notices.came_or_went.connect(self._share_height)
         self.menu = AppMenu(self)
         self._menu_button = menu_button(self.menu)
         self._lay_out()
@@ -152,8 +159,9 @@ class MainWindow(QMainWindow):
         for key, signal, _ in KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setAutoRepeat(False)
-            shortcut.activated.connect(getattr(self, signal))
+            shortcut.activated.connect(self._press_or_pluck if key == "Return" else getattr(self, signal))
         self.notices_asked.connect(self.notices.show_all)
+        self.menu_asked.connect(self._menu_button.showMenu)
         for action, signal in self.menu.asked.items():
             action.triggered.connect(getattr(self, signal))
         self.quit_asked.connect(self.close)
@@ -234,6 +242,21 @@ class MainWindow(QMainWindow):
         for before, after in pairwise(chain):
             QWidget.setTabOrder(before, after)
 
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        moved = super().focusNextPrevChild(forward)
+        self._tabbed_to = self.focusWidget()
+        return moved
+
+    def _press_or_pluck(self) -> None:
+        """Presses the button, or opens the box, that the Tab key went to; after a click elsewhere, Enter plucks."""
+        aimed = self.focusWidget()
+        if aimed is self._tabbed_to and isinstance(aimed, QAbstractButton):
+            aimed.animateClick()
+        elif aimed is self._tabbed_to and isinstance(aimed, QComboBox):
+            aimed.showPopup()
+        else:
+            self.pluck_asked.emit()
+
     def _set_alive(self, alive: bool) -> None:
         for part in (self.presets, self.transport, self._test_button, self._audio_button, self._menu_button):
             part.setEnabled(alive)
@@ -255,7 +278,10 @@ class MainWindow(QMainWindow):
     def _share_height(self) -> None:
         """A low window hides the views beside the instrument, then parts of the instrument."""
         height = self.height()
-        needed = ALL_HIGH + (KNOBS_HIGH if self.instrument.unfolded else 0) if self.shows_instrument else 0
+        needed = 0
+        if self.shows_instrument:
+            told, unfolded = not self.notices.isHidden(), self.instrument.unfolded
+            needed = ALL_HIGH + NOTICE_HIGH * told + KNOBS_HIGH * unfolded
         self.instrument.set_low(height < ALL_HIGH, height < HIGH)
         self._decks.setVisible(self._alive and height >= needed)
 

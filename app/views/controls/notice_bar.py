@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import datetime
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QHideEvent, QPainter, QPainterPath, QPaintEvent, QPen, QShowEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 
 from app.views import theme
@@ -20,6 +20,8 @@ MOST_KEPT = 50
 
 class NoticeBar(QFrame):
     """Hidden while there is no notice. A notice that is repeated raises its count instead of being listed twice."""
+
+    came_or_went = Signal()  # it takes height, or gives it back
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -74,6 +76,14 @@ class NoticeBar(QFrame):
         self._list.show()
         self._list.raise_()
         self.bell.set_unseen(0)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.came_or_went.emit()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self.came_or_went.emit()
 
     def _take(self, notice: Notice) -> None:
         earlier = next((old for old in self._notices if old.message == notice.message), None)

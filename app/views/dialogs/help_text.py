@@ -70,6 +70,7 @@ GESTURES = (
     ("Drag the green marker", "move the listening point; double-click resets it"),
     ("Arrow keys on the string", "move the pluck; with Shift the listening point"),
     ("Drag, wheel or arrow keys on a knob", "change it; with Shift in fine steps"),
+    ("Tab, then Enter", "press the button, or open the list, that Tab went to; else Enter plucks"),
     ("Digits on a knob", "type a value, then Enter"),
     ("Delete or double-click on a knob", "reset to the default"),
     ("Click in the waveform", "move the playhead; the wheel zooms, double-click shows all"),

@@ -17,7 +17,8 @@ LINE_HEIGHT = 15
 HATCHING = 70  # alpha, 0 … 255
 LEGEND_Y = 17.5  # the middle of the line above the string
 LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
-SCALE = (-1, -0.5, 0, 0.5, 1)  # shares of the span
+SCALES = ((-1, -0.5, 0, 0.5, 1), (-1, 0, 1), (0,))  # shares of the span, for less and less height
+SCALE_LINE = 13  # pixels between two figures of the scale, at least
 
 
 @dataclass(frozen=True)
@@ -54,17 +55,22 @@ def paint_grid(painter: QPainter, axes: StringAxes) -> None:
     painter.drawLines(_grid(axes))
 
 
+def scale(axes: StringAxes) -> tuple[float, ...]:
+    """The displacements that have a line and a figure, as shares of the span: as many as the height has room for."""
+    return next(marks for marks in SCALES if 2 * axes.half_height >= SCALE_LINE * (len(marks) - 1))
+
+
 @lru_cache(maxsize=2)
 def _grid(axes: StringAxes) -> list[QLineF]:
     xs = [round(axes.x(tenth / 10)) + 0.5 for tenth in range(11)]
-    ys = [round(axes.middle - share * axes.half_height) + 0.5 for share in SCALE]
+    ys = [round(axes.middle - share * axes.half_height) + 0.5 for share in scale(axes)]
     return [QLineF(x, axes.top, x, axes.bottom) for x in xs] + [QLineF(axes.x(0), y, axes.x(1), y) for y in ys]
 
 
 def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
     painter.setFont(theme.small_font(10))
     painter.setPen(QColor(theme.FAINT))
-    for share in SCALE:
+    for share in scale(axes):
         y = axes.middle - share * axes.half_height
         painter.drawText(
             QRectF(0, y - 8, MARGIN_X - 8, 16),
@@ -112,7 +118,7 @@ def _paint_untrained_positions(
         for row, text in enumerate(lines):
             painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
             line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
-            if painter.fontMetrics().horizontalAdvance(text) > line.width():
+            if painter.fontMetrics().horizontalAdvance(text) > line.width() or line.height() < LINE_HEIGHT:
                 continue  # the hatching says it
             painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
 

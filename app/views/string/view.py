@@ -37,6 +37,7 @@ from app.views.string.ink import (
     paint_ends,
     paint_envelopes,
     paint_handle,
+    paint_listening_labels,
     paint_listening_line,
     paint_listening_point,
     paint_motion,
@@ -79,7 +80,7 @@ class StringView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setMinimumSize(480, 96)
+        self.setMinimumSize(480, 112)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
@@ -359,12 +360,15 @@ class StringView(QWidget):
         else:
             paint_motion(painter, axes, self._frame, self._heard)
         paint_ends(painter, axes)
-        labels = {"left": "listen"} if len(self._listening) == 1 else {"left": "left", "right": "right"}
-        for side, label in labels.items():
+        below = event.rect().bottom() > axes.bottom  # what lies there is painted anew
+        for side, position in self._listening.items():
             grabbed = side in (self._drag, self._hovered)
-            paint_listening_line(painter, axes, self._listening[side], grabbed)
-            if event.rect().bottom() > axes.bottom:
-                paint_listening_point(painter, axes, self._listening[side], label, grabbed)
+            paint_listening_line(painter, axes, position, grabbed)
+            if below:
+                paint_listening_point(painter, axes, position, grabbed)
+        if below:
+            one = len(self._listening) == 1
+            paint_listening_labels(painter, axes, {"listen": self._listening["left"]} if one else self._listening)
         grabbed = "pluck" in (self._drag, self._hovered)
         paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
         if self._frame is not None and not self._shows_pluck:

@@ -9,8 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QAbstractButton, QApplication, QMenu, QTabBar, QWidget
+from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QMenu, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.views import theme
@@ -99,6 +99,45 @@ def test_the_tab_key_itself_comes_round(qtbot: QtBot, controller: Controller) ->
         if window.focusWidget() is first:
             return
     pytest.fail("it never came back")
+
+
+def tab_to(qtbot: QtBot, window: MainWindow, aim: QWidget) -> None:
+    """Presses the Tab key until `aim` has the keyboard."""
+    for _ in range(len(stops(window)) + 5):
+        qtbot.keyClick(window.focusWidget(), Qt.Key.Key_Tab)
+        if window.focusWidget() is aim:
+            return
+    pytest.fail(f"Tab never came to {aim}")
+
+
+def test_enter_presses_what_tab_went_to_and_plucks_otherwise(qtbot: QtBot, controller: Controller) -> None:
+    window, session = controller.window, controller.session
+    plucked: list[bool] = []
+    window.pluck_asked.connect(lambda: plucked.append(True))
+    loop = next(button for button in window.findChildren(QAbstractButton) if button.accessibleName() == "Loop")
+    looped = session.choices.loop
+    tab_to(qtbot, window, loop)
+    qtbot.keyClick(loop, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: session.choices.loop is not looped)
+    assert not plucked
+    box = next(box for box in window.findChildren(QComboBox) if box in stops(window))
+    tab_to(qtbot, window, box)
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+    qtbot.waitUntil(box.view().isVisible)
+    box.hidePopup()
+    assert not plucked
+    window.right.currentWidget().setFocus()  # as by a click
+    loop.setFocus()
+    qtbot.keyClick(loop, Qt.Key.Key_Return)
+    assert plucked
+    assert session.choices.loop is not looped
+
+
+def test_f10_opens_the_menu(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    window.menu.aboutToShow.connect(lambda: QTimer.singleShot(0, window.menu.close))
+    with qtbot.waitSignal(window.menu.aboutToHide):
+        qtbot.keyClick(window, Qt.Key.Key_F10)
 
 
 def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
@@ -262,4 +301,8 @@ def test_in_a_low_window_the_views_make_room_for_the_instrument(alive: MainWindo
     alive.show_instrument(True)
     alive.instrument.set_unfolded(False)
     alive.resize(1000, 680)  # of 720 with a title bar
+    assert seen() == (True, True, True, False)
+    alive.notices.inform("It takes a line.")
+    assert seen() == (False, True, True, False)
+    alive.notices.hide()
     assert seen() == (True, True, True, False)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from app.views.string.axes import StringAxes
-from app.views.string.ground import TrainedPlucks, paint_ground
+from app.views.string.ground import TrainedPlucks, paint_ground, scale
+from app.views.string.ink import LABEL_GAP, label_places
 
 
 class Recorder(QPainter):
@@ -30,3 +33,27 @@ def test_words_are_written_beside_a_pluck_and_not_under_a_motion_that_covers_the
     paint_ground(painter, StringAxes(1200, 300, 5.0), TrainedPlucks((0.3, 0.7)), pluck)
     painter.end()
     assert painter.written.count("not trained here") == count
+
+
+@pytest.mark.parametrize(("height", "figures"), [(300, 5), (112, 3), (90, 1)])
+def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot: QtBot, height: int, figures: int) -> None:
+    axes = StringAxes(1200, height, 5.0)
+    assert len(scale(axes)) == figures
+    image = QImage(1200, height, QImage.Format.Format_ARGB32)
+    painter = Recorder(image)
+    paint_ground(painter, axes, TrainedPlucks((0.3, 0.7)), 0)
+    painter.end()
+    assert sum(text[-1].isdigit() or text.endswith("mm") for text in painter.written) >= figures
+    assert painter.written.count("not trained here") == (2 if height == 300 else 0)
+
+
+@pytest.mark.parametrize("points", [(0.10, 0.15), (0.15, 0.10), (0.0, 0.01), (0.99, 1.0), (0.5, 0.5), (0.2, 0.8)])
+def test_the_names_of_two_listening_points_do_not_cover_each_other(qtbot: QtBot, points: tuple[float, float]) -> None:
+    axes = StringAxes(560, 200, 5.0)
+    places = label_places(QFontMetrics(QFont()), axes, dict(zip(("left", "right"), points, strict=True)))
+    assert {text for _, text in places} == {f"left {points[0]:.2f}", f"right {points[1]:.2f}"}
+    for (before, _), (after, _) in pairwise(places):
+        assert after.left() >= before.right() + LABEL_GAP - 0.01
+    assert all(place.left() >= 0 and place.right() <= axes.width for place, _ in places)
+    if points == (0.2, 0.8):  # each under its point
+        assert [place.center().x() for place, _ in places] == pytest.approx([axes.x(point) for point in points])
