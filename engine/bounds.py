@@ -42,7 +42,6 @@ SIZES: Mapping[str, tuple[int, int]] = {
 OTHER_SIZES = (-65_536, 65_536)
 MOST_LAYERS_OF_WIDTHS = 16
 LARGEST_WIDTH = 8_192
-MOST_PARAMETERS = 16 * 2**20  # float32 of the largest preset
 
 # Strings: parameter -> least and most, in the unit of its name
 STRING: Mapping[str, tuple[float, float]] = {

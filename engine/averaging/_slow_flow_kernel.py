@@ -17,6 +17,7 @@ from engine.kernels.compiled import COMPILED
 Array = NDArray[np.float64]
 Triads = NDArray[np.int32]
 
+DEAD_NEPERS = 700.0  # of a mode's decay: what it is made louder by stays a number
 NEWTON_STEPS = 12  # at most; S̄ is a concave equation of one unknown, three or four suffice
 STRONG = 1e-5  # of a triad's effect, as `slow_flow.NEGLIGIBLE` counts it: from here on its third order is there, too
 HORIZON_S = 1.0  # time in which what a triad does adds up, if its phase does not turn before
@@ -630,7 +631,7 @@ def flow(
             for n in range(mo):
                 speed[slot, n] += third[n]
             for n in range(mo):  # ẇ = i g z̄ e^{σt - iΦ}
-                growth = math.exp(decays[n] * time_s)
+                growth = math.exp(min(decays[n] * time_s, DEAD_NEPERS))
                 re, im = pull[0, n] * z[0, n] + pull[1, n] * z[1, n], pull[1, n] * z[0, n] - pull[0, n] * z[1, n]
                 cosine, sine = growth * math.cos(stage_phase[n]), growth * math.sin(stage_phase[n])
                 drift[slot, 0, n] = -im * cosine + re * sine

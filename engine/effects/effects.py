@@ -36,13 +36,13 @@ class Effects:
 
 @lru_cache(maxsize=4)
 def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
-    found = np.ones((1, 1))
+    found: NDArray[np.float64] | None = None
     for part in (effects.body, effects.room):
         if part is not None and part.mix > 0:
             wet = part.mix * part.response(rate_hz)
             wet[0] += 1 - part.mix
-            found = convolved(found, wet) if len(found) > 1 else wet
-    found = found if effects.neutral else as_loud(found, rate_hz)
+            found = wet if found is None else convolved(found, wet)
+    found = np.ones((1, 1)) if found is None else as_loud(found, rate_hz)
     found.setflags(write=False)
     return found
 

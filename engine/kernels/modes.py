@@ -16,7 +16,7 @@ from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 
-TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, before it would sound as another
+TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for it would sound as another
 
 
 @njit(inline="always", **COMPILED)

@@ -150,8 +150,9 @@ def linear_string_encoder(analysis: Tensor) -> Tensor:
 
 def store_eigenvalues(nu_log: Tensor, theta_log: Tensor, log_eigenvalues: Tensor) -> None:
     """Writes log λ = -exp(ν_log) + i exp(θ_log) into the two parameters."""
-    nu_log.copy_(torch.log(-log_eigenvalues.real))
-    theta_log.copy_(log_eigenvalues.imag.log())
+    nu, theta = eigenvalues.stored(log_eigenvalues)
+    nu_log.copy_(nu)
+    theta_log.copy_(theta)
 
 
 def store_ring(nu_log: Tensor, theta_log: Tensor, generator: torch.Generator) -> None:

@@ -1,6 +1,6 @@
 """The contract of every learned string.
 
-A displacement is *encoded* to a state; the state is *advanced* by any number of samples, which yields the
+A displacement is *encoded* to a state; the state is *advanced* by one sample or more, which yields the
 displacement of each; what comes out is *decoded* on the grid, or only at listening points. The state is a
 value: blocks chain, and nothing is remembered behind the caller's back.
 

@@ -583,8 +583,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         if count > n:
             raise ValueError(f"state_size must be at least {count}, the modes that the data show, not {n}")
         analysis, starts, omega = modes.analysis, modes.starts, modes.log_eigenvalues.imag
-        self.nu_log[:count] = (-modes.log_eigenvalues.real).log()
-        self.theta_log[:count] = omega.log()
+        self.nu_log[:count], self.theta_log[:count] = eigenvalues.stored(modes.log_eigenvalues)
         for linear in (self.encoder, self.decoder):
             nn.init.zeros_(linear.weight)
         self.encoder.weight[:count] = (starts.real[:, None] * analysis).to(self.K.dtype)

@@ -43,6 +43,7 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor, nn
 
+from engine.models import eigenvalues
 from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
 
 SERIES = 1 / 12  # r and p of small hω
@@ -372,8 +373,8 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         spare = torch.full((c.modes - n,), n - 1)
         mode = torch.cat([torch.arange(n), spare])
         log_eigenvalues = physics.log_eigenvalues[mode]
-        self.nu_log.copy_((-log_eigenvalues.real).log().clamp(min=-30))
-        self.theta_log.copy_(log_eigenvalues.imag.log())
+        for parameter, found in zip((self.nu_log, self.theta_log), eigenvalues.stored(log_eigenvalues), strict=True):
+            parameter.copy_(found)
         for buffer in (self.coupling, self.stretch, self.shapes, self.analysis):
             buffer.zero_()
         self.coupling[:n] = resonator.coupling / physics.rate_hz**2

@@ -64,8 +64,7 @@ class LRULayer(DiagonalSSM):
 
     def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
         modes = len(log_eigenvalues)
-        self.nu_log[:modes] = (-log_eigenvalues.real).log()
-        self.theta_log[:modes] = log_eigenvalues.imag.log()
+        self.nu_log[:modes], self.theta_log[:modes] = eigenvalues.stored(log_eigenvalues)
         self.gamma_log[:modes] = 0
         self.B[:modes] = input_matrix.to(self.B)
 

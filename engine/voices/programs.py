@@ -19,6 +19,7 @@ from torch import Tensor, nn
 
 from engine.bounds import SUBSTEPS_IN_A_PERIOD
 from engine.kernels import layout as at
+from engine.kernels.modes import TOO_HIGH
 from engine.models.base import StringModel
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
@@ -64,12 +65,14 @@ class Program:
     _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
-        """As `read`, of a pair of listening points; remembered."""
-        if ear not in self._known:
+        """As `read`, of a pair of listening points; remembered. Any thread may ask."""
+        found = self._known.get(ear)
+        if found is None:
+            found = self.read(ear.weights(self.grid_points))
             if len(self._known) >= KEPT_WEIGHTS:
                 self._known.clear()
-            self._known[ear] = self.read(ear.weights(self.grid_points))
-        return self._known[ear]
+            self._known[ear] = found
+        return found
 
     @property
     def rendered(self) -> bool:
@@ -165,6 +168,9 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
             z = model.release((displacement_m[None] / info.scale_m).float()).origin[0].to(torch.complex128)
         return z.abs().clamp(min=1e-300).log().numpy(), z.angle().numpy()
 
+    if rate_hz != info.rate_hz:
+        weight = weight * _fits(rates.omega * ratio).repeat(2)
+
     def read(weights: Tensor) -> tuple[Array, Array]:
         scale = info.scale_m / FULL_SCALE_M
         return (scale * weights.T @ weight).numpy(), (scale * offset @ weights).numpy()
@@ -174,14 +180,17 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
 
 @bank_program.register
 @torch.no_grad()
-def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
+def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program | None:
+    """None where no eigenvalue is left, or there are more than the kernel holds."""
     present = model.magnitude_log > -600
     sigma, omega = -model.magnitude_log[present].double(), model.angle[present].double()
     n = int(present.sum())
+    if not 0 < n <= at.MOST_MODES:
+        return None
     zeros = torch.zeros(n, dtype=torch.float64)
     parts = [sigma, omega, torch.zeros(n, 2 * n, dtype=torch.float64), zeros, *(zeros[:0] for _ in range(8))]
     header = {
-        at.P_RATIO: info.rate_hz / rate_hz,
+        at.P_RATIO: (ratio := info.rate_hz / rate_hz),
         at.P_SPACING: 1.0,
         at.P_LIMIT: 1.0,
         at.P_LOUDNESS: math.log(info.scale_m / FULL_SCALE_M),
@@ -191,6 +200,8 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program:
     )
     real, imaginary = model.modes.double().chunk(2, dim=-1)
     modes = torch.cat([real[:, present], -imaginary[:, present]], dim=-1)
+    if rate_hz != info.rate_hz:
+        modes = modes * _fits(omega * ratio).repeat(2)
 
     def start(displacement_m: Tensor) -> tuple[Array, Array]:
         with torch.inference_mode():
@@ -231,11 +242,17 @@ def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) 
     Args:
         coarser: how many times fewer sub-steps than `default_substeps`.
     """
-    return solver_program(info.resonator, rate_hz, coarser)
+    return solver_program(info.resonator, rate_hz, coarser, aliased=rate_hz == info.rate_hz)
 
 
-def solver_program(resonator: Resonator, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
-    """The physics of a resonator at any rate."""
+def solver_program(
+    resonator: Resonator, rate_hz: int, coarser: int = HEARD_COARSER, aliased: bool = False
+) -> Program:
+    """The physics of a resonator at any rate.
+
+    Args:
+        aliased: modes that are too high for the rate are heard as others, as they are in data of that rate.
+    """
     reals = {
         at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
         at.T_SILENCE: HEARD_SILENCE,
@@ -244,13 +261,20 @@ def solver_program(resonator: Resonator, rate_hz: int, coarser: int = HEARD_COAR
         **{at.T_ROTATIONS + stage: share for stage, share in enumerate(ROTATIONS[: at.STAGES // 2])},
         **{at.T_KICKS + stage: share for stage, share in enumerate(KICKS)},
     }
-    return _with_modes(at.TRUTH, _header(at.T_HEADER, reals, {}), resonator, rate_hz)
+    return _with_modes(at.TRUTH, _header(at.T_HEADER, reals, {}), resonator, rate_hz, aliased)
 
 
-def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int) -> Program:
+def _fits(omega: Tensor) -> Tensor:
+    """1 where a mode turns by so few rad a frame, ω (modes,), that it sounds as itself, else 0."""
+    return (omega.abs() <= TOO_HIGH).double()
+
+
+def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, aliased: bool = False) -> Program:
     """Of a kind whose voices move amplitudes of the resonator's modes."""
-    resonator.eigenvalues()  # it swings
+    omega = resonator.eigenvalues().imag  # it swings
     shapes, n = resonator.shapes, resonator.modes
+    if not aliased:
+        shapes = shapes * _fits(omega / rate_hz)[:, None]
 
     def start(displacement_m: Tensor) -> tuple[Array, Array]:
         return resonator.to_modes(displacement_m.double()).numpy(), np.zeros(n)

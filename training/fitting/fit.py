@@ -19,6 +19,7 @@ from torch import Tensor
 from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
+from engine.bounds import LARGEST_HEADER_BYTES, LARGEST_PRESET_BYTES
 from engine.metrics import RelativeError
 from engine.models import DMD, MODELS, StringModel, build_model
 from engine.models.base import Physics
@@ -153,6 +154,12 @@ def new_model(
     model = build_model(configuration.model, {**configuration.model_configuration, **(found or {})})
     if model.grid_points != data.grid_points:
         raise ValueError(f"model_configuration.grid_points is {model.grid_points}, the data's are {data.grid_points}")
+    size = LARGEST_HEADER_BYTES + sum(part.nbytes for part in model.state_dict().values())
+    if size > LARGEST_PRESET_BYTES:
+        raise ValueError(
+            f"model_configuration makes a model of {size / 2**20:.0f} MiB, and a preset may have "
+            f"{LARGEST_PRESET_BYTES / 2**20:g}; lower its widths"
+        )
     model.initialise(
         own_start(configuration),
         Physics(data.resonator, data.rate_hz, scale_m),

@@ -72,8 +72,10 @@ def _loss_of_code(model: DiagonalModel, batch: Batch, recipe: Recipe) -> tuple[T
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
-    frames, _ = model.advance(model.encode(batch.initial), int(batch.frames[-1]))
-    return frames if frames.shape[1] == len(batch.frames) else frames[:, batch.frames - 1]
+    last = int(batch.frames[-1])
+    frames, _ = model.advance(model.encode(batch.initial), last)
+    every = torch.arange(1, last + 1, device=batch.frames.device)  # some may be drawn twice, and others not
+    return frames if torch.equal(batch.frames, every) else frames[:, batch.frames - 1]
 
 
 def _mean_square(found: Tensor, wanted: Tensor) -> Tensor:

@@ -54,6 +54,8 @@ def _matrix(tensor: Tensor) -> Tensor:
 def _direction(state: dict[str, Tensor], gradient: Tensor) -> Tensor:
     """What is subtracted for a learning rate of 1, of the gradient's shape."""
     if not state:
+        if not bool(gradient.isfinite().all()):  # it has no eigenvectors
+            return torch.zeros_like(gradient)
         state["step"] = torch.zeros(())
         state["mean"], state["square"] = torch.zeros_like(gradient), torch.zeros_like(gradient)
         if gradient.ndim == 2:

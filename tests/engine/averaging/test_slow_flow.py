@@ -124,3 +124,11 @@ def test_what_it_cannot_do_is_told() -> None:
     noise, many = torch.ones(20, dtype=torch.float64), string().resonator(20)
     with pytest.raises(ArithmeticError, match="pluck more softly"):
         slow_flow(many, noise, RATE_HZ, 10)
+
+
+def test_a_string_stays_a_number_long_after_it_has_died() -> None:
+    resonator = replace(string(), damping_d1_kg_m_s=0.08, damping_d3_kg_m_s=0.0).resonator(3)
+    assert float(resonator.sigma[0]) > 50
+    found = slow_flow(resonator, pluck(resonator, 0.1), 1_000.0, 20_000)
+    assert found.isfinite().all()
+    assert not found[-1].abs().max() > 1e-100

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.effects import Body, Effects, Room, apply
-from engine.effects.impulse import LOUDNESS_HZ
+from engine.effects.impulse import LOUDNESS_HZ, Impulse
 from engine.kernels import layout as at
 from engine.voices import Mixer, Voice, plain_program
 
@@ -80,3 +80,13 @@ def test_the_direct_sound_is_where_it_was() -> None:
 
 def test_no_sound_is_no_sound() -> None:
     assert apply(CHOICES[0], np.zeros((0, 1)), RATE_HZ).shape == (0, 2)
+
+
+def test_a_body_of_a_single_frame_is_heard_in_a_room() -> None:
+    """Its balance of left and right, and its sign."""
+    sample, silence = np.array([[-1.0, 0.2]]), np.zeros((1, 2))
+    short, padded = (Impulse(samples, RATE_HZ) for samples in (sample, np.concatenate([sample, silence])))
+    room = Room(0.2, 0.5)
+    found, expected = (Effects(Body(1.0, impulse=each), room).impulse(RATE_HZ) for each in (short, padded))
+    np.testing.assert_allclose(found, expected[: len(found)], atol=1e-9)
+    assert found[0, 0] < 0 < found[0, 1]

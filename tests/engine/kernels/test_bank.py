@@ -12,6 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from engine.kernels import layout as at
 from engine.models import KoopmanIntegrated
 from engine.models.dmd import DMD, DMDConfiguration
 from engine.pluck import FULL_SCALE_M, Pluck
@@ -19,7 +20,7 @@ from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import ModelSource
 from engine.truth import ModalState, SplittingSolver, solve_linear
-from engine.voices import Ear, Mixer, Voice, bank_program
+from engine.voices import Ear, Mixer, Voice, bank_program, model_program, render_voice
 
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 HINTED = f"{KNOWING}_hinted"
@@ -128,3 +129,35 @@ def test_what_is_no_bank_has_no_program(shipped: Shipped, model: torch.nn.Module
     assert bank_program(model, preset.info, 48_000) is None  # Koopman_var: its multiplier sees every frame
     c = replace(preset.model.configuration, decoder_widths=(4,))
     assert bank_program(KoopmanIntegrated(c), preset.info, 48_000) is None
+
+
+@pytest.mark.parametrize("rank", [0, at.MOST_MODES + 2])
+def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(
+    rank: int, small_info: Callable[[bool], PresetInfo]
+) -> None:
+    """Its latents would be written beyond their memory; so would those of a fit to silence, which has none."""
+    info = small_info(False)
+    model = DMD(DMDConfiguration(info.grid_points, 16, max(rank, 2)))
+    with torch.no_grad():
+        model.magnitude_log.fill_(-0.01 if rank else -1e9)
+    assert bank_program(model, info, 48_000) is None
+    assert model_program(model, info, 48_000).rendered
+    with torch.no_grad():
+        model.magnitude_log[: at.MOST_MODES].fill_(-0.01)
+        model.magnitude_log[at.MOST_MODES :].fill_(-1e9)
+    program = bank_program(model, info, 48_000)
+    assert program is not None and program.modes == min(max(rank, 2), at.MOST_MODES)
+
+
+def test_at_a_low_rate_no_latent_is_heard_as_another(shipped: Shipped) -> None:
+    """What a device of 48 kHz gives below 3.5 kHz is what one of 8 kHz gives."""
+    preset, pluck = shipped(STEEL), Pluck(0.13, 2.0, width=0.03)
+    programs = {rate: model_program(preset.model, preset.info, rate) for rate in (8_000, 48_000)}
+    low, high = (
+        render_voice(program, ModelSource(preset), preset.info, pluck, EAR, 0.5)[:, 0]
+        for program in programs.values()
+    )
+    window = [np.hanning(len(sound)) for sound in (low, high)]
+    spectra = [np.abs(np.fft.rfft(w * sound)) / len(sound) for w, sound in zip(window, (low, high), strict=True)]
+    band = slice(50, 3_500 // 2)  # bins of 2 Hz
+    assert relative(spectra[0][band], spectra[1][band]) < 0.01

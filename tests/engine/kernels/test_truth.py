@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,3 +63,22 @@ def test_the_linear_string_is_exact(rate_hz: int, small_info: Info, initial_m: I
     exact = solve_linear(info.resonator, start, torch.arange(len(found)).double() / rate_hz)
     expected = (to_grid(exact[0], info.grid_points) @ STEREO.weights(info.grid_points)).numpy() / FULL_SCALE_M
     assert relative(found, expected) < 1e-7
+
+
+@pytest.mark.parametrize("modulated", [False, True])
+def test_at_a_low_rate_no_mode_is_heard_as_another(
+    modulated: bool, small_info: Info, initial_m: Initial, rung: Rung
+) -> None:
+    """Softly plucked, it is the string of the modes that the rate can hold."""
+    info = small_info(modulated)
+    omegas = [info.string.undamped_frequency(number) for number in range(1, info.modes + 1)]
+    rate_hz = int(1.5 * omegas[-1] / (2 * math.pi))  # the highest lie above its half
+    few = replace(info, modes=sum(omega < 3 * rate_hz for omega in omegas))
+    assert 2 < few.modes < info.modes
+    let_go_m = initial_m(info, Pluck(0.3, 0.01))
+    found = rung(rate_hz // 4, Voice(truth_program(info, rate_hz), let_go_m, STEREO), attack=False)
+    expected = rung(rate_hz // 4, Voice(truth_program(few, rate_hz), let_go_m, STEREO), attack=False)
+    assert relative(found, expected) < 1e-4
+    own = replace(info, rate_hz=rate_hz)  # of data of that rate, which alias as well
+    aliased = rung(rate_hz // 4, Voice(truth_program(own, rate_hz), let_go_m, STEREO), attack=False)
+    assert relative(aliased, expected) > 1e-3

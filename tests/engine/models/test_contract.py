@@ -138,3 +138,14 @@ def test_a_preset_of_it_renders_what_the_model_does(
 def test_sizes_are_checked_by_name() -> None:
     with pytest.raises(SchemaError, match="unknown field 'depht'"):
         build_model("frnn", {"depht": 3})
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [(name, how) for name, (kind, _) in MODELS.items() for how in kind.initialisations if how != "paper"],
+)
+def test_a_string_without_losses_can_be_started_from(name: str, how: str) -> None:
+    string = StringParameters(damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
+    model = build_model(name)
+    model.initialise(how, Physics(string.resonator(10), 16_000, 1e-3), torch.Generator().manual_seed(0))
+    assert all(part.isfinite().all() for part in model.state_dict().values())

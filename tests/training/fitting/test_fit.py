@@ -281,3 +281,9 @@ def test_a_coupling_without_a_rate_stays(small_dataset: Dataset, runs: Path) -> 
     moved = fit(small("koopman_integrated", coupling_rate=1.0), small_dataset, runs / "moved").model
     start = module.new_model(small("koopman_integrated"), small_dataset.scale_m)
     assert torch.equal(kept.K, start.K) and not torch.equal(moved.K, start.K)
+
+
+def test_a_model_that_no_preset_can_hold_is_refused_before_it_is_trained(small_dataset: Dataset) -> None:
+    configuration = replace(small("koopman"), model_configuration={"encoder_widths": [4096, 4096]})
+    with pytest.raises(ValueError, match="lower its widths"):
+        module.new_model(configuration, small_dataset.scale_m)

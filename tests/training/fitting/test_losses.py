@@ -6,7 +6,7 @@ from typing import Literal
 import pytest
 import torch
 
-from engine.models import KoopmanVar, KoopmanVarConfiguration
+from engine.models import KoopmanVar, KoopmanVarConfiguration, build_model
 from engine.models.base import Physics
 from engine.resonators.string import StringParameters
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
@@ -64,3 +64,15 @@ def test_terms_of_the_code_need_a_koopman_model() -> None:
     TrainingConfiguration("", "koopman_var", data, recipe)
     with pytest.raises(ValueError, match="koopman_terms 'code' needs a Koopman model, not 'lru'"):
         TrainingConfiguration("", "lru", data, recipe)
+
+
+def test_frames_that_were_drawn_twice_are_compared_with_themselves() -> None:
+    """As many frames as the last one's number need not be all of them."""
+    model = build_model("lru", {"layers": 0, "state_size": 4})
+    model.initialise("paper", Physics(StringParameters().resonator(6), 4_000), torch.Generator().manual_seed(1))
+    model.eval()
+    initial, frames = torch.randn(2, 101, generator=torch.Generator().manual_seed(2)), torch.tensor([1, 3, 3, 4])
+    whole = model(initial, 4).detach()
+    _, prediction = training_loss(model, Batch(initial, frames, whole[:, frames - 1]), RECIPE)
+    assert float(prediction) < 1e-12
+    assert float(training_loss(model, Batch(initial, frames, whole), RECIPE)[1]) > 1e-9
