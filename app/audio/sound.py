@@ -108,6 +108,7 @@ class Sound:
         self._stalled = False  # whether a stall has been reported
         self._gaps: deque[Gap] = deque(maxlen=MOST_GAPS)
         self._status = SoundStatus(rate_hz=rate_hz)
+        self._changes_done = 0
         self._caretaker = threading.Thread(target=self._take_care, name="sound-caretaker", daemon=True)
         self._caretaker.start()
 
@@ -214,7 +215,7 @@ class Sound:
             except Empty:
                 return
             self._change(wish)
-            self._status = replace(self._status, changes_done=self._status.changes_done + 1)
+            self._changes_done += 1  # published with the device and the rate that came of it
 
     def _change(self, wish: _Wish) -> None:
         before = self._wish if self._output.device is not None else None
@@ -317,4 +318,5 @@ class Sound:
             latency_s=output.latency_s,
             gaps=tuple(self._gaps),
             load=output.load(),
+            changes_done=self._changes_done,
         )

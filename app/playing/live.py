@@ -58,6 +58,7 @@ class Live:
         self._notes, self._sources, self._find, self._report = notes, sources, find, report
         self._lock = threading.RLock()
         self._player: Player | None = None
+        self._wanted: Patch | None = None
         self._path = Path()
         self._ear: Ear | None = None
         self._struck_s = 0.0
@@ -86,6 +87,7 @@ class Live:
         with self._lock:
             self._ear = ear
             player = self._player
+            self._wanted = patch
             if patch is None:
                 self._player = None
                 self._wish_effects(None)
@@ -249,6 +251,9 @@ class Live:
     # How it is done
 
     def _begin(self, patch: Patch) -> None:
+        """Loads a patch's preset, unless another patch is wanted by now, or none."""
+        if patch is not self._wanted:
+            return
         path = self._find(patch.preset)
         if path is None:
             self._report(f"{patch.name} is played by the preset {patch.preset}, which was not found.", "")
@@ -259,6 +264,8 @@ class Live:
             self._report(str(error), "")
             return
         with self._lock:
+            if patch is not self._wanted:
+                return
             if self._ear is not None:
                 player.listen(self._ear)
             self._path, self._player = path, player

@@ -141,7 +141,8 @@ def test_another_rate_has_another_mixer_as_loud(sound: Sound, desk: Desk, speake
     before = sound.mixer
     opened(sound, speakers)
     assert sound.mixer is not before
-    assert (sound.rate_hz, sound.mixer.rate_hz, sound.status().rate_hz) == (44_100, 44_100, 44_100)
+    assert (sound.rate_hz, sound.mixer.rate_hz) == (44_100, 44_100)
+    wait_for(lambda: sound.status().rate_hz == 44_100)
     assert sound.mixer.voices == []
     lasting(sound)
     found = sound.mixer.render(20_000)
@@ -271,6 +272,7 @@ def test_while_one_is_missed_another_may_be_chosen(
     desk.outputs[0].is_lost = True
     wait_for(lambda: desk.problems != [])
     opened(sound, speakers)
+    wait_for(lambda: sound.status().device == speakers)
     desk.devices.append(headphones)
     tries = desk.rescans
     time.sleep(0.2)
