@@ -52,9 +52,7 @@ class ComparePanel(Panel):
         if names & {"position", "amplitude_mm", "shape", "width", "seconds", "listen", "preset", "string"}:
             self._unchanged_s = 0.0
             if self._tried != self._wanted():
-                self._background.cancel()
-                self.view.set_computing(None)
-                self._stopped = False
+                self._abandon()
             self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
 
     def _library_changed(self) -> None:
@@ -141,10 +139,14 @@ class ComparePanel(Panel):
     def _choose(self, names: list[str] | None) -> None:
         self._names = names
         if self._tried != self._wanted():
-            self._background.cancel()
-            self._ended()
-            self._stopped = False
+            self._abandon()
         self._show()
+
+    def _abandon(self) -> None:
+        """Ends what is computed for other choices than the present ones; where they come back, it is begun anew."""
+        self._background.cancel()
+        self._tried, self._stopped = (), False
+        self._ended()
 
     def _show(self) -> None:
         self._stale = False

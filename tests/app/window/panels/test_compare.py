@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.window.controller import Controller
+from app.window.panels import compare as module
 
 
 @pytest.fixture
@@ -70,6 +72,28 @@ def test_figures_of_an_earlier_pluck_are_told(qtbot: QtBot, controller: Controll
     assert shown._words.text() == "2 presets on this pluck, 0.5 s"
     controller.session.update(position=0.6)
     qtbot.waitUntil(lambda: shown._words.text() == "0 of 2 presets on this pluck, 0.5 s; grey: an earlier pluck")
+
+
+def test_a_pluck_that_comes_back_while_it_is_computed_is_computed(
+    qtbot: QtBot, controller: Controller, shown: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
+    begun: list[object] = []
+    compare, held = module.compare, Event()
+
+    def slow(missing: Any, trial: Any, job: Any) -> object:
+        begun.append(trial)
+        while not held.wait(0.01):
+            job.check()
+        return compare(missing, trial, job)
+
+    monkeypatch.setattr(module, "compare", slow)
+    controller.session.update(position=0.6)
+    qtbot.waitUntil(lambda: len(begun) == 1)
+    controller.session.update(position=0.61)
+    controller.session.update(position=0.6)
+    held.set()
+    qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
 
 
 def test_presets_are_taken_out_and_put_in(qtbot: QtBot, controller: Controller, shown: Any) -> None:
