@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import threading
-import time
 import venv
 from pathlib import Path
 
@@ -237,16 +236,21 @@ def test_a_failed_step_shows_its_last_lines_and_leaves_no_stamp(run, monkeypatch
 
 
 def test_a_second_set_up_waits_for_the_first_and_does_nothing_more(run, monkeypatch, capsys):
-    begun, made = threading.Event(), []
+    begun, waited_for, made = threading.Event(), threading.Event(), []
 
     def slow(absent):
         begun.set()
-        time.sleep(0.2)
+        waited_for.wait(0.2 if run.WINDOWS else 20)  # there nothing is said
         made.append(absent)
         environment(absent)
 
-    environment = run.environment
+    def tell(message):
+        say(message)
+        waited_for.set()
+
+    environment, say = run.environment, run.say
     monkeypatch.setattr(run, "environment", slow)
+    monkeypatch.setattr(run, "say", tell)
     run.STAMP.unlink()
     first = threading.Thread(target=run.prepare, args=("start", False))
     first.start()

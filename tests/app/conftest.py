@@ -109,8 +109,8 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
     qtbot.addWidget(window)
     settings = Settings(choices=Choices(seconds=0.5))
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
-    window.show()
-    qtbot.waitExposed(window)
+    with qtbot.waitExposed(window):
+        window.show()
     yield made
     window.close()
     left = [t.name for t in threading.enumerate() if t.name in OWN_THREADS]

@@ -64,7 +64,7 @@ def expected(rate_hz: int, switch_frame: int) -> NDArray[np.float32]:
     return np.concatenate([before, mixer.render(round(END_S * rate_hz) - switch_frame)])
 
 
-def wait_until(condition: Callable[[], bool], timeout_s: float = 8.0) -> None:
+def wait_until(condition: Callable[[], bool], timeout_s: float = 60.0) -> None:  # kernels may have to be compiled
     deadline_s = time.monotonic() + timeout_s
     while not condition() and time.monotonic() < deadline_s:
         time.sleep(0.005)
@@ -77,6 +77,7 @@ def main(rate: str, action: str, *argument: str) -> None:
         wait_until(lambda: sound.status().device is not None or problems != [])
         time.sleep(0.3)  # let the device settle
         mixer = sound.mixer
+        notes(mixer.rate_hz, 0)  # loads and compiles, which may take longer than there is until the first frame
         first_frame = round((mixer.seconds + 0.3) * mixer.rate_hz)
         first_frame += -first_frame % 64
         voices = notes(mixer.rate_hz, first_frame)

@@ -76,7 +76,7 @@ def play(server: SoundServer, *action: str) -> dict[str, Any]:
         env=server.environment,
         capture_output=True,
         text=True,
-        timeout=120,  # kernels may have to be compiled
+        timeout=600,  # kernels may have to be compiled, on a busy computer
     )
     assert done.returncode == 0, done.stderr
     said: dict[str, Any] = json.loads(done.stdout)

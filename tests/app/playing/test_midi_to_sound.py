@@ -6,6 +6,7 @@ messages of bytes as a driver's thread does.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -30,7 +31,7 @@ from engine.voices import Ear
 RATE_HZ = 48_000
 KEY, HZ = 57, 220.0
 RELEASE_T60_S = 0.15
-NAME = "Learned Strings test"
+NAME = f"Learned Strings test {os.getpid()}"  # others of the system may be tested at the same time
 Wait = Callable[[Callable[[], bool]], None]
 
 

@@ -11,12 +11,13 @@ def test_events_come_in_time_and_everything_is_let_go_in_the_end() -> None:
     came: list[tuple[float, Event]] = []
     ended = threading.Event()
     playback = Playback(lambda event: came.append((time.monotonic(), event)), ended.set)
+    began_s = time.monotonic()  # each event may be late by itself, and none is early
     playback.play([TimedEvent(0.2, NoteOff(60)), TimedEvent(0.0, NoteOn(60, 90)), TimedEvent(0.1, NoteOn(64, 90))])
     assert ended.wait(10)
-    times = [when - came[0][0] for when, _ in came]
+    times = [when - began_s for when, _ in came]
     assert [event for _, event in came[:3]] == [NoteOn(60, 90), NoteOn(64, 90), NoteOff(60)]
-    assert times[1] >= 0.05
-    assert times[2] >= 0.15
+    assert times[1] >= 0.1
+    assert times[2] >= 0.2
     assert came[-1][1] == Controller(NOTES_OFF, 0)
 
 

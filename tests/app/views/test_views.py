@@ -154,9 +154,9 @@ def test_a_click_on_the_waveform_asks_to_seek(qtbot: QtBot) -> None:
     view = WaveformView()
     qtbot.addWidget(view)
     view.resize(600, 240)
-    view.show()
     view.set_take(2.0, 0.25)
-    qtbot.waitExposed(view)
+    with qtbot.waitExposed(view):
+        view.show()
     with qtbot.waitSignal(view.seek_asked) as asked:
         qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=view.viewport().rect().center())
     assert 0.7 < asked.args[0] < 1.3

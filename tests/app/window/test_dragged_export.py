@@ -101,6 +101,7 @@ def test_the_same_choices_are_rendered_once_and_others_replace_no_file(
 def test_what_cannot_be_rendered_is_told(qtbot: QtBot, short: Controller, dropped: list[Path]) -> None:
     entry = short.library.find("first")
     assert entry is not None
+    qtbot.waitUntil(lambda: short.performance.at_hand)  # else the window itself would tell that the file is gone
     entry.path.unlink()
     drag(qtbot, short, until="first.safetensors")
     assert dropped == []

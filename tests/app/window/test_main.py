@@ -25,6 +25,9 @@ timer = QTimer(interval=50)
 timer.timeout.connect(close_when_rendered)
 timer.start()
 status = main.run()
+for thread in threading.enumerate():
+    if thread.name == "sound-finder":  # which nobody waits for
+        thread.join(60)
 print([thread.name for thread in threading.enumerate() if thread is not threading.main_thread()])
 raise SystemExit(status)
 """

@@ -3,6 +3,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -271,8 +272,9 @@ def test_a_sweep_here_listens_to_nobody(plan, options: Options) -> None:
 
     class Look(Watch):
         def progressed(self, event: Progressed) -> None:
-            family = [psutil.Process(), *psutil.Process().children(recursive=True)]
-            seen.append([port for one in family for port in one.net_connections("inet") if port.status == "LISTEN"])
+            for one in [psutil.Process(), *psutil.Process().children(recursive=True)]:
+                with suppress(psutil.NoSuchProcess):  # `git`, which a worker asks for its commit, ends by itself
+                    seen.append([port for port in one.net_connections("inet") if port.status == "LISTEN"])
 
     with local_workers(here(1)) as workers:
         sweep(made, workers, options, Look())

@@ -53,7 +53,7 @@ def test_a_short_soak_plays_into_the_private_card_and_reports(
         env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "PYTHONPATH": os.pathsep.join(sys.path)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,  # kernels may have to be compiled
     )
     if "libasound2-plugins" in done.stderr:
         pytest.skip("ALSA does not play into PulseAudio here")

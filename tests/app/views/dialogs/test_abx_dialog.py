@@ -65,8 +65,8 @@ def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
             through, Subject(CANDIDATES, PLUCK, 0.0), choices, lambda rate_hz: rendering, seed=lambda: seed
         )
         qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
-        dialog.open()
-        qtbot.waitExposed(dialog)
+        with qtbot.waitExposed(dialog):
+            dialog.open()
         if rendered is None and through is sound:
             qtbot.waitUntil(dialog._setup.start.isEnabled)
         return dialog

@@ -27,18 +27,15 @@ MADE = 3 * 2
 
 
 class Notes:
-    """In place of the instrument: decaying sines. Each note waits while `gate` is closed."""
+    """In place of the instrument: decaying sines. After the `last` one each waits until `gate` is open."""
 
     def __init__(self) -> None:
         self.rendered: list[tuple] = []
-        self.gate = threading.Event()
-        self.gate.set()
-        self.last = 10**6  # notes that pass before it closes by itself
+        self.gate = threading.Event()  # never closed again: a note that looks late finds it open
+        self.last = 10**6
 
     def render_note(self, patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced):
-        if len(self.rendered) >= self.last:
-            self.gate.clear()
-        assert self.gate.wait(20)
+        assert len(self.rendered) < self.last or self.gate.wait(20)
         advanced(seconds)
         self.rendered.append((patch, key, velocity, seconds, rate_hz, source))
         time_s = np.arange(round(seconds * rate_hz)) / rate_hz
@@ -194,7 +191,6 @@ def test_progress_is_shown_and_the_choices_wait(
     qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
     assert "key 61, velocity 127, about " in dialog.state.text()
     assert " s left. You can play on meanwhile." in dialog.state.text()
-    notes.last = 100
     notes.gate.set()
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert dialog.form.isEnabled()
@@ -210,7 +206,6 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     assert dialog.close_button.text() == "Cancel"
     dialog.close()  # as its cross does: it stays, to tell what was kept
     assert dialog.isVisible()
-    notes.last = 100
     notes.gate.set()
     told = f"of {MADE} samples are kept; export again to go on from there"
     qtbot.waitUntil(lambda: told in dialog.state.text())
@@ -234,7 +229,6 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     dialog.close_button.click()
     notes.gate.set()
-    notes.last = 100
     job = dialog._job
     assert job is not None
     job.wait()  # what it tells has not arrived
@@ -399,7 +393,6 @@ def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
     dialog.save.click()
     qtbot.waitUntil(lambda: len(notes.rendered) == 1)
     dialog.show_patch(patch.with_value("knobs.decay", 3.0), preset)
-    notes.last = 100
     notes.gate.set()
     qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text())
     assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}

@@ -47,8 +47,8 @@ def test_axes_stay_while_curves_move(
     view = make()
     qtbot.addWidget(view)
     view.resize(500, 300)
-    view.show()
-    qtbot.waitExposed(view)
+    with qtbot.waitExposed(view):
+        view.show()
     draw(view, 0)
     qtbot.wait(100)
     assert painted  # once
@@ -64,8 +64,8 @@ def test_what_is_kept_follows_the_view(qtbot: QtBot, painted: list[pg.AxisItem])
     qtbot.addWidget(view)
     view.resize(500, 300)
     view.set_take(2.0, 1.0)
-    view.show()
-    qtbot.waitExposed(view)
+    with qtbot.waitExposed(view):
+        view.show()
     qtbot.wait(100)
     item = view.getPlotItem()
     for change, side in (

@@ -20,8 +20,8 @@ def plot(qtbot: QtBot) -> KeptPlot:
     made.resize(400, 200)
     made.setXRange(0, 1, padding=0)
     made.plot([0, 1], [0, 1], pen=pg.mkPen(theme.MODEL, width=1))
-    made.show()
-    qtbot.waitExposed(made)
+    with qtbot.waitExposed(made):
+        made.show()
     return made
 
 

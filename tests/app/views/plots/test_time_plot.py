@@ -20,8 +20,8 @@ def plot(qtbot: QtBot) -> Iterator[TimePlot]:
     made = TimePlot("A plot", "A tip")
     qtbot.addWidget(made)
     made.resize(640, 240)
-    made.show()
-    qtbot.waitExposed(made)
+    with qtbot.waitExposed(made):
+        made.show()
     made.set_times(4.0, 0.25)
     made.getPlotItem().setYRange(0, 1, padding=0)
     QApplication.processEvents()

@@ -19,7 +19,8 @@ NAME = "a thread of tests"
 
 
 @pytest.fixture
-def background(qtbot: QtBot) -> Iterator[Background]:
+def background(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Background]:
+    monkeypatch.setattr(_background, "UNSEEN_S", 60.0)  # nobody looks here, however late a job begins
     made = Background(NAME)
     yield made
     made.close()
@@ -114,8 +115,13 @@ def test_a_take_that_no_longer_grows_is_not_waited_for(qtbot: QtBot, background:
         background.start(lambda job: job.report(0.5))
 
 
-def test_a_job_rests_while_nobody_looks(qtbot: QtBot, background: Background) -> None:
+def test_a_job_rests_while_nobody_looks(
+    qtbot: QtBot, background: Background, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_background, "UNSEEN_S", 0.3)
     shares: list[float] = []
+    ended: list[object] = []
+    background.finished.connect(ended.append)
     background.progressed.connect(lambda share, _: shares.append(share))
     resting = threading.Event()
 
@@ -128,8 +134,12 @@ def test_a_job_rests_while_nobody_looks(qtbot: QtBot, background: Background) ->
     assert resting.wait(10)
     qtbot.wait(200)
     assert shares == []
-    with qtbot.waitSignal(background.finished):
-        background.look()
+
+    def seen() -> bool:
+        background.look()  # again and again: each look holds for UNSEEN_S
+        return bool(ended)
+
+    qtbot.waitUntil(seen)
     assert shares == [0.5]
 
 

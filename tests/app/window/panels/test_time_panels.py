@@ -70,8 +70,8 @@ def make(qtbot: QtBot, take: Take) -> Iterator[Make]:
         panel.choices_changed(frozenset(Choices.model_fields))
         qtbot.addWidget(panel.view)
         panel.view.resize(700, 300)
-        panel.view.show()
-        qtbot.waitExposed(panel.view)
+        with qtbot.waitExposed(panel.view):
+            panel.view.show()
         panel.take_started(take)
         return panel
 
