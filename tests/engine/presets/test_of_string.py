@@ -153,7 +153,8 @@ def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> No
     own, expected = load_preset(find_preset(f"studio_any_{name}")), of_string(many, string)
     assert own.info.string == string
     for key, tensor in expected.model.state_dict().items():
-        assert torch.equal(own.model.state_dict()[key], tensor)
+        # logarithms differ in their last digit between makes of processor
+        torch.testing.assert_close(own.model.state_dict()[key], tensor, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", NAMES)
