@@ -2,7 +2,7 @@
 
 That is the same product, taken by oneDNN instead of the BLAS: on processors of another make than the BLAS's it is
 two to three times as fast (AMD EPYC, one thread, 20,000 × 128 by 128 × 128, timed by hand: 58 GFLOP/s as a product,
-185 as a convolution), and a training step takes a third less time.
+185 as a convolution), and a training step takes a third less time. On an Intel Xeon both have 97 GFLOP/s.
 """
 
 from __future__ import annotations
