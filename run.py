@@ -4,6 +4,7 @@
 python3 run.py                 open the app
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
+python3 run.py bench NAME      measure speed, sound and memory on this machine (without NAME: which there are)
 python3 run.py setup           only prepare
 python3 run.py -- render ...   the command line: everything after -- goes to learned-strings
 
@@ -96,6 +97,8 @@ def main(words: list[str]) -> int:
         prepare(action, window=action == "start" and not arguments)
         if action == "test":
             return check(arguments)
+        if action == "bench":
+            return subprocess.call([PYTHON, "-m", "tests.bench", *arguments], cwd=ROOT)
         return start(arguments) if action == "start" else 0
     except KeyboardInterrupt:
         return fail("stopped", 130)
@@ -109,8 +112,8 @@ def parse(words: list[str]) -> tuple[str, list[str]]:
         return "start", []
     if words[0] == "--":
         return "start", words[1:]
-    if words[0] == "test":
-        return "test", words[1:]
+    if words[0] in ("test", "bench"):
+        return words[0], words[1:]
     if words == ["setup"]:
         return "setup", []
     usage = (__doc__ or "").strip()

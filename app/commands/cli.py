@@ -19,7 +19,6 @@ import typer
 from app.commands import (
     abx,
     batch,
-    bench,
     evaluation,
     family,
     faust,
@@ -94,17 +93,21 @@ for command in (
     cli.command()(command)
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
-cli.add_typer(bench.bench, name="bench")
 cli.add_typer(abx.abx, name="abx")
 cli.add_typer(family.family, name="family")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a command line (default: the process's own) and returns the exit status."""
+    return carry_out(cli, arguments, NAME)
+
+
+def carry_out(commands: typer.Typer, arguments: Sequence[str] | None, name: str) -> int:
+    """Runs a command line of some commands; failures are printed in one line. Returns the exit status."""
     wait_asleep()
     use_any_output()
     try:
-        typer.main.get_command(cli).main(list(sys.argv[1:] if arguments is None else arguments), prog_name=NAME)
+        typer.main.get_command(commands).main(list(sys.argv[1:] if arguments is None else arguments), prog_name=name)
     except SystemExit as exit:
         return exit.code if isinstance(exit.code, int) else 0 if exit.code is None else 1
     except Exception as error:

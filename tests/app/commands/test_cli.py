@@ -28,7 +28,6 @@ COMMANDS = [
     "dataset",
     "train",
     "evaluate",
-    "bench",
     "abx",
 ]
 
@@ -70,8 +69,7 @@ def test_commands_need_neither_window_nor_sound_packages() -> None:
         "import sys\n"
         "for name in ('PySide6', 'pyqtgraph', 'sounddevice', 'soundfile', 'psygnal'):\n"
         "    sys.modules[name] = None\n"
-        "import app.commands.arrays, app.commands.benchmarks.render, app.commands.benchmarks.solver\n"
-        "import app.commands.benchmarks.train, training.run\n"
+        "import app.commands.arrays, training.run\n"
         "from app.commands.cli import main\n"
         "assert main(['models', '--json']) == 0\n"
         "pluck = ['--position', '.5', '--amplitude-mm', '1', '--seconds', '1']\n"
@@ -83,7 +81,7 @@ def test_commands_need_neither_window_nor_sound_packages() -> None:
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("words", [[], *([name] for name in COMMANDS), ["bench", "solver"], ["bench", "train"]])
+@pytest.mark.parametrize("words", [[], *([name] for name in COMMANDS)])
 def test_everything_has_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([*words, "--help"]) == 0
     assert "Usage: learned-strings" in capsys.readouterr().out
@@ -99,7 +97,7 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.strip()
 
 
-@pytest.mark.parametrize("words", [["unknown"], ["render"], ["models", "--nonsense"], ["bench", "nothing"]])
+@pytest.mark.parametrize("words", [["unknown"], ["render"], ["models", "--nonsense"]])
 def test_bad_usage_is_status_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(words) == 2
     found = capsys.readouterr()

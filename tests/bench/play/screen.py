@@ -1,0 +1,103 @@
+"""A private X screen (Xvfb): windows are drawn on it, keys are sent to it, and pictures are taken of it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.bench.play.children import Missing, child
+
+if TYPE_CHECKING:
+    from Xlib.xobject.drawable import Window
+
+SIZE = (1920, 1080)
+DEPTH = 24
+
+
+class Screen:
+    """One connection to an X server, for one thread."""
+
+    def __init__(self, name: str) -> None:
+        try:
+            from Xlib import display, error
+        except ImportError as missing:
+            raise Missing("this benchmark needs the Python package python-xlib: pip install python-xlib") from missing
+        self.name = name
+        try:
+            self._display = display.Display(name)
+        except error.DisplayError as failed:
+            raise Missing(f"the private screen {name} cannot be opened ({failed})") from failed
+        self._root = self._display.screen().root
+
+    def close(self) -> None:
+        self._display.close()
+
+    def find(self, title: str) -> Window | None:
+        """The visible window whose title begins with `title`; None where there is none."""
+        from Xlib import X, error
+
+        for window in self._root.query_tree().children:
+            with contextlib.suppress(error.BadWindow):  # it has vanished between two calls
+                name = window.get_wm_name() or ""
+                if str(name).startswith(title) and window.get_attributes().map_state == X.IsViewable:
+                    return window
+        return None
+
+    def take(self, window: Window) -> None:
+        """Makes a window as large as the screen and gives it the keyboard, as a window manager does."""
+        from Xlib import X
+
+        window.configure(x=0, y=0, width=SIZE[0], height=SIZE[1], stack_mode=X.Above)
+        window.set_input_focus(X.RevertToParent, X.CurrentTime)
+        self._display.sync()
+
+    def size(self, window: Window) -> tuple[int, int]:
+        found = window.get_geometry()
+        return found.width, found.height
+
+    def key(self, name: str, down: bool) -> float:
+        """Presses or releases a key, by the name of its keysym; returns when it was sent (`time.monotonic`)."""
+        from Xlib import XK, X
+        from Xlib.ext import xtest
+
+        code = self._display.keysym_to_keycode(XK.string_to_keysym(name))
+        if not code:
+            raise Missing(f"the private screen has no key {name}")
+        now_s = time.monotonic()
+        xtest.fake_input(self._display, X.KeyPress if down else X.KeyRelease, code)
+        self._display.flush()
+        return now_s
+
+    def grab(self, x: int, y: int, width: int, height: int) -> NDArray[np.uint8]:
+        """The picture of a part of the screen, (height, width, 4): blue, green, red, unused."""
+        from Xlib import X
+
+        data = self._root.get_image(x, y, width, height, X.ZPixmap, 0xFFFFFFFF).data
+        return np.frombuffer(data, np.uint8).reshape(height, -1)[:, : 4 * width].reshape(height, width, 4)
+
+
+@contextlib.contextmanager
+def private_screen() -> Iterator[Screen]:
+    """Starts an X server on a free display number, and ends it afterwards.
+
+    Raises:
+        Missing: it did not start, or python-xlib is missing.
+    """
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x{DEPTH}", "-nolisten", "tcp"]
+    with child(command, os.environ, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        number = process.stdout.readline().decode().strip()
+        if not number:
+            raise Missing("Xvfb did not start")
+        screen = Screen(f":{number}")
+        try:
+            yield screen
+        finally:
+            screen.close()

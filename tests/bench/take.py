@@ -1,0 +1,107 @@
+"""Cost of a pluck's pictures and signals: processor time, memory, and the time after a listening point has moved.
+
+Processor times are of all threads of this process; other processes have little effect on them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from app.playing.sources import Sources
+from app.rendering import RenderRequest, Take
+from app.rendering.job import Job
+from engine.metrics import ErrorSums
+from engine.pluck import DEFAULT_LISTEN, Pluck
+from engine.presets import SHIPPED
+from engine.voices import Ear
+from tests.bench.machine import Machine, one_thread
+
+PRESETS = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_ds3", "studio_steel_e4")
+SECONDS = 10.0
+SPEED = 0.004  # of slow motion, as at the first start
+EARS = tuple(Ear((point,)) for point in (DEFAULT_LISTEN, 0.2, 0.55, 0.8))
+MEGABYTE = 1e6
+
+
+@dataclass(frozen=True)
+class TakeCost:
+    """Model and truth of one pluck.
+
+    Attributes:
+        picture_hz: pictures per second.
+        rendered_s: processor time for all pictures and signals of both.
+        megabytes: memory of one source.
+        moved_s, moved_wall_s: processor and wall-clock time from a moved listening point to both signals there; the
+            shortest of a few.
+    """
+
+    preset: str
+    seconds: float
+    picture_hz: float
+    rendered_s: float
+    megabytes: float
+    moved_s: float
+    moved_wall_s: float
+
+
+@dataclass(frozen=True)
+class TakeBenchmark:
+    machine: Machine
+    takes: tuple[TakeCost, ...]
+
+
+class _Nobody:
+    """A listener that does nothing."""
+
+    def take_started(self, take: Take) -> None: ...
+
+    def take_finished(self, take: Take, errors: ErrorSums) -> None: ...
+
+    def other_failed(self, preset: str, message: str) -> None: ...
+
+    def render_failed(self, message: str, detail: str) -> None: ...
+
+
+def measure(report: Callable[[float, str], None]) -> TakeBenchmark:
+    """Measures `PRESETS`."""
+    found = []
+    with one_thread(), ThreadPoolExecutor(1) as helper:
+        machine = Machine.here()
+        for number, name in enumerate(PRESETS):
+            report(number / len(PRESETS), name)
+            found.append(_measure(SHIPPED / f"{name}.safetensors", helper))
+    return TakeBenchmark(machine, tuple(found))
+
+
+def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
+    sources = Sources()
+    request = RenderRequest(path, Pluck(), SECONDS, EARS[0], SPEED)
+    _finish(Job(replace(request, seconds=0.1), sources.load, _Nobody(), helper))  # loads and compiles
+    job = Job(request, sources.load, _Nobody(), helper)
+    rendered_s, _ = _finish(job)
+    take = job.take
+    assert take is not None
+    moved = []
+    for ear in EARS[1:]:
+        job.ask_again(replace(request, ear=ear))
+        moved.append(_finish(job))
+    return TakeCost(
+        path.stem,
+        SECONDS,
+        take.picture_hz,
+        rendered_s,
+        take.bytes("model") / MEGABYTE,
+        *map(min, zip(*moved, strict=True)),
+    )
+
+
+def _finish(job: Job) -> tuple[float, float]:
+    """Finishes the job; returns processor time and wall-clock time in s."""
+    began_s, began_wall_s = time.process_time(), time.perf_counter()
+    while not job.idle:
+        job.advance()
+    return time.process_time() - began_s, time.perf_counter() - began_wall_s
