@@ -22,6 +22,7 @@ from app.instrument.hands import GUITAR_STRINGS, Hands
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
 from app.patches.patch import Patch, StringSet
+from app.shared.parameters import OF_PATCHES
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.presets import Preset
@@ -36,23 +37,6 @@ DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03
 KEPT_KEYS = 512
 GOALS = 8  # values that are tried for a wheel all the way up
-# What a wheel all the way up makes of a field: a factor of its own value, or a value
-WHEEL_FACTORS = {
-    "knobs": 4.0,
-    "knobs.length": 2.0,
-    "damping": 10.0,
-    "pluck.hardest_mm": 2.0,
-    "body.size": 2.0,
-    "room.t60_s": 3.0,
-}
-WHEEL_VALUES = {
-    "pluck.position": 0.5,
-    "pluck.width": 0.02,
-    "pluck.width_hard": 0.02,
-    "pluck.curve": 1.0,
-    "body.mix": 1.0,
-    "room.mix": 1.0,
-}
 
 
 @dataclass(frozen=True)
@@ -425,9 +409,8 @@ class Player:
         name, share = self._patch.mod_wheel, self._hands.wheel / 127
         if share == 0 or not name.startswith(parts):
             return self._patch
-        value = self._patch.value(name)
-        factor = WHEEL_FACTORS.get(name, WHEEL_FACTORS.get(name.split(".")[0], 0.0))
-        goal = WHEEL_VALUES.get(name, value * factor if factor else value)
+        value, parameter = self._patch.value(name), OF_PATCHES[name]
+        goal = value * parameter.wheel_factor if parameter.wheel is None else parameter.wheel
         for _ in range(GOALS):
             try:
                 self._patch.with_value(name, goal)

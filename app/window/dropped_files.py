@@ -12,7 +12,7 @@ from app.instrument.bodies import ENDINGS, install_body
 from app.presets.folders import user_folder
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
-from app.session.choices import SECONDS_RANGE
+from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from app.shared.whole_file import WriteError
 
@@ -67,7 +67,7 @@ def _recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     notices = [] if exact else [changed_preset_notice(recipe)]
-    if not SECONDS_RANGE[0] <= recipe.seconds <= SECONDS_RANGE[1]:
+    if recipe.seconds != OF_CHOICES["seconds"].clamped(recipe.seconds):
         notices.append(f"its duration of {recipe.seconds:g} s is out of the window's range, and was limited")
     notice = f"{file.name}: {'; '.join(notices)}." if notices else ""
     return Dropped({"preset": path.stem, **restored_choices(recipe)}, notice)
@@ -75,7 +75,7 @@ def _recipe(file: Path, library: Library) -> Dropped:
 
 def restored_choices(recipe: Recipe) -> dict[str, Any]:
     """The fields of `Choices` that a recipe sets, without the preset."""
-    low, high = SECONDS_RANGE
+    low, high = OF_CHOICES["seconds"].limits
     found: dict[str, Any] = {
         "position": recipe.pluck.position,
         "amplitude_mm": recipe.pluck.amplitude_mm,

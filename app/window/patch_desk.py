@@ -196,11 +196,11 @@ class PatchDesk(QObject):
 
     def turn_to(self, field: str, figure: float) -> None:
         """Turns a knob of the string to a figure of the string that is shown, or as near to it as the knob goes."""
-        patch, limits = self.patch, self._panel.knobs.knobs[field].limits
+        patch = self.patch
         if patch is None:
             return
         try:
-            self.change(field, knob_for(patch, self._shown_key(patch), field, figure, (limits.low, limits.high)))
+            self.change(field, knob_for(patch, self._shown_key(patch), field, figure))
         except ValueError as error:
             self.told.emit(one_line(str(error)))
 

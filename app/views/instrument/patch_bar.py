@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch, TuningChoice
-from app.session.step_words import PATCH
-from app.views.controls.knob import Knob, KnobRange
+from app.patches.patch import MOST_MACROS, Macro, Patch, TuningChoice
+from app.shared.parameters import MACRO, OF_PATCHES
+from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, plain_tip
@@ -23,16 +23,7 @@ ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
 LONGEST_SCALE_NAME = 120  # characters
 COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
-SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
-_MIXES = {  # field of a patch -> (label, range, tip)
-    "body.mix": ("mix", SHARE, "Mix of the body: 0 % the strings alone, 100 % the body alone"),
-    "room.mix": (
-        "room",
-        KnobRange(0, 1, 0, 0.02, "{:.0%}"),
-        "Mix of the room: 0 % without it, 100 % its reverberation alone",
-    ),
-    "level_db": ("level", KnobRange(*LEVEL_RANGE_DB, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
-}
+MIXES = ("body.mix", "room.mix", "level_db")
 
 
 class PatchBar(QFrame):
@@ -63,10 +54,10 @@ class PatchBar(QFrame):
         self._compact = False
         self._recorded_s: float | None = None
         self._unsaved = 0
-        self.knobs = {field: Knob(name, limits, tip) for field, (name, limits, tip) in _MIXES.items()}
+        self.knobs = {field: Knob(OF_PATCHES[field]) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
-        self.macros = [Knob(f"macro {number + 1}", SHARE) for number in range(MOST_MACROS)]
+        self.macros = [Knob(MACRO) for _ in range(MOST_MACROS)]
         for number, knob in enumerate(self.macros):
             knob.value_asked.connect(lambda value, number=number: self.macro_turned.emit(number, value))
             knob.hide()
@@ -345,10 +336,4 @@ def _scale_name(scale: str) -> str:
 
 def _named(macro: Macro) -> tuple[str, list[str]]:
     """Its name, and its targets in words."""
-    return macro.name, [_words(target.field) for target in macro.targets]
-
-
-def _words(field: str) -> str:
-    """The words for a field of a patch; the same for all pick-up points."""
-    inside, _, last = field.rpartition(".")
-    return PATCH.get(field) or PATCH.get(inside) or last.replace("_", " ")
+    return macro.name, [OF_PATCHES[target.field].name for target in macro.targets]

@@ -7,7 +7,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.analysis.string_frame import StringFrame
-from app.views.controls.knob import KnobRange
+from app.shared.parameters import PARAMETERS
 from app.views.plots.spectrum_view import COLUMNS, Analyser, SpectrumView
 from app.views.plots.waveform_view import WaveformView, extremes
 from app.views.string.ink import ShownPluck
@@ -85,17 +85,18 @@ def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_
     assert curve.getData()[0] is None or len(curve.getData()[0]) == 0
 
 
-@pytest.mark.parametrize(
-    "limits",
-    [KnobRange(0, 20, 4, 0.25), KnobRange(0.001, 1, 0.004, 1.25, logarithmic=True), KnobRange(-60, 12, 0, 1.0)],
-)
-def test_a_knob_goes_from_end_to_end(limits: KnobRange) -> None:
+@pytest.mark.parametrize("id", PARAMETERS)
+def test_a_parameter_goes_from_end_to_end(id: str) -> None:
+    parameter = PARAMETERS[id]
+    low, high = parameter.limits
     for share in (0, 0.3, 1):
-        assert limits.share(limits.value(share)) == pytest.approx(share)
-    assert limits.value(-1) == pytest.approx(limits.low)
-    assert limits.value(2) == pytest.approx(limits.high)
-    assert limits.stepped(limits.high, 5) == limits.high
-    assert limits.stepped(limits.stepped(limits.default, 1), -1) == pytest.approx(limits.default)
+        assert parameter.share(parameter.value(share)) == pytest.approx(share)
+    assert parameter.value(-1) == pytest.approx(low)
+    assert parameter.value(2) == pytest.approx(high)
+    assert parameter.stepped(high, 5) == high
+    step = parameter.stepped(parameter.default, -1)
+    assert parameter.default == low or step < parameter.default
+    assert parameter.default == low or parameter.stepped(step, 1) == pytest.approx(parameter.default)
 
 
 def test_the_string_view_zooms_with_the_decay(qtbot: QtBot) -> None:
