@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
+from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M
 from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
@@ -188,7 +189,7 @@ class Voice:
             return False
         self._set_weights(1, ear)
         self._counts[at.WEIGHTS_FADED] = 0
-        self._counts[at.NEXT_WEIGHTS] = 1
+        publish(self._counts, at.NEXT_WEIGHTS, 1)
         self.ear = ear
         return True
 
@@ -210,7 +211,7 @@ class Voice:
                 del self._blocks[:place]
                 break
         self._blocks.append(block)
-        self._counts[at.RESONATOR] = int(block.ctypes.data)
+        publish(self._counts, at.RESONATOR, block.ctypes.data)
 
     def continues(self, before: Voice) -> None:
         """Before it is handed over: it is the same string, plucked again while `before` rings.
@@ -237,7 +238,7 @@ class Voice:
         ready = int(self._counts[at.READY])
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
-        self._counts[at.READY] = ready + count
+        publish(self._counts, at.READY, ready + count)
 
     def level_of_samples(self, seconds: float) -> float:
         """Root mean square of what a rendered voice was given for its first seconds."""
