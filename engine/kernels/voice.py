@@ -13,13 +13,13 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import row
 
-MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
+MOVE_S = 0.020  # the fade to another listening point
+END_S = 0.020  # the fade of a voice that has become silent
 WARMED = 3  # quanta: the one that is heard, and those before and after it
-_END = 960  # frames of the fade of a voice that has become silent
 
 
 @njit(**COMPILED)
-def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     counts = voice.view(np.int64)
     kind = counts[at.KIND]
@@ -37,10 +37,10 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     else:
         truth.generate(voice, program, fading, heard, out)
     if fading:
-        done, frames = counts[at.WEIGHTS_FADED], MOVE_QUANTA * at.QUANTUM
+        done, frames = counts[at.WEIGHTS_FADED], round(MOVE_S * rate_hz)
         for point in range(counts[at.POINTS]):
             for frame in range(at.QUANTUM):
-                share = (done + frame + 1) / frames
+                share = min((done + frame + 1) / frames, 1.0)
                 out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
         counts[at.WEIGHTS_FADED] = done + at.QUANTUM
         if counts[at.WEIGHTS_FADED] >= frames or not heard:
@@ -54,7 +54,9 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 
 @njit(**COMPILED)
-def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray) -> None:
+def _velocity(
+    voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
+) -> None:
     """As `_generate`, differentiated; the voice is generated a quantum ahead for that.
 
     What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
@@ -65,7 +67,7 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     if begins:
         counts[at.WARM] = 0
     for turn in range(2 if begins else 1):
-        _generate(voice, heard, out, scratch)
+        _generate(voice, heard, rate_hz, out, scratch)
         counts[at.WARM] = min(counts[at.WARM] + 1, WARMED) if heard else 0
         for point in range(counts[at.POINTS]):
             slot = at.history(n, point)
@@ -156,7 +158,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
-    now = mix_counts[at.M_FRAMES]
+    now, rate_hz = mix_counts[at.M_FRAMES], mixer[at.M_RATE]
     if counts[at.BEGIN_AT] > now and counts[at.STATE] == at.WAITING:
         return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
@@ -174,9 +176,9 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     was_dry, generated = counts[at.DRY], counts[at.GENERATED]
     if counts[at.VELOCITY]:
         taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
-        _velocity(voice, heard, out, scratch, taps)
+        _velocity(voice, heard, rate_hz, out, scratch, taps)
     else:
-        _generate(voice, heard, out, scratch)
+        _generate(voice, heard, rate_hz, out, scratch)
     points = counts[at.POINTS]
     if counts[at.DRY] and not was_dry:
         note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
@@ -215,7 +217,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     if release > 0 and (not heard or (voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0)):
         return at.OVER
     if release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
-        counts[at.RELEASE] = _END
+        counts[at.RELEASE] = max(1, round(END_S * rate_hz))
     return at.SOUNDING
 
 
@@ -239,5 +241,5 @@ def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
         counts[at.GENERATED] = quanta * at.QUANTUM
         quanta = 0
     for _ in range(quanta):
-        _generate(voice, False, out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+        _generate(voice, False, mixer[at.M_RATE], out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     counts[at.FRAME] = counts[at.GENERATED]
