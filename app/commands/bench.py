@@ -410,6 +410,8 @@ def notes(
     print(f"{found.patch}, without body and room; {found.buffer} buffer; seed {found.seed}; load before: {loads}")
     hands, told = found.heard, [each.judgement for each in found.heard]
     t60_s = told[0].wanted_t60_s
+    restrikes = "soft strikes of a loud string, "
+    restrikes += "softest to loudest" if found_patch.pluck.stops else "largest fall of the level"
     rows: list[tuple[object, ...]] = [
         ("quiet notes off their tuning, worst, cents", *(each.melody_cents for each in told), 0.5),
         ("resting bends off theirs, worst, cents", *(each.bend_cents for each in told), 0.5),
@@ -422,7 +424,7 @@ def notes(
         ("damper's T60, longest, s", *(each.release_t60_s[1] for each in told), t60_s),
         ("held by the pedal from held by a finger, dB", *(each.pedal_db for each in told), 0),
         ("damper's T60 as the pedal rises, s", *(each.pedal_t60_s for each in told), t60_s),
-        ("largest fall at a soft strike of a loud string, dB", *(each.restrike_db for each in told), None),
+        (f"{restrikes}, dB", *(each.restrike_db for each in told), 0),
         ("holes", *(each.holes for each in told), 0),
         ("holes together, ms", *(each.holes_ms for each in told), 0),
         ("holes of a steady tone beside it", *(each.control_holes for each in hands), None),

@@ -53,10 +53,10 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
     _take_up(counts)
-    for place in range(counts[at.M_ACTIVE]):  # before any goes on
+    for place in range(counts[at.M_ACTIVE]):  # before any sounds on
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)
-        if whole[at.CONTINUES] != 0 and whole[at.BEGIN_AT] <= counts[at.M_FRAMES]:
+        while whole[at.BEFORE] != 0 and whole[at.BEGIN_AT] <= counts[at.M_FRAMES]:
             take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0

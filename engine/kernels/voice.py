@@ -93,14 +93,43 @@ def _velocity(
 
 @njit(**COMPILED)
 def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
-    """A pluck of a string that rings is added to its motion, as this voice begins; the voice that had it fades.
-
-    One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
-    kind, the string is at rest.
-    """
+    """The string of the voice before is this one's as it begins: its motion is stopped, or this pluck added to it."""
     counts = voice.view(np.int64)
-    before = carray(pointer(counts[at.CONTINUES]), (1 << 40,), np.float64)
+    before = carray(pointer(counts[at.BEFORE]), (1 << 40,), np.float64)
+    stops = counts[at.STOPS_IN]
+    earlier = _stop(before, stops) if stops > 0 else _join(voice, before, now, scratch)
+    fence()
+    counts[at.BEFORE] = earlier
+
+
+@njit(**COMPILED)
+def _stop(before: np.ndarray, frames: int) -> int:
+    """A voice fades out in so many frames; one that waits never sounds. The address of the one before it, or 0."""
     befores = before.view(np.int64)
+    if befores[at.STATE] == at.WAITING:
+        _never_begin(before)
+        return befores[at.BEFORE]
+    if befores[at.RELEASE] == 0:
+        befores[at.RELEASE] = frames
+    return 0
+
+
+@njit(inline="always", **COMPILED)
+def _never_begin(voice: np.ndarray) -> None:
+    """A voice that waits ends without a sound."""
+    voice[at.GAIN] = voice[at.GAIN_TO] = voice[at.WANTED_GAIN] = 0.0
+    voice.view(np.int64)[at.RELEASE] = 1
+
+
+@njit(**COMPILED)
+def _join(voice: np.ndarray, before: np.ndarray, now: int, scratch: np.ndarray) -> int:
+    """The pluck is added to the motion of the voice before, which fades as this one begins.
+
+    One that has not begun yet is not heard at all: both plucks are this voice's, and so is what is left to do with
+    the one before it, whose address this gives; else 0. Where it is over, or of another kind, the string is at rest.
+    """
+    counts, befores = voice.view(np.int64), before.view(np.int64)
+    earlier = 0
     rings = befores[at.STATE] == at.SOUNDING and befores[at.GENERATED] > 0
     waits = befores[at.STATE] == at.WAITING and befores[at.PREPARED] == 0
     if (rings or waits) and befores[at.KIND] == counts[at.KIND]:
@@ -122,15 +151,16 @@ def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
         voice[at.LIMIT] *= 1 + widest / voice[at.PEAK]
         if waits:
             counts[at.BEGIN_AT] = max(counts[at.BEGIN_AT], befores[at.BEGIN_AT])
-            before[at.GAIN] = before[at.GAIN_TO] = before[at.WANTED_GAIN] = 0.0
-            befores[at.RELEASE] = 1
+            earlier = befores[at.BEFORE]
+            if earlier != 0:
+                counts[at.STOPS_IN] = befores[at.STOPS_IN]
+            _never_begin(before)
         else:  # what senses velocity has been generated further than it is heard: so much later this one begins
             counts[at.BEGIN_AT] = now + befores[at.GENERATED] - befores[at.FRAME]
             befores[at.FADE_FRAMES] = max(1, counts[at.ATTACK])
             befores[at.RELEASE_AT] = max(1, counts[at.BEGIN_AT])
         counts[at.JOINS] = joins
-    fence()
-    counts[at.CONTINUES] = 0
+    return earlier
 
 
 @njit(**COMPILED)
