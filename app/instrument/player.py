@@ -1,8 +1,10 @@
 """A patch that is played: events become voices, and change those that ring.
 
-Strings are known by their places: a key, or a channel of a guitar, which is one string. A place that is struck again
-goes on with the motion that it has; a key that is released damps its string, unless the pedal or the patch lets it
-ring. Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
+Strings are known by their places: a key, or a channel of a guitar, which is one string. What plucks a place again
+stops its string first, or, where the patch says so, adds to its motion. A key that is released damps its string,
+unless the pedal or the patch lets it ring.
+
+Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
 
 In guitar mode the first channels are the strings, the highest first, as guitars with MIDI send them. The first of
 them alone may as well be a keyboard: until another has played, it plays any key, each on the string that the key
@@ -35,6 +37,7 @@ SOURCES = ("model", "truth")
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03
+PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
 KEPT_KEYS = 512
 GOALS = 8  # values that are tried for a wheel all the way up
 
@@ -301,8 +304,11 @@ class Player:
             before = None
         if before is not None:
             for source, voice in voices.items():
-                if not before.voices[source].over:
-                    voice.continues(before.voices[source])
+                ringing = before.voices[source]
+                if not ringing.over and self._patch.pluck.stops:
+                    voice.stops(ringing, PLUCK_STOPS_S)
+                elif not ringing.over:
+                    voice.continues(ringing)
         own = key.string.parameters
         struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own)
         parameters = self._with_hands(struck)

@@ -181,6 +181,8 @@ class PluckChoices(_Value):
         width, width_hard: of the softest and of the hardest pluck.
         softest_mm, hardest_mm: amplitudes of velocity 1 and 127; between them a step of velocity is a step in dB.
         curve: 0 is even; towards 1 the middle velocities are louder, towards -1 softer.
+        stops: whether what plucks a string that rings stops it first, as a finger or a plectrum does. Otherwise the
+            pluck is added to the motion, as under a hammer.
     """
 
     shape: Shape = "triangular"
@@ -190,6 +192,7 @@ class PluckChoices(_Value):
     softest_mm: float = _parameter("pluck.softest_mm")
     hardest_mm: float = _parameter("pluck.hardest_mm")
     curve: float = _parameter("pluck.curve")
+    stops: Flag = True
 
     @model_validator(mode="after")
     def _softest_is_softer(self) -> Self:

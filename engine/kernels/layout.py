@@ -64,7 +64,7 @@ WARM = 40  # W quanta of its own displacement that a velocity voice has behind i
 RESONATOR = 41  # W address of the modes that it is to have; the kernel glides there
 TAKEN = 42  # W the one that it is gliding to, or has reached
 GLIDE = 43  # W quanta left of the way
-CONTINUES = 44  # W address of the voice whose string this pluck is added to; 0: the string is at rest, or it is done
+BEFORE = 44  # W address of the voice that has the string until this one begins; 0: none has, or it is taken over
 PREPARED = 45  # W whether the rows that follow from its modes are there
 STEPS = 46  # W nodes, or sub-steps, of a frame, for which they were made
 DECAY = 47  # R of the largest energy in a frame
@@ -74,7 +74,8 @@ PEAK = 50  # R m: of the displacement as it is let go, a least one
 JOINS = 51  # W whether its fade-in is the complement of the other's fade
 ENDS_AT = 52  # W frames since the pluck, from which on it fades out whatever it still gives
 ENDS_IN = 53  # W frames of that fade
-HEADER = 54
+STOPS_IN = 54  # W frames of the fade in which it stops the voice before; 0: it is added to that motion
+HEADER = 55
 
 
 @njit(inline="always", **COMPILED)

@@ -13,13 +13,13 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import row
 
-MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
+MOVE_S = 0.020  # the fade to another listening point
+END_S = 0.020  # the fade of a voice that has become silent
 WARMED = 3  # quanta: the one that is heard, and those before and after it
-_END = 960  # frames of the fade of a voice that has become silent
 
 
 @njit(**COMPILED)
-def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     counts = voice.view(np.int64)
     kind = counts[at.KIND]
@@ -37,10 +37,10 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     else:
         truth.generate(voice, program, fading, heard, out)
     if fading:
-        done, frames = counts[at.WEIGHTS_FADED], MOVE_QUANTA * at.QUANTUM
+        done, frames = counts[at.WEIGHTS_FADED], round(MOVE_S * rate_hz)
         for point in range(counts[at.POINTS]):
             for frame in range(at.QUANTUM):
-                share = (done + frame + 1) / frames
+                share = min((done + frame + 1) / frames, 1.0)
                 out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
         counts[at.WEIGHTS_FADED] = done + at.QUANTUM
         if counts[at.WEIGHTS_FADED] >= frames or not heard:
@@ -54,7 +54,9 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 
 @njit(**COMPILED)
-def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray) -> None:
+def _velocity(
+    voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
+) -> None:
     """As `_generate`, differentiated; the voice is generated a quantum ahead for that.
 
     What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
@@ -65,7 +67,7 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     if begins:
         counts[at.WARM] = 0
     for turn in range(2 if begins else 1):
-        _generate(voice, heard, out, scratch)
+        _generate(voice, heard, rate_hz, out, scratch)
         counts[at.WARM] = min(counts[at.WARM] + 1, WARMED) if heard else 0
         for point in range(counts[at.POINTS]):
             slot = at.history(n, point)
@@ -91,14 +93,43 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 @njit(**COMPILED)
 def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
-    """A pluck of a string that rings is added to its motion, as this voice begins; the voice that had it fades.
-
-    One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
-    kind, the string is at rest.
-    """
+    """The string of the voice before is this one's as it begins: its motion is stopped, or this pluck added to it."""
     counts = voice.view(np.int64)
-    before = carray(pointer(counts[at.CONTINUES]), (1 << 40,), np.float64)
+    before = carray(pointer(counts[at.BEFORE]), (1 << 40,), np.float64)
+    stops = counts[at.STOPS_IN]
+    earlier = _stop(before, stops) if stops > 0 else _join(voice, before, now, scratch)
+    fence()
+    counts[at.BEFORE] = earlier
+
+
+@njit(**COMPILED)
+def _stop(before: np.ndarray, frames: int) -> int:
+    """A voice fades out in so many frames; one that waits never sounds. The address of the one before it, or 0."""
     befores = before.view(np.int64)
+    if befores[at.STATE] == at.WAITING:
+        _never_begin(before)
+        return befores[at.BEFORE]
+    if befores[at.RELEASE] == 0:
+        befores[at.RELEASE] = frames
+    return 0
+
+
+@njit(inline="always", **COMPILED)
+def _never_begin(voice: np.ndarray) -> None:
+    """A voice that waits ends without a sound."""
+    voice[at.GAIN] = voice[at.GAIN_TO] = voice[at.WANTED_GAIN] = 0.0
+    voice.view(np.int64)[at.RELEASE] = 1
+
+
+@njit(**COMPILED)
+def _join(voice: np.ndarray, before: np.ndarray, now: int, scratch: np.ndarray) -> int:
+    """The pluck is added to the motion of the voice before, which fades as this one begins.
+
+    One that has not begun yet is not heard at all: both plucks are this voice's, and so is what is left to do with
+    the one before it, whose address this gives; else 0. Where it is over, or of another kind, the string is at rest.
+    """
+    counts, befores = voice.view(np.int64), before.view(np.int64)
+    earlier = 0
     rings = befores[at.STATE] == at.SOUNDING and befores[at.GENERATED] > 0
     waits = befores[at.STATE] == at.WAITING and befores[at.PREPARED] == 0
     if (rings or waits) and befores[at.KIND] == counts[at.KIND]:
@@ -120,15 +151,16 @@ def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
         voice[at.LIMIT] *= 1 + widest / voice[at.PEAK]
         if waits:
             counts[at.BEGIN_AT] = max(counts[at.BEGIN_AT], befores[at.BEGIN_AT])
-            before[at.GAIN] = before[at.GAIN_TO] = before[at.WANTED_GAIN] = 0.0
-            befores[at.RELEASE] = 1
+            earlier = befores[at.BEFORE]
+            if earlier != 0:
+                counts[at.STOPS_IN] = befores[at.STOPS_IN]
+            _never_begin(before)
         else:  # what senses velocity has been generated further than it is heard: so much later this one begins
             counts[at.BEGIN_AT] = now + befores[at.GENERATED] - befores[at.FRAME]
             befores[at.FADE_FRAMES] = max(1, counts[at.ATTACK])
             befores[at.RELEASE_AT] = max(1, counts[at.BEGIN_AT])
         counts[at.JOINS] = joins
-    fence()
-    counts[at.CONTINUES] = 0
+    return earlier
 
 
 @njit(**COMPILED)
@@ -156,7 +188,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
-    now = mix_counts[at.M_FRAMES]
+    now, rate_hz = mix_counts[at.M_FRAMES], mixer[at.M_RATE]
     if counts[at.BEGIN_AT] > now and counts[at.STATE] == at.WAITING:
         return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
@@ -174,9 +206,9 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     was_dry, generated = counts[at.DRY], counts[at.GENERATED]
     if counts[at.VELOCITY]:
         taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
-        _velocity(voice, heard, out, scratch, taps)
+        _velocity(voice, heard, rate_hz, out, scratch, taps)
     else:
-        _generate(voice, heard, out, scratch)
+        _generate(voice, heard, rate_hz, out, scratch)
     points = counts[at.POINTS]
     if counts[at.DRY] and not was_dry:
         note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
@@ -215,7 +247,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     if release > 0 and (not heard or (voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0)):
         return at.OVER
     if release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
-        counts[at.RELEASE] = _END
+        counts[at.RELEASE] = max(1, round(END_S * rate_hz))
     return at.SOUNDING
 
 
@@ -239,5 +271,5 @@ def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
         counts[at.GENERATED] = quanta * at.QUANTUM
         quanta = 0
     for _ in range(quanta):
-        _generate(voice, False, out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+        _generate(voice, False, mixer[at.M_RATE], out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     counts[at.FRAME] = counts[at.GENERATED]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
+from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M
 from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
@@ -188,7 +189,7 @@ class Voice:
             return False
         self._set_weights(1, ear)
         self._counts[at.WEIGHTS_FADED] = 0
-        self._counts[at.NEXT_WEIGHTS] = 1
+        publish(self._counts, at.NEXT_WEIGHTS, 1)
         self.ear = ear
         return True
 
@@ -210,10 +211,10 @@ class Voice:
                 del self._blocks[:place]
                 break
         self._blocks.append(block)
-        self._counts[at.RESONATOR] = int(block.ctypes.data)
+        publish(self._counts, at.RESONATOR, block.ctypes.data)
 
     def continues(self, before: Voice) -> None:
-        """Before it is handed over: it is the same string, plucked again while `before` rings.
+        """Before it is handed over: it is the same string, plucked again while `before` rings on.
 
         Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
 
@@ -222,13 +223,25 @@ class Voice:
         """
         if self.program.resonator is None or before.program.resonator is None:
             raise ValueError("a voice without modes of its own has no string that is plucked again")
-        before.forget_before()
-        self._before = before
-        self._counts[at.CONTINUES] = before.address
+        self._follow(before)
 
-    def forget_before(self) -> None:
-        """Lets go of the voice that it continues, once it has taken its motion over."""
-        if self._counts[at.CONTINUES] == 0:
+    def stops(self, before: Voice, seconds: float) -> None:
+        """Before it is handed over: it is the same string, stopped by what plucks it again.
+
+        It begins as a pluck of a string at rest, and `before` fades out in so many seconds from then on. One that
+        has not begun by then never sounds.
+        """
+        self._follow(before)
+        self._counts[at.STOPS_IN] = max(1, round(seconds * self.program.rate_hz))
+
+    def _follow(self, before: Voice) -> None:
+        """Keeps the voice before in memory until this one, which is the same string, has begun."""
+        before._forget_before()
+        self._before = before
+        self._counts[at.BEFORE] = before.address
+
+    def _forget_before(self) -> None:
+        if self._counts[at.BEFORE] == 0:
             self._before = None
 
     def append(self, samples: NDArray[np.floating]) -> None:
@@ -237,7 +250,7 @@ class Voice:
         ready = int(self._counts[at.READY])
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
-        self._counts[at.READY] = ready + count
+        publish(self._counts, at.READY, ready + count)
 
     def level_of_samples(self, seconds: float) -> float:
         """Root mean square of what a rendered voice was given for its first seconds."""

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
-from engine.kernels.voice import MOVE_QUANTA
 from engine.models import KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.presets import Preset, PresetInfo
+from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer, Voice, bank_program, plain_program, truth_program
 from engine.voices.derivative import REACH_FRAMES
+from engine.voices.programs import solver_program
 from engine.voices.voice import FADE_S
 
 RATE_HZ = 48_000
@@ -140,6 +141,45 @@ def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, run
     assert (np.diff(shares[loud_enough]) > -2e-3).all(), "the fade goes one way"
 
 
+RATES_HZ = pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000, 192_000])
+
+
+def slowest(rate_hz: int, ear: Ear) -> Voice:
+    """A string that all but stands still for the time of a test: by it every change of gain can be seen."""
+    slow = StringParameters(
+        length_m=2.0, density_kg_m3=20_000.0, tension_n=1e-3, youngs_modulus_pa=1e6, damping_d1_kg_m_s=0.0
+    )
+    program = solver_program(slow.resonator(1, tension_modulated=False), rate_hz)
+    voice = Voice(program, Pluck(0.5).displacement(program.grid_points), ear)
+    voice.begin_at_once()
+    return voice
+
+
+@RATES_HZ
+def test_the_way_to_another_listening_point_lasts_as_long_at_any_rate(rate_hz: int) -> None:
+    voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
+    mixer.add(voice)
+    mixer.render(4 * at.QUANTUM)
+    assert voice.listen(Ear((0.0,)))
+    frames = round(0.02 * rate_hz)
+    found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
+    np.testing.assert_allclose(found[:frames] / found[0], 1 - np.arange(frames) / frames, atol=2e-3)
+    assert np.abs(found[frames:]).max() < 1e-6
+
+
+@RATES_HZ
+def test_a_voice_that_is_silent_ends_in_as_long_at_any_rate(rate_hz: int) -> None:
+    voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
+    voice.memory[at.SILENT] = 0.0  # louder than it is
+    mixer.add(voice)
+    frames = round(0.02 * rate_hz)
+    found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
+    np.testing.assert_allclose(
+        found[at.QUANTUM : at.QUANTUM + frames] / found[0], 1 - np.arange(1, frames + 1) / frames, atol=2e-3
+    )
+    assert voice.over
+
+
 @KINDS
 @pytest.mark.parametrize("solo", [0, 2])
 def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
@@ -151,7 +191,7 @@ def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int
     assert not moved.listen(here), "a fade is under way"
     found = mixer.render(4800).astype(np.float64)
     before, after = rung(6720, struck(kind, here))[1920:], rung(6720, struck(kind, there))[1920:]
-    frames = MOVE_QUANTA * at.QUANTUM
+    frames = FADE
     share = np.minimum(np.arange(1, 4801) / frames, 1.0)[:, None]
     np.testing.assert_allclose(found, before + share * (after - before), atol=1e-6)
     if kind == "truth":

@@ -224,6 +224,68 @@ def test_two_plucks_before_the_string_sounds_are_one_of_both(kind: str) -> None:
     assert not second.over
 
 
+def stopping(before: Voice, of: Program, seconds: float = 0.006) -> Voice:
+    voice = struck(of)
+    voice.stops(before, seconds)
+    return voice
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_a_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fades(kind: str) -> None:
+    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
+    first = struck(of)
+    mixer.add(first)
+    mixer.render(6_400)
+    mixer.add(stopping(first, of))
+    fresh.add(struck(of))
+    heard = mixer.render(6_400)[:, 0]
+    left = heard - fresh.render(6_400)[:, 0]
+    fade = np.clip(1 - np.arange(1, 6_401) / 288, 0, 1)
+    expected = fade * sound(of, [], 200)[6_400:]
+    np.testing.assert_allclose(left, expected, atol=1e-6)
+    assert first.over
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_of_plucks_that_wait_the_last_alone_sounds_and_the_ringing_one_is_stopped(kind: str) -> None:
+    """Also where the one that is stopped was to begin later."""
+    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
+    ringing = struck(of)
+    mixer.add(ringing)
+    mixer.render(6_400)
+    waits = stopping(ringing, of)
+    later = stopping(waits, of)
+    later.begin_at(20_000)
+    last = stopping(later, of)
+    mixer.add(waits)
+    mixer.add(later)
+    mixer.add(last)
+    fresh.add(struck(of))
+    heard = mixer.render(32_000)[:, 0]
+    np.testing.assert_allclose(heard[320:], fresh.render(32_000)[320:, 0], atol=1e-6)
+    assert [each.over for each in (ringing, waits, later, last)] == [True, True, True, False]
+
+
+def test_a_pluck_that_is_added_to_one_that_waits_stops_what_that_one_would() -> None:
+    of, mixer = program("model"), Mixer(RATE_HZ, limited=False)
+    ringing = struck(of)
+    mixer.add(ringing)
+    mixer.render(6_400)
+    waits = stopping(ringing, of)
+    waits.begin_at(8_000)
+    added = struck(of)
+    added.continues(waits)
+    mixer.add(waits)
+    mixer.add(added)
+    both = Voice(of, 2 * PLUCK.displacement(101), EAR)
+    both.never_ends()
+    alone = Mixer(RATE_HZ, limited=False)
+    alone.add(both)
+    heard = mixer.render(12_800)[:, 0]
+    np.testing.assert_allclose(heard[1_600 + 320 :], alone.render(11_200)[320:, 0], atol=1e-6)
+    assert ringing.over
+
+
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) -> None:
     high = modes_of(STRING, 80)
