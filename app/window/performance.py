@@ -244,7 +244,7 @@ class Performance(QObject):
         """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
         if patch is not None:
-            choices = choices.model_copy(update=choices_of(patch))
+            choices = choices.changed(choices_of(patch))
         self.notes.listen(heard_ear(choices))
         self.live.set_patch(choices.patch, heard_ear(choices))
 
