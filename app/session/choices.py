@@ -87,6 +87,11 @@ class Choices(BaseModel):
     def source_heard(self) -> str:
         return self.a if self.heard == "a" else self.b
 
+    @property
+    def plays_pitches(self) -> bool:
+        """Whether keys are pitches of the patch; otherwise they pluck at ten places."""
+        return self.keys_play == "pitch" and self.patch is not None
+
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """These choices with other values: the one way to change them. Another preset resets `string`, unless given.
 
@@ -178,7 +183,7 @@ def _with_one_ear(choices: Choices, asked: Collection[str]) -> Choices:
         ValueError: the patch cannot be heard so.
     """
     patch = choices.patch
-    if patch is None or choices.keys_play != "pitch":
+    if patch is None or not choices.plays_pitches:
         return choices
     if "patch" not in asked and any(name in asked for name in EARS):
         heard = picked_up(patch, choices.listen, choices.listen_right, choices.stereo, choices.pickup)

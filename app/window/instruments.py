@@ -91,9 +91,8 @@ class Instruments(QObject):
 
     @property
     def plays_pitches(self) -> bool:
-        """Whether the computer's keys are a piano's; otherwise they pluck at ten places."""
-        choices = self._session.choices
-        return choices.keys_play == "pitch" and choices.patch is not None
+        """As `Choices.plays_pitches`: what the computer's keys are."""
+        return self._session.choices.plays_pitches
 
     def choices_changed(self) -> None:
         self._keys.piano = self.plays_pitches

@@ -6,6 +6,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import NoteOn
+from app.playing.keyboard import PLACES
 from app.playing.midi import LOWEST_NOTE
 from app.rendering.subject import path_of, string_of
 from app.window.controller import Controller
@@ -49,3 +50,25 @@ def test_a_note_struck_just_before_the_session_takes_another_is_of_its_preset(
     note = played.performance.notes._notes[-1]
     assert path_of(note.stroke.preset).stem == "second"
     assert (note.stroke.pluck.position, note.stroke.pluck.amplitude_mm) == (0.6, 2.5)
+
+
+def test_places_are_prepared_where_keys_choose_them_alone(
+    qtbot: QtBot, played: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared: list[list[float]] = []
+    monkeypatch.setattr(
+        played.performance.notes,
+        "prepare_plucks",
+        lambda subject, plucks: prepared.append([pluck.position for pluck in plucks]),
+    )
+    for key in (52, 55):
+        played.window.instrument.pressed.emit(key, 100)
+        qtbot.waitUntil(lambda key=key: played.instruments.latest_key == (key, None))  # type: ignore[misc]
+    qtbot.waitUntil(lambda: not played.instruments._told)
+    assert played.session.choices.string is not None
+    assert prepared == []
+    played.session.update(keys_play="place")
+    (positions,) = prepared
+    assert len(set(positions)) == PLACES
+    played.session.update(amplitude_mm=3.3)
+    assert len(prepared) == 2
