@@ -5,7 +5,7 @@ All choices are one immutable, validated value; the session replaces it and sign
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, Literal
 
 from psygnal import Signal
@@ -91,6 +91,26 @@ class Choices(BaseModel):
     def source_heard(self) -> str:
         return self.a if self.heard == "a" else self.b
 
+    @property
+    def plays_pitches(self) -> bool:
+        """Whether keys are pitches of the patch; otherwise they pluck at ten places."""
+        return self.keys_play == "pitch" and self.patch is not None
+
+    def changed(self, changes: Mapping[str, Any]) -> Choices:
+        """These choices with other values: the one way to change them. Another preset resets `string`, unless given.
+
+        Raises:
+            ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
+        """
+        if changes.get("preset", self.preset) != self.preset:
+            changes = {"string": None, **changes}
+        try:  # of the other fields, which are valid, only the slots: without them `heard` is read as an old one
+            checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        return _with_one_ear(self.model_copy(update={name: getattr(checked, name) for name in changes}), changes)
+
 
 class Session:
     """The present choices.
@@ -131,18 +151,10 @@ class Session:
             self.played.emit(names)
             self.changed.emit(names)
 
-    def _take(self, changes: dict[str, Any]) -> frozenset[str]:
-        """Returns the fields that have new values. Another preset resets `string`, unless that is given."""
-        if changes.get("preset", self._choices.preset) != self._choices.preset:
-            changes = {"string": None, **changes}
-        try:
-            new = Choices.model_validate({**dict(self._choices), **changes})
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-        new = _with_one_ear(new, changes)
-        before, self._choices = self._choices, new
-        return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
+    def _take(self, changes: Mapping[str, Any]) -> frozenset[str]:
+        """Returns the fields that have new values."""
+        before, self._choices = self._choices, self._choices.changed(changes)
+        return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(self._choices, n))
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
         """Takes the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
@@ -175,7 +187,7 @@ def _with_one_ear(choices: Choices, asked: Collection[str]) -> Choices:
         ValueError: the patch cannot be heard so.
     """
     patch = choices.patch
-    if patch is None or choices.keys_play != "pitch":
+    if patch is None or not choices.plays_pitches:
         return choices
     if "patch" not in asked and any(name in asked for name in EARS):
         heard = picked_up(patch, choices.listen, choices.listen_right, choices.stereo, choices.pickup)
