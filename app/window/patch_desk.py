@@ -233,13 +233,14 @@ class PatchDesk(QObject):
 
     def _save(self, patch: Patch, replace: Path | None = None) -> None:
         try:
-            save_patch(patch, replace)
+            saved = save_patch(patch, replace)
         except WriteError as error:
             self.told.emit(one_line(str(error)))
             return
         self.reload()
         self._session.update(patch=patch)
         self._show_patch()
+        self.browser.reveal(saved.name)
 
     def rename(self, name: str = "") -> None:
         """Asks for a new name of one of the user's own patches, by default the present one."""
@@ -261,6 +262,7 @@ class PatchDesk(QObject):
         if self.patch is not None and self.patch.name == entry.patch.name:
             self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
         self.reload()
+        self.browser.reveal(renamed.name)
 
     def delete(self, name: str) -> None:
         """Deletes one of the user's own patches."""

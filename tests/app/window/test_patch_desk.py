@@ -156,6 +156,37 @@ def test_a_patch_is_saved_renamed_and_deleted(played: Controller, monkeypatch: p
     assert "yours" not in played.patches.favourites
 
 
+def test_typing_after_an_arrow_searches_and_plays_no_key(qtbot: QtBot, played: Controller) -> None:
+    pressed: list[object] = []
+    played.instruments._keys.pressed.connect(pressed.append)
+    qtbot.waitUntil(played.window.isActiveWindow)
+    played.patches.toggle()
+    browser = played.patches.browser
+    qtbot.keyClick(browser.search, Qt.Key.Key_Down)
+    qtbot.waitUntil(browser.list.hasFocus)
+    for letter in "harp":
+        qtbot.keyClick(played.window.focusWidget(), letter)
+    assert browser.search.text() == "harp"
+    played.window.instrument.keys.setFocus()  # as by a click on a key, which the browser leaves in sight
+    for letter in "ab":
+        qtbot.keyClick(played.window.focusWidget(), letter)
+    assert browser.search.text() == "harpab"
+    assert played.session.choices.heard == "a", "B is a shortcut of the window"
+    assert pressed == []
+
+
+def test_an_old_search_does_not_hide_what_was_just_saved(played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    browser = played.patches.browser
+    for name, do in (("Mine", played.patches.save), ("Yours", played.patches.rename)):
+        browser.search.setText("harpsichord")
+        monkeypatch.setattr(QInputDialog, "getText", lambda *args, name=name, **words: (name, True))
+        do()
+        assert name.lower() in browser.listed
+        played.patches.toggle()
+        assert (browser.search.text(), browser.selected, browser._title.text()) == ("", name.lower(), name)
+        played.patches.toggle()
+
+
 def test_an_impossible_name_is_explained_and_asked_for_again(
     played: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
