@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QInputDialog
+from PySide6.QtWidgets import QInputDialog, QToolTip
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
@@ -61,6 +61,31 @@ def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_K)
     assert played.performance.live.sounding().keys() == {72}
     qtbot.keyRelease(played.window, Qt.Key.Key_K)
+
+
+def test_octave_keys_stop_where_no_key_sounds_and_the_strip_says_so(qtbot: QtBot, played: Controller) -> None:
+    played.patches.choose("toy_wires")  # C3 to D♯6
+    for key, octave, words in ((Qt.Key.Key_Z, -1, "Lowest"), (Qt.Key.Key_X, 3, "Highest")):
+        QToolTip.hideText()
+        for _ in range(6):
+            press(qtbot, played, key)
+        assert played.session.choices.octave == octave
+        assert QToolTip.text() == f"{words} octave: Toy wires has C3 to D♯6"
+    assert played.window.instrument.bar.octave.text() == "from C6"
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding().keys() == {84}
+    played.window.instrument.bar.octave_asked.emit(1)
+    assert played.session.choices.octave == 3
+
+
+def test_the_octave_moves_into_the_range_of_another_instrument(qtbot: QtBot, played: Controller) -> None:
+    played.session.update(octave=2)  # C5 to F6
+    played.patches.choose("slack_bass")
+    assert played.session.choices.octave == 0
+    assert QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
+    assert played.window.instrument.bar.octave.text() == "from C3"
+    played.patches.choose("concert_harp")
+    assert played.session.choices.octave == 0, "keys sound there"
 
 
 def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller) -> None:
