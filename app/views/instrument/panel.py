@@ -166,9 +166,9 @@ class InstrumentPanel(QFrame):
         self.keys.set_range(low, high)
         self.neck.set_range(low, high)
 
-    def set_octave(self, octave: int) -> None:
-        """The octave of the lowest of the computer's keys; C4 is middle C."""
-        self.bar.show_octave(octave)
+    def set_octave(self, octave: int, lowest: int, highest: int) -> None:
+        """The octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
+        self.bar.show_octave(octave, lowest, highest)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
         """What the computer's keys play, of KEYS_PLAY; `possible`: whether there is a patch for pitches."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QToolTip, QVBoxLayout, QWidget
 
 from app.patches.patch import MOST_MACROS, Macro, Patch, TuningChoice
 from app.shared.parameters import MACRO, OF_PATCHES
@@ -22,6 +22,8 @@ from engine.plain_text import one_line
 ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
 LONGEST_SCALE_NAME = 120  # characters
+SAID_MS = 2_500  # a text that says why the octave stops or moves
+SAID_ABOVE = 44  # pixels
 COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
 MIXES = ("body.mix", "room.mix", "level_db")
 
@@ -166,7 +168,7 @@ class PatchBar(QFrame):
         row.addWidget(self.note, 1)
         for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)
-        self.show_octave(3)
+        self.show_octave(3, 3, 3)
         self.show_velocity(90)
         self.show_recording(None)
         self.show_note("")
@@ -275,9 +277,17 @@ class PatchBar(QFrame):
         of = f" of {most}" if most is not None else ""
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
-    def show_octave(self, octave: int) -> None:
-        """The octave of the lowest of the computer's keys."""
+    def show_octave(self, octave: int, lowest: int, highest: int) -> None:
+        """The octave of the lowest of the computer's keys, of those at which a key sounds."""
         self.octave.setText(f"from C{octave}")
+        self._lower.setEnabled(octave > lowest)
+        self._higher.setEnabled(octave < highest)
+
+    def say_octave(self, text: str) -> None:
+        """Shows above the octave, for SAID_MS, why it is what it is."""
+        if self.octave.isVisible():
+            place = self.octave.mapToGlobal(QPoint(0, -SAID_ABOVE))
+            QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)
 
     def show_velocity(self, velocity: int) -> None:
         """With which the computer's keys strike."""
