@@ -16,7 +16,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from app.analysis.abx.subject import subject_of
+from app.analysis.abx.record import subject_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn

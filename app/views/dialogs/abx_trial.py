@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from app.analysis.abx.sound import Candidate
+from app.analysis.abx.record import Candidate
 from app.views.controls.parts import label
 from app.views.controls.plain import Label
 
