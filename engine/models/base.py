@@ -87,7 +87,8 @@ class StringModel(nn.Module, ABC, Generic[State]):
                 `sine_transform.listening_weights`; None decodes on the whole grid. Fewer points cost less.
 
         Returns:
-            displacement (batch, steps, points or grid_points) in normalised units, and the last state.
+            displacement (batch, steps, points or grid_points) in normalised units and the model's own precision,
+            and the last state.
         """
 
     @torch.no_grad()

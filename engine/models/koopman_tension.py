@@ -268,7 +268,6 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         if state.step_size is None:
             state = self._set_out(state, step, size)
         to_points = self.shapes if readout is None else self.shapes @ readout.double()
-        to_points = to_points.to(torch.get_default_dtype())
         blocks, done = [], 0
         while done < steps:
             count = min(FRAMES_AT_ONCE, steps - done)
@@ -276,7 +275,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             amplitudes, state = (self._compiled if compiled else self._plain)(state, step, count)
             if frames is not None:
                 amplitudes = amplitudes[:, frames[(frames > done) & (frames <= done + count)] - done - 1]
-            blocks.append(amplitudes.to(to_points.dtype) @ to_points)
+            blocks.append(amplitudes @ to_points)
             done += count
         return torch.cat(blocks, dim=1), state
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from fractions import Fraction
 
 import pytest
@@ -141,7 +142,7 @@ def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
     with torch.no_grad():
         amplitudes = model.amplitudes(model.release(released), 50)
     torch.testing.assert_close(torch.cat([together, rest], dim=1).detach(), alone.detach(), rtol=0, atol=1e-5)
-    torch.testing.assert_close((amplitudes @ model.shapes).float(), alone.detach(), rtol=0, atol=1e-5)
+    torch.testing.assert_close(amplitudes @ model.shapes, alone.detach(), rtol=0, atol=1e-5)
     assert state.nodes is not None
     assert state.nodes.tolist() == [5, 2, 3, 2]
 
@@ -210,6 +211,24 @@ def test_the_compiled_loop_of_a_ringing_string_is_the_definition() -> None:
     with torch.no_grad():
         compiled, _ = model.advance(model.encode(displacement, velocity), 300)
     torch.testing.assert_close(compiled, plain.detach(), rtol=0, atol=1e-6)
+
+
+@pytest.fixture
+def double_by_default() -> Iterator[None]:
+    torch.set_default_dtype(torch.float64)
+    yield
+    torch.set_default_dtype(torch.float32)
+
+
+def test_the_precision_is_the_models_own(double_by_default: None) -> None:
+    """Not that of tensors that are made without one, which a program may set for itself."""
+    displacement, model = pluck_m(NYLON, 25, 0.4), made(NYLON, 25, "series")
+    with torch.no_grad():
+        double = model(displacement / 1e-3, 10)
+        torch.set_default_dtype(torch.float32)
+        single = model(displacement / 1e-3, 10)
+    assert double.dtype == single.dtype == model.shapes.dtype
+    assert torch.equal(double, single)
 
 
 def test_gradients_reach_every_curve() -> None:
