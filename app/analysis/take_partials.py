@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from app.analysis.job import Job
 from app.rendering import Take
+from app.shared.worker import Job
 from engine.partials import (
     LEAST_SEGMENTS,
     MOST_SIMILAR,

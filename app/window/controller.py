@@ -330,7 +330,7 @@ class Controller(QObject):
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:
-            panel.close()
+            panel.end()
         self.performance.close()
         self.sound.close()
 
@@ -402,7 +402,7 @@ class Controller(QObject):
             self.audio.show(status, performance.notes, take)
         moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
         for panel in self.panels:
-            if isinstance(panel, StringPanel) and panel.view.isVisible():
+            if isinstance(panel, StringPanel) and panel.isVisible():
                 panel.show_moment(moment)
         self._deck_timer.start()
         self.patches.tick()
@@ -421,7 +421,7 @@ class Controller(QObject):
         elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
         moment = Moment(performance.take, performance.position_s, performance.moving, elapsed_s)
         for panel in self.panels:
-            if not isinstance(panel, StringPanel) and panel.on_the_left == on_the_left and panel.view.isVisible():
+            if not isinstance(panel, StringPanel) and panel.on_the_left == on_the_left and panel.isVisible():
                 panel.show_moment(moment)
 
     def _show_level(self, elapsed_s: float) -> None:

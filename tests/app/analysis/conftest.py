@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.analysis.job import Cancelled
 from app.rendering import Take
+from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import read_info
 from engine.voices import Ear
@@ -44,7 +44,7 @@ class RecordingJob:
         if self.cancel_after is not None and len(self.shares) >= self.cancel_after:
             raise Cancelled
 
-    def report(self, share: float, so_far: object = None) -> None:
+    def report(self, share: float, text: str = "", so_far: object = None) -> None:
         self.check()
         self.shares.append(share)
         if so_far is not None:

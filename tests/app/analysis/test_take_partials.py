@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from app.analysis.job import Cancelled, Job
 from app.analysis.take_partials import take_partials
 from app.rendering import Take
+from app.shared.worker import Cancelled, Job
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
 from engine.resonators.sine_transform import to_grid, to_modes

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from app.commands.benchmarks.tune import pitch_hz
+
 from app.instrument.glide import START_S, glides_cents
 from app.instrument.offline import render_note
 from app.instrument.strings import Strings

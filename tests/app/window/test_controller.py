@@ -28,7 +28,7 @@ LEFT = Qt.MouseButton.LeftButton
 
 def view(controller: Controller, key: str) -> Any:
     """The view of a panel."""
-    return next(panel.view for panel in controller.panels if panel.key == key)
+    return next(getattr(panel, "view", panel) for panel in controller.panels if panel.key == key)
 
 
 def notes(controller: Controller) -> list[Note]:

@@ -311,7 +311,7 @@ def drop(controller: Controller, *files: Path) -> None:
 
 def test_a_file_over_any_view_reaches_the_window(controller: Controller) -> None:
     window = controller.window
-    for view in (panel.view for panel in controller.panels):
+    for view in controller.panels:
         under = view.childAt(view.rect().center()) or view
         while under is not window:
             assert not under.acceptDrops(), under

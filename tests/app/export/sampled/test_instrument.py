@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from app.commands.benchmarks.tune import pitch_hz
 from numpy.typing import NDArray
 
-from app.commands.benchmarks.tune import pitch_hz
 from app.export.sampled.job import export_sampled, note_renderer
 from app.export.sampled.plan import SampledPlan
 from app.instrument.offline import render_note
