@@ -117,9 +117,10 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
 
 class AnyFrameModel(StringModel[State]):
-    """A model of which some frames can be had for little more than their own cost.
+    """A model that computes some frames of a motion in much less time than all of them.
 
-    Any can be had without those before it, or it is the frames' shapes that cost, not the way to them.
+    Most compute any frame by itself. `koopman_tension` steps through all frames and computes the wanted shapes alone;
+    they are the larger part of its cost.
     """
 
     @abstractmethod
