@@ -107,6 +107,13 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
+    @torch.no_grad()
+    def check_physics(self, physics: Physics) -> None:
+        """Raises ValueError, naming the tensor, where the model holds another resonator than this one.
+
+        A model that learned one string holds none: its weights are all there is of it.
+        """
+
     def release(self, displacement: Tensor) -> State:
         """As `encode`, by the name of what happens to the string."""
         return self.encode(displacement)
