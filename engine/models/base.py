@@ -107,6 +107,13 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
+    @torch.no_grad()
+    def check_physics(self, physics: Physics) -> None:
+        """Raises ValueError, naming the tensor, where the model holds another resonator than this one.
+
+        A model that learned one string holds none: its weights are all there is of it.
+        """
+
     def release(self, displacement: Tensor) -> State:
         """As `encode`, by the name of what happens to the string."""
         return self.encode(displacement)
@@ -117,9 +124,10 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
 
 class AnyFrameModel(StringModel[State]):
-    """A model of which some frames can be had for little more than their own cost.
+    """A model that computes some frames of a motion in much less time than all of them.
 
-    Any can be had without those before it, or it is the frames' shapes that cost, not the way to them.
+    Most compute any frame by itself. `koopman_tension` steps through all frames and computes the wanted shapes alone;
+    they are the larger part of its cost.
     """
 
     @abstractmethod

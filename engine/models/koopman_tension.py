@@ -60,6 +60,7 @@ SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
 HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
 MOST_NODES = 3  # times as many as a soft pluck has
+SAME_RESONATOR = 1e-9  # relative: processors round logarithms and sines differently
 LEAST_PHASE = 0.02  # between nodes: a voice of more would take too much of the device's time
 
 
@@ -190,6 +191,17 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             getattr(other, name).copy_(getattr(self, name))
         other._take(physics)
         return other.train(self.training)
+
+    @torch.no_grad()
+    def check_physics(self, physics: Physics) -> None:
+        """See the contract."""
+        other = KoopmanTension(self.configuration)
+        other._take(physics)
+        own = dict(self.named_buffers())
+        for name, expected in other.named_buffers():
+            largest = float(expected.abs().max())
+            if not torch.allclose(own[name], expected, rtol=SAME_RESONATOR, atol=1e-3 * SAME_RESONATOR * largest):
+                raise ValueError(f"tensor {name!r} is of another string, or of other modes, rate_hz or scale_m")
 
     def encode(self, displacement: Tensor, velocity: Tensor | None = None) -> KoopmanTensionState:
         """See the contract; here of strings that may ring.
