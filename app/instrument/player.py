@@ -71,6 +71,7 @@ class Struck:
         gain: the factor of its voices.
         voices: by source.
         parameters: of the string, with bends, slides, dampers and knobs.
+        begin_frame: of the mixer, for which it was struck; 0: at once.
         held: whether the key is down.
         kept: whether it was released while the pedal was down.
         damped: whether the damper is on it.
@@ -85,6 +86,7 @@ class Struck:
     gain: float
     voices: dict[str, Voice]
     parameters: StringParameters
+    begin_frame: int = 0
     held: bool = True
     kept: bool = False
     damped: bool = False
@@ -94,8 +96,13 @@ class Struck:
         """Whether all its voices have ended."""
         return all(voice.over for voice in self.voices.values())
 
-    def retune(self, parameters: StringParameters, seconds: float) -> None:
-        """Lets the voices glide to the modes of other parameters."""
+    @property
+    def scheduled(self) -> bool:
+        """Whether the frame for which it was struck is still to come."""
+        return self.begin_frame > 0 and all(voice.waits for voice in self.voices.values())
+
+    def retune(self, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
+        """Lets the voices glide to the modes of other parameters, from a frame of the mixer on."""
         self.parameters = parameters
         own = self.key.resonator
         modes = own.modes
@@ -107,7 +114,7 @@ class Struck:
             stretch=parameters.wavenumbers(modes).square(),
         )
         for voice in self.voices.values():
-            voice.retune(resonator, seconds)
+            voice.retune(resonator, seconds, frame)
 
 
 class Player:
@@ -143,6 +150,7 @@ class Player:
         self._ringing: dict[Place, Struck] = {}
         self._all: list[Struck] = []  # with those whose place was struck again, until they are over
         self._listens: Ear | None = None
+        self._frame = 0  # at which the event counts that is being handled
         self._take(patch)
 
     # What is played
@@ -214,32 +222,42 @@ class Player:
 
     # Events
 
-    def handle(self, event: Event) -> Struck | None:
+    def handle(self, event: Event, frame: int = 0) -> Struck | None:
         """Plays an event; what it struck, or None.
+
+        Args:
+            frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. Events
+                of frames to come must be given in their order. 0: at once.
 
         Raises:
             ValueError: a key has no possible string.
         """
         with self._lock:
-            if isinstance(event, NoteOn):
-                return self._note_on(event)
-            if isinstance(event, NoteOff):
-                self._note_off(event)
-            elif isinstance(event, Bend):
-                self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
-                self._follow_bend(event.channel)
-            elif isinstance(event, Controller):
-                self._controller(event)
-            else:
-                self.set_patch(event.patch)
-        return None
+            self._frame = frame
+            try:
+                return self._play(event)
+            finally:
+                self._frame = 0
+
+    def cancel(self) -> None:
+        """Ends strings that were struck for frames to come, without a sound; others have their places again."""
+        with self._lock:
+            for struck in self._all:
+                if struck.scheduled:
+                    for voice in struck.voices.values():
+                        voice.release(STOP_S)
+            self._all = [struck for struck in self._all if not (struck.over or struck.scheduled)]
+            self._ringing = {struck.place: struck for struck in self._all}
 
     def stop(self, seconds: float = STOP_S) -> None:
         """Lets all strings fade out, and forgets them."""
         with self._lock:
             for struck in self._all:
                 for voice in struck.voices.values():
-                    voice.release(seconds)
+                    if self._frame > 0:
+                        voice.release_at(self._frame)
+                    else:
+                        voice.release(seconds)
             self._ringing.clear()
             self._all.clear()
 
@@ -285,6 +303,20 @@ class Player:
         self._ringing = {place: struck for place, struck in self._ringing.items() if not struck.over}
         return list(self._ringing.values())
 
+    def _play(self, event: Event) -> Struck | None:
+        if isinstance(event, NoteOn):
+            return self._note_on(event)
+        if isinstance(event, NoteOff):
+            self._note_off(event)
+        elif isinstance(event, Bend):
+            self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
+            self._follow_bend(event.channel)
+        elif isinstance(event, Controller):
+            self._controller(event)
+        else:
+            self.set_patch(event.patch)
+        return None
+
     def _note_on(self, event: NoteOn) -> Struck | None:
         if event.velocity <= 0:
             self._note_off(NoteOff(event.key, event.channel))
@@ -309,8 +341,10 @@ class Player:
                     voice.stops(ringing, PLUCK_STOPS_S)
                 elif not ringing.over:
                     voice.continues(ringing)
+        for voice in voices.values():
+            voice.begin_at(self._frame)
         own = key.string.parameters
-        struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own)
+        struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own, self._frame)
         parameters = self._with_hands(struck)
         if parameters != own:
             struck.retune(parameters, 0.0)
@@ -447,7 +481,7 @@ class Player:
     def _retune(self, struck: Struck, seconds: float) -> None:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
-            struck.retune(parameters, seconds)
+            struck.retune(parameters, seconds, self._frame)
 
 
 def is_another(patch: Patch, than: Patch) -> bool:

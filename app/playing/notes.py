@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from app.audio.sound import Sound, SoundStatus
 from app.playing.ahead import Ahead, AheadVoice
+from app.playing.due import Due
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
 from app.rendering.subject import Subject
@@ -173,27 +174,40 @@ class Notes:
             begin()
         return note
 
-    def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float) -> Note:
+    def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float, due: Due | None = None) -> Note:
         """A note of given voices, which have the rate of the present mixer; it sounds with the next quantum.
 
         It ends when the device changes its rate. All its sources have the gain of the stroke: they are not matched.
 
         Args:
-            struck_s: when the gesture was, by `now_s`.
+            struck_s: when the gesture was, by `now_s`; 0 where there was none.
+            due: when it sounds instead.
         """
-        note = Note(stroke)
+        mixer = self._sound.mixer
+        note = Note(stroke, begin_frame=0 if due is None else due.frame_in(mixer))
         note.adopted, note.voices, note.match = True, dict(voices), dict.fromkeys(voices, 1.0)
         for voice in voices.values():
             voice.set_struck(struck_s)
+            voice.begin_at(note.begin_frame)
         with self._lock:
             self._notes.append(note)
-        if not self._hand_over(note, self._sound.mixer):
+        if not self._hand_over(note, mixer):
             note.end()
         return note
 
     def now_s(self) -> float:
         """The clock by which gestures are timed."""
         return self._sound.now_s()
+
+    @property
+    def mixer(self) -> Mixer:
+        """The present one, whose frames are the time of events."""
+        return self._sound.mixer
+
+    @property
+    def buffer_s(self) -> float:
+        """The length of the device's buffer: so much may be rendered at once."""
+        return self._sound.status().latency_s
 
     @property
     def rate_hz(self) -> int:

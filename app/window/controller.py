@@ -22,6 +22,7 @@ from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn
 from app.instrument.player import Struck
 from app.playing.chosen import mix_of
+from app.playing.due import Due
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices, Session
 from app.session.history import History
@@ -232,11 +233,11 @@ class Controller(QObject):
         if self._abx is None:
             self.performance.strike(choices)
 
-    def _handle(self, event: Event) -> Struck | None:
+    def _handle(self, event: Event, due: Due | None) -> Struck | None:
         """An event of an instrument; called in the instrument's thread."""
         if self._abx is not None and isinstance(event, NoteOn):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.performance.handle(event)
+        return self.performance.handle(event, due)
 
     def play_or_stop(self) -> None:
         if self._abx is None:

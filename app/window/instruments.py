@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn
 from app.instrument.player import Struck
 from app.patches.patch import Patch, PhysicalString
+from app.playing.due import Due
 from app.playing.keyboard import LOWEST_C, KeyPress, Reach, play, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.presets.library import Library
@@ -48,7 +49,7 @@ class Instruments(QObject):
         library: Library,
         midi: MidiChoices,
         strike: Callable[[Choices], object],
-        handle: Callable[[Event], Struck | None],
+        handle: Callable[[Event, Due | None], Struck | None],
     ) -> None:
         super().__init__(window)
         self._session = session
@@ -98,12 +99,12 @@ class Instruments(QObject):
         self._keys.piano = self.plays_pitches
         self.midi.show_patch(self._session.choices.patch)
 
-    def play(self, event: Event) -> bool:
-        """Plays an event through the patch. Any thread. False where no patch is chosen."""
+    def play(self, event: Event, due: Due | None = None) -> bool:
+        """Plays an event through the patch, at once or when it is due. Any thread. False where no patch is chosen."""
         choices = self._session.choices
         if choices.patch is None:
             return False
-        struck = self._handle(event)
+        struck = self._handle(event, due)
         if struck is not None:
             self.latest = choices.patch, struck
             self.latest_key = struck.event.key, struck.string

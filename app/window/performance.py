@@ -20,6 +20,7 @@ from app.instrument.events import Event
 from app.instrument.player import Struck
 from app.patches.patch import Patch
 from app.playing.chosen import mix_of, render_request, stroke_of, subject_of
+from app.playing.due import Due
 from app.playing.keyboard import PLACES, Reach
 from app.playing.live import Live
 from app.playing.notes import Note, Notes
@@ -154,9 +155,9 @@ class Performance(QObject):
         self._latest = note
         return note
 
-    def handle(self, event: Event) -> Struck | None:
+    def handle(self, event: Event, due: Due | None = None) -> Struck | None:
         """Plays an event through the patch. Any thread; `follow` then shows it. None where it struck no string."""
-        made = self.live.handle(event)
+        made = self.live.handle(event, due)
         if made is None:
             return None
         struck, self._latest = made

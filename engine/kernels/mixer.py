@@ -56,7 +56,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     for place in range(counts[at.M_ACTIVE]):  # before any sounds on
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)
-        while whole[at.BEFORE] != 0 and whole[at.BEGIN_AT] <= counts[at.M_FRAMES]:
+        while whole[at.BEFORE] != 0 and whole[at.BEGIN_AT] < counts[at.M_FRAMES] + at.QUANTUM:
             take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0

@@ -93,25 +93,25 @@ def _velocity(
 
 @njit(**COMPILED)
 def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
-    """The string of the voice before is this one's as it begins: its motion is stopped, or this pluck added to it."""
+    """The string of the voice before is this one's as it begins: its motion is stopped, or this pluck added to it.
+
+    One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
+    the voice before that one, which is left as what is to be taken over.
+    """
     counts = voice.view(np.int64)
     before = carray(pointer(counts[at.BEFORE]), (1 << 40,), np.float64)
-    stops = counts[at.STOPS_IN]
-    earlier = _stop(before, stops) if stops > 0 else _join(voice, before, now, scratch)
+    befores = before.view(np.int64)
+    stops, waits, earlier = counts[at.STOPS_IN], befores[at.STATE] == at.WAITING, 0
+    later = befores[at.BEGIN_AT] >= now + at.QUANTUM and befores[at.JOINS] == 0
+    if waits and (later or stops > 0):
+        _never_begin(before)
+        earlier = befores[at.BEFORE]
+    elif stops == 0:
+        _join(voice, before, now, scratch)
+    elif befores[at.RELEASE] == 0:
+        befores[at.RELEASE] = stops
     fence()
     counts[at.BEFORE] = earlier
-
-
-@njit(**COMPILED)
-def _stop(before: np.ndarray, frames: int) -> int:
-    """A voice fades out in so many frames; one that waits never sounds. The address of the one before it, or 0."""
-    befores = before.view(np.int64)
-    if befores[at.STATE] == at.WAITING:
-        _never_begin(before)
-        return befores[at.BEFORE]
-    if befores[at.RELEASE] == 0:
-        befores[at.RELEASE] = frames
-    return 0
 
 
 @njit(inline="always", **COMPILED)
@@ -122,14 +122,13 @@ def _never_begin(voice: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
-def _join(voice: np.ndarray, before: np.ndarray, now: int, scratch: np.ndarray) -> int:
+def _join(voice: np.ndarray, before: np.ndarray, now: int, scratch: np.ndarray) -> None:
     """The pluck is added to the motion of the voice before, which fades as this one begins.
 
-    One that has not begun yet is not heard at all: both plucks are this voice's, and so is what is left to do with
-    the one before it, whose address this gives; else 0. Where it is over, or of another kind, the string is at rest.
+    One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
+    kind, the string is at rest.
     """
     counts, befores = voice.view(np.int64), before.view(np.int64)
-    earlier = 0
     rings = befores[at.STATE] == at.SOUNDING and befores[at.GENERATED] > 0
     waits = befores[at.STATE] == at.WAITING and befores[at.PREPARED] == 0
     if (rings or waits) and befores[at.KIND] == counts[at.KIND]:
@@ -149,18 +148,15 @@ def _join(voice: np.ndarray, before: np.ndarray, now: int, scratch: np.ndarray) 
             speeds[mode] += v[mode]
             widest += math.sqrt(q[mode] ** 2 + v[mode] ** 2 / row(voice, n, at.OMEGA_SQUARED)[mode])
         voice[at.LIMIT] *= 1 + widest / voice[at.PEAK]
+        counts[at.LATE] = befores[at.LATE]
         if waits:
             counts[at.BEGIN_AT] = max(counts[at.BEGIN_AT], befores[at.BEGIN_AT])
-            earlier = befores[at.BEFORE]
-            if earlier != 0:
-                counts[at.STOPS_IN] = befores[at.STOPS_IN]
             _never_begin(before)
         else:  # what senses velocity has been generated further than it is heard: so much later this one begins
             counts[at.BEGIN_AT] = now + befores[at.GENERATED] - befores[at.FRAME]
             befores[at.FADE_FRAMES] = max(1, counts[at.ATTACK])
             befores[at.RELEASE_AT] = max(1, counts[at.BEGIN_AT])
         counts[at.JOINS] = joins
-    return earlier
 
 
 @njit(**COMPILED)
@@ -181,6 +177,21 @@ def _past(voice: np.ndarray, before: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
+def _look_at_wishes(voice: np.ndarray, now: int) -> None:
+    """Goes on to the latest modes that are due. Wishes count in their order, and wait for those before them."""
+    counts = voice.view(np.int64)
+    latest = counts[at.RESONATOR]
+    wished = counts[at.WISHES] if latest == 0 else carray(pointer(latest), (at.B_HEADER,), np.int64)[at.B_NEXT]
+    while wished != 0:
+        fence()
+        block = carray(pointer(wished), (at.B_HEADER,), np.int64)
+        if block[at.B_AT] > now:
+            break
+        counts[at.RESONATOR] = wished
+        wished = block[at.B_NEXT]
+
+
+@njit(**COMPILED)
 def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     """Adds the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
     counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
@@ -189,8 +200,16 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
     now, rate_hz = mix_counts[at.M_FRAMES], mixer[at.M_RATE]
-    if counts[at.BEGIN_AT] > now and counts[at.STATE] == at.WAITING:
-        return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
+    if counts[at.STATE] == at.WAITING:
+        if counts[at.BEGIN_AT] >= now + quantum:
+            return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
+        counts[at.LATE] = max(counts[at.LATE], counts[at.BEGIN_AT] - now)
+    late, left_over = counts[at.LATE], voice[at.left_over(counts[at.MODES]) : at.state(counts[at.MODES])]
+    for frame in range(late):
+        mix[frame, 0] += left_over[2 * frame]
+        mix[frame, 1] += left_over[2 * frame + 1]
+        left_over[2 * frame] = left_over[2 * frame + 1] = 0.0
+    _look_at_wishes(voice, now + late)
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
         counts[at.RELEASE] = counts[at.FADE_FRAMES]
     if counts[at.FRAME] >= counts[at.ENDS_AT] and counts[at.RELEASE] == 0:
@@ -235,16 +254,22 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
                     gain *= (first + frame + 1) / attack
                 else:
                     gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
-            mix[frame, 0] += gain * out[0, frame]
-            mix[frame, 1] += gain * out[points - 1, frame]
+            place = frame + late
+            if place < quantum:
+                mix[place, 0] += gain * out[0, frame]
+                mix[place, 1] += gain * out[points - 1, frame]
+            else:
+                left_over[2 * (place - quantum)] = gain * out[0, frame]
+                left_over[2 * (place - quantum) + 1] = gain * out[points - 1, frame]
         counts[at.GAIN_DONE] = min(done + quantum, length)
         voice[at.GAIN] = goal if done + quantum >= length else source + (goal - source) * ((done + quantum) / length)
     if counts[at.GENERATED] > generated:  # else it stands still
         if counts[at.BEGAN_FRAME] < 0:
-            counts[at.BEGAN_FRAME] = mix_counts[at.M_FRAMES]
+            counts[at.BEGAN_FRAME] = now + late
             voice[at.BEGAN_S] = now_s
         counts[at.FRAME] += quantum
-    if release > 0 and (not heard or (voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0)):
+    faded = voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0 and late == 0
+    if release > 0 and (not heard or faded):
         return at.OVER
     if release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
         counts[at.RELEASE] = max(1, round(END_S * rate_hz))
@@ -270,6 +295,7 @@ def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
     if counts[at.KIND] == at.RENDERED:  # there need not be samples yet
         counts[at.GENERATED] = quanta * at.QUANTUM
         quanta = 0
+    _look_at_wishes(voice, 0)
     for _ in range(quanta):
         _generate(voice, False, mixer[at.M_RATE], out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     counts[at.FRAME] = counts[at.GENERATED]

@@ -152,6 +152,11 @@ class Mixer:
         self._counts[at.M_TONE_LENGTH] = self.rate_hz
 
     @property
+    def frames(self) -> int:
+        """Of sound, given so far."""
+        return int(self._counts[at.M_FRAMES])
+
+    @property
     def seconds(self) -> float:
         """Of sound, given so far."""
         return float(self._counts[at.M_FRAMES]) / self.rate_hz

@@ -153,11 +153,14 @@ class Voice:
         self.memory[at.GAIN_FROM] = self.memory[at.GAIN_TO] = gain
 
     def begin_at(self, frame: int) -> None:
-        """Before it is handed over: it waits for this frame of the mixer."""
+        """Before it is handed over: it begins at this frame of the mixer, or with the next quantum if that is past.
+
+        One that is added to the motion of another begins with a quantum of that one, less than a quantum off.
+        """
         self._counts[at.BEGIN_AT] = frame
 
     def release_at(self, frame: int) -> None:
-        """It fades out from this frame of the mixer on; 0: it does not."""
+        """It fades out from the first quantum on that begins at this frame of the mixer or later; 0: it does not."""
         self._counts[at.RELEASE_AT] = frame
 
     def fade_out_by(self, seconds: float) -> None:
@@ -166,6 +169,11 @@ class Voice:
         if self._counts[at.ENDS_AT] + self._counts[at.ENDS_IN] > end:
             self._counts[at.ENDS_AT] = max(0, min(int(self._counts[at.ENDS_AT]), end - fade))
             self._counts[at.ENDS_IN] = fade
+
+    @property
+    def waits(self) -> bool:
+        """Whether it has not begun."""
+        return bool(self._counts[at.STATE] == at.WAITING)
 
     @property
     def began_frame(self) -> int:
@@ -193,10 +201,13 @@ class Voice:
         self.ear = ear
         return True
 
-    def retune(self, resonator: Resonator, seconds: float = 0.005) -> None:
+    def retune(self, resonator: Resonator, seconds: float = 0.005, frame: int = 0) -> None:
         """Other modes while it rings, as a tension, a length or a damping that changes: it gets there evenly.
 
         Amplitude and speed of each mode go on. Any one thread; the latest wish counts.
+
+        Args:
+            frame: of the mixer, from which they count, within a quantum; they wait for those wished for before.
 
         Raises:
             ValueError: the voice has no modes of its own, or not so many.
@@ -204,14 +215,18 @@ class Voice:
         if self.program.resonator is None or resonator.modes != self.program.modes:
             raise ValueError(f"a voice with {self.program.modes} modes cannot take {resonator.modes} others")
         block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
-        block.view(np.int64)[at.B_QUANTA] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM))
+        own = block.view(np.int64)
+        own[at.B_QUANTA], own[at.B_AT] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM)), frame
         taken = int(self._counts[at.TAKEN])
         for place, each in enumerate(self._blocks):
             if int(each.ctypes.data) == taken:
                 del self._blocks[:place]
                 break
+        if self._blocks:
+            publish(self._blocks[-1].view(np.int64), at.B_NEXT, block.ctypes.data)
+        else:
+            publish(self._counts, at.WISHES, block.ctypes.data)
         self._blocks.append(block)
-        publish(self._counts, at.RESONATOR, block.ctypes.data)
 
     def continues(self, before: Voice) -> None:
         """Before it is handed over: it is the same string, plucked again while `before` rings on.
@@ -303,4 +318,4 @@ def _rows(resonator: Resonator) -> NDArray[np.float64]:
 
 
 def _state(modes: int) -> int:
-    return at.HEADER + 8 * modes + 4 + 6 * at.QUANTUM
+    return at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM

@@ -75,7 +75,7 @@ def test_samples_and_voices_are_published_when_they_are_there(published: Publish
     ("tell", "slot"),
     [
         (lambda voice: voice.listen(Ear((0.2,))), at.NEXT_WEIGHTS),
-        (lambda voice: voice.retune(StringParameters().resonator(4)), at.RESONATOR),
+        (lambda voice: voice.retune(StringParameters().resonator(4)), at.WISHES),
     ],
     ids=["listening points", "modes"],
 )

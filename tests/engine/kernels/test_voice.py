@@ -250,14 +250,53 @@ def test_one_that_never_ends_does_not(small_info: Callable[[bool], PresetInfo], 
     assert not voice.over
 
 
-@pytest.mark.parametrize(("frame", "begins"), [(1, 64), (640, 640), (641, 704)])
-def test_it_begins_at_the_quantum_that_it_is_told(frame: int, begins: int) -> None:
+@pytest.mark.parametrize("frame", [0, 1, 63, 64, 640, 641, 703])
+def test_it_begins_at_the_frame_that_it_is_told(frame: int) -> None:
     voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
     voice.begin_at(frame)
+    assert voice.waits
     mixer.add(voice)
     found = mixer.render(1000)[:, 0]
-    assert int(np.argmax(found != 0)) == begins == voice.began_frame
+    assert int(np.argmax(found != 0)) == frame == voice.began_frame
     assert voice.sounding
+
+
+@KINDS
+@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
+@pytest.mark.parametrize("frame", [1, 700, 1023])
+def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
+    kind: str, pickup: str, frame: int, struck: Strike, rung: Rung
+) -> None:
+    """All of it, with a change of gain and the release, later by so many frames."""
+    ear = Ear((0.3, 0.6), "velocity" if pickup == "velocity" else "displacement")
+
+    def rendered(begins: int) -> Signal:
+        voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
+        voice.begin_at(begins)
+        mixer.add(voice)
+        first = -(-(begins + 1) // at.QUANTUM) * at.QUANTUM + 1280 if begins else 1280 + at.QUANTUM
+        parts = [mixer.render(first)]
+        voice.set_gain(0.5)
+        parts.append(mixer.render(640))
+        voice.release(0.003)  # it ends within a quantum
+        parts.append(mixer.render(640))
+        assert voice.over
+        return np.concatenate(parts)
+
+    at_once, later = rendered(0), rendered(frame)
+    assert not later[:frame].any()
+    np.testing.assert_array_equal(later[frame : frame + len(at_once) - 64], at_once[:-64])
+    assert np.abs(later[frame + len(at_once) - 64 :]).max() == 0
+
+
+@pytest.mark.parametrize("frame", [100, 4_000])
+def test_one_whose_frame_is_past_begins_with_the_next_quantum(frame: int) -> None:
+    voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
+    mixer.render(4_000)
+    voice.begin_at(frame)
+    mixer.add(voice)
+    mixer.render(100)
+    assert voice.began_frame == 4_032
 
 
 def test_it_is_released_at_the_quantum_that_it_is_told() -> None:
