@@ -156,6 +156,7 @@ QMainWindow, QDialog {{ background: {BACKGROUND}; }}
 QFrame#rule {{ background: {LINE}; }}
 QFrame#panel {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: 6px; }}
 QFrame#panel QScrollArea, QFrame#panel QScrollArea > QWidget > QWidget {{ background: transparent; }}
+QFrame#notice {{ background: {RAISED}; border: 1px solid {FAINT}; border-radius: 6px; }}
 QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius: 8px; }}
 QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
 QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}

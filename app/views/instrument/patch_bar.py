@@ -20,7 +20,7 @@ from app.views.controls.plain import Label, plain_tip
 from engine.plain_text import one_line
 
 ROOMY_MACROS = 6  # more of them are drawn narrow
-NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
+NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
 LONGEST_SCALE_NAME = 120  # characters
 SAID_MS = 2_500  # a text that says why the octave stops or moves
 SAID_ABOVE = 44  # pixels
@@ -203,9 +203,10 @@ class PatchBar(QFrame):
             self._share_width()
 
     def _share_width(self) -> None:
-        close = self._compact or len(self._macros) > ROOMY_MACROS
+        many = len(self._macros) > ROOMY_MACROS
+        close = self._compact or many
         self.category.setVisible(not close and bool(self.category.text()))
-        self.name.setMinimumWidth(NARROWEST_NAME if close else NARROW_NAME)
+        self.name.setMinimumWidth(NARROWEST_NAME if many else NARROW_NAME)
         for knob in self.macros:
             knob.set_narrow(close)
 

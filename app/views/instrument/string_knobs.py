@@ -84,7 +84,7 @@ class StringKnobs(QWidget):
         self.facts = Facts()
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
+        row.setSpacing(5)
         for number, group in enumerate(GROUPS):
             if number:
                 row.addWidget(vertical_rule())
