@@ -37,7 +37,7 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
     def heard(take: Take, ear: Ear) -> None:
         listened = Listened(ear)
         for name in (*SOURCES, *take.others):
-            motion = take.motion(name)
+            motion = take.motions[name]
             frames_m, rate_hz = motion.read(), round(motion.rate_hz)
             signal = listened.signals[name] = Signal(rate_hz, len(ear.points), take.seconds)
             samples = frames_m @ ear.weights(frames_m.shape[1]).float().numpy()

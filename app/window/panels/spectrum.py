@@ -195,7 +195,7 @@ class SpectrumPanel(Panel):
         analyser = analyser_at(heard.rate_hz)
         last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / heard.listened.ear.full_scale
+        signal = heard.read(first, first + analyser.window_frames) / heard.of.ear.full_scale
         self.show_signal(heard.source, signal, analyser)
 
     def set_rate(self, rate_hz: int) -> None:

@@ -17,6 +17,7 @@ from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import ModelSource, TruthSource, project
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def take_of(
         frames, _ = source.advance(source.start(initial), take.frames - 1)
         motions.append(torch.cat([initial, frames[0]]))
     changed = to_modes(motions[0], info.modes) * torch.tensor(gains, dtype=torch.float64)
-    take.append(to_grid(changed, info.grid_points).float().numpy(), motions[1].float().numpy())
+    append_to(take, to_grid(changed, info.grid_points).float().numpy(), motions[1].float().numpy())
     return take
 
 
