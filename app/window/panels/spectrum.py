@@ -28,11 +28,8 @@ from app.views import theme
 from app.views.controls.parts import combo_box, faint, lay_out_view
 from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
-from app.views.plots.axis_label import UprightLabel, fit_foot
-from app.views.plots.curves import set_curves
-from app.views.plots.frequency_axis import LOWEST_HZ, RANGES_DB, frequency_ticks
-from app.views.plots.kept_axes import keep_axes
-from app.views.plots.legend import Legend
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, fit_foot, frequency_ticks, keep_axes
+from app.views.plots.legend import Legend, set_curves
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 EVERY = 2  # moments
