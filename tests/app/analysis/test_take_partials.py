@@ -102,9 +102,9 @@ def test_a_take_of_pictures_has_the_partials_of_every_sample(job: Job) -> None:
     following, _ = source.advance(source.start(initial), frames)
     every = torch.cat([initial[:, None], following], dim=1)[0].float().numpy()
     whole = Take("whole", info, pluck, 0.2, Ear((0.5,)))
-    whole.append(every, every)
+    append_to(whole, every, every)
     pictures = Take("pictures", info, pluck, 0.2, Ear((0.5,)), stride=8, model=source)
-    pictures.append(every[::8], every[::8])
+    append_to(pictures, every[::8], every[::8])
     expected, found = take_partials(whole, job), take_partials(pictures, job)
     assert set(found) == set(expected) == {"trained", "all"}
     for one, other in zip(found["all"][:20], expected["all"][:20], strict=True):
