@@ -108,17 +108,16 @@ class AbxDialog(QDialog):
 
     def _connect(self) -> None:
         setup, trial, result = self._setup, self._trial, self._result
-        setup.start_asked.connect(self._start)
+        setup.start.clicked.connect(self._start)
         setup.pair_changed.connect(self._prepare)
+        setup.audition_asked.connect(self._audition)
+        trial.audition_asked.connect(self._audition)
         trial.replay_asked.connect(lambda: self._audition(self._sounding or "X", again=True))
         trial.answered.connect(self._answer)
-        trial.stop_asked.connect(self.reject)
-        result.again_asked.connect(self._show_setup)
-        result.save_asked.connect(self._save_elsewhere)
-        for audition_asked in (setup.audition_asked, trial.audition_asked):
-            audition_asked.connect(self._audition)
-        for close_asked in (setup.close_asked, result.close_asked):
-            close_asked.connect(self.reject)
+        result.again.clicked.connect(self._show_setup)
+        result.save.clicked.connect(self._save_elsewhere)
+        for button in (setup.close_button, trial.stop, result.close_button):
+            button.clicked.connect(self.reject)
 
     # Sound
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.analysis.abx.record import MEANING, AbxRecord, p_text
@@ -11,11 +11,7 @@ from app.views.controls.plain import Label
 
 
 class ResultPage(QWidget):
-    """One result, and whether it has been saved."""
-
-    again_asked = Signal()
-    save_asked = Signal()  # elsewhere, after a failure
-    close_asked = Signal()
+    """One result, and whether it has been saved; `save` is to save it elsewhere after a failure."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,12 +28,10 @@ class ResultPage(QWidget):
         self._saved = label("faint", selectable=True)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
-        self._save, again, self._close = (
+        self.save, self.again, self.close_button = (
             QPushButton(text, autoDefault=False) for text in ("Save elsewhere …", "New test", "Close")
         )
-        asked = (self._save, self.save_asked), (again, self.again_asked), (self._close, self.close_asked)
-        for button, signal in asked:
-            button.clicked.connect(signal)
+        for button in (self.save, self.again, self.close_button):
             buttons.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -58,11 +52,11 @@ class ResultPage(QWidget):
         self._p.setText(unfinished if record.p_value is None else p_text(record.p_value))
         self._verdict.setText(" ".join(filter(None, (record.remark, record.verdict))))
         self._meaning.setVisible(record.complete)
-        self._close.setFocus()
+        self.close_button.setFocus()
 
     def show_saved(self, text: str, failed: bool) -> None:
         """Where the result was saved; or why it was not, with a button to save it elsewhere."""
         self._saved.setObjectName("warning" if failed else "faint")
         self._saved.style().polish(self._saved)
         self._saved.setText(text)
-        self._save.setVisible(failed)
+        self.save.setVisible(failed)

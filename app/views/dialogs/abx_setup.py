@@ -32,10 +32,8 @@ ROW_HEIGHT = 30
 class SetupPage(QWidget):
     """Asks with signals; `show_state` says whether the test can start."""
 
-    start_asked = Signal()
     audition_asked = Signal(str)  # "A" or "B"
     pair_changed = Signal()
-    close_asked = Signal()
 
     def __init__(self, candidates: Sequence[Candidate], trials: int, restart: bool, folder: Path) -> None:
         super().__init__()
@@ -58,7 +56,6 @@ class SetupPage(QWidget):
         self._warning.hide()
         self.start = QPushButton("Start the test")
         self.start.setObjectName("play")
-        self.start.clicked.connect(self.start_asked)
         self._lay_out()
         self._show_trials(trials)
         self._show_folder()
@@ -126,11 +123,10 @@ class SetupPage(QWidget):
             text="In each trial X is A or B, chosen at random and hidden. Listen to A, B and X as often as you like, "
             "then answer which one X is. Both play at the same level."
         )
-        close = QPushButton("Close", autoDefault=False)
-        close.clicked.connect(self.close_asked)
+        self.close_button = QPushButton("Close", autoDefault=False)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
-        buttons.addWidget(close)
+        buttons.addWidget(self.close_button)
         buttons.addWidget(self.start)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

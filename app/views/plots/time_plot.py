@@ -12,8 +12,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
-from app.views.plots.axis_label import fit_foot
-from app.views.plots.kept_axes import keep_axes
+from app.views.plots.axis_label import fit_foot, keep_axes
 from app.views.plots.kept_plot import KeptPlot
 
 SEEK_STEP_S = 0.1

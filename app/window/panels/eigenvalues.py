@@ -12,7 +12,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.poles import PoleFigure, Poles, pole_figure
 from app.playing.chosen import subject_of
@@ -20,14 +20,14 @@ from app.presets.library import Library
 from app.rendering.subject import Subject, load_subject
 from app.session.choices import Session
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, combo_box, keeps_own_keys, lay_out_view, words_label
+from app.views.controls.parts import ENTER_KEYS, combo_box, lay_out_view, words_label
 from app.views.controls.segments import SMALL
-from app.views.plots.axis_label import UprightLabel, UprightTicks, fit_foot
+from app.views.plots.axis_label import fit_foot
+from app.views.plots.pointed_plot import PointedPlot
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 NEAR_PIXELS = 16  # within which a point is pointed at
 CLOSER_PIXELS = 3  # by which a point of the string must be nearer than a learned one
-TIP_MS = 3000  # the tooltip covers what is pointed at
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}
@@ -177,7 +177,7 @@ def _t60_text(t60_s: float) -> str:
     return "∞: it grows" if math.isinf(t60_s) else f"{t60_s:.3g} s"
 
 
-class _Plane(pg.PlotWidget):
+class _Plane(PointedPlot):
     """The points: wheel zooms, drag pans, double-click shows all, a click takes a point."""
 
     pointed = Signal(int)  # the number of a point, the learned ones first; -1: none
@@ -185,19 +185,13 @@ class _Plane(pg.PlotWidget):
     escaped = Signal()
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setAccessibleName("Plane of eigenvalues")
-        self.setToolTip(
+        super().__init__(
+            "Plane of eigenvalues",
             "Amber rings: learned; blue dots: the string's own. Click or Enter: hear this mode alone, again for all\n"
-            "Arrow keys go from point to point; the wheel zooms, double-click shows all"
+            "Arrow keys go from point to point; the wheel zooms, double-click shows all",
         )
-        self.setToolTipDuration(TIP_MS)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMouseTracking(True)
         item = self.getPlotItem()
         item.showGrid(x=True, y=True, alpha=0.18)
-        item.setMenuEnabled(False)
-        item.hideButtons()
         turn = np.linspace(0, np.pi, 721)
         self._circle = item.plot(np.cos(turn), np.sin(turn), pen=pg.mkPen(theme.FAINT, width=1))
         self._string = pg.ScatterPlotItem(symbol="o", size=6, pen=None)
@@ -205,17 +199,10 @@ class _Plane(pg.PlotWidget):
         self._ring = pg.ScatterPlotItem(symbol="o", size=21, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for layer in (self._learned, self._string, self._ring):
             item.addItem(layer)
-        self._label = UprightLabel(item)
-        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self._places = np.empty((0, 2))
         self._learned_count = 0
         self._at = -1
         self._pressed: QPointF | None = None
-
-    def resizeEvent(self, event: QResizeEvent | None) -> None:
-        super().resizeEvent(event)
-        if self.getPlotItem() is not None:  # it is, while this is being made
-            fit_foot(self)
 
     def clear_points(self) -> None:
         self._places, self._at = np.empty((0, 2)), -1
@@ -243,7 +230,6 @@ class _Plane(pg.PlotWidget):
     def set_axes(self, musical: bool, rate_hz: int) -> None:
         """Frequency in Hz against decay time, or the upper half of the complex plane; all points in view."""
         item = self.getPlotItem()
-        item.getAxis("bottom").enableAutoSIPrefix(False)
         self._circle.setVisible(not musical)
         item.setAspectLocked(not musical)
         if musical:
@@ -300,10 +286,6 @@ class _Plane(pg.PlotWidget):
         self._point_at(-1)
         super().leaveEvent(event)
 
-    def event(self, event: QEvent) -> bool:
-        """Keeps Enter and Esc, which are shortcuts of the window, while the plane has the focus."""
-        return keeps_own_keys(event) or bool(super().event(event))
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()))
         if step is not None and len(self._places):
@@ -322,9 +304,7 @@ class _Plane(pg.PlotWidget):
         """The point nearest to a place of the widget, a learned one where both lie there; -1 where none is near."""
         if not len(self._places):
             return -1
-        box = self.getPlotItem().vb
-        here = box.mapSceneToView(self.mapToScene(at.toPoint()))
-        wide, high = box.viewPixelSize()
+        here, (wide, high) = self._place_at(at), self.getPlotItem().vb.viewPixelSize()
         off = np.hypot((self._places[:, 0] - here.x()) / wide, (self._places[:, 1] - here.y()) / high)
         point = int((off + CLOSER_PIXELS * (np.arange(len(off)) >= self._learned_count)).argmin())
         return point if off[point] <= NEAR_PIXELS else -1

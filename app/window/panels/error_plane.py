@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
 from app.playing.chosen import subject_of
@@ -19,10 +19,11 @@ from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
 from app.shared.worker import Job
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, keeps_own_keys, lay_out_view, words_label
+from app.views.controls.parts import ENTER_KEYS, lay_out_view, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.plots.axis_label import UprightLabel, UprightTicks, fit_foot
+from app.views.plots.axis_label import UprightTicks
 from app.views.plots.colour_maps import share_map
+from app.views.plots.pointed_plot import PointedPlot
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 from engine.pluck import Pluck
 from engine.presets import preset_digest
@@ -31,7 +32,6 @@ MM = 1000.0
 SETTLED_S = 0.3  # a width that is still being turned is not computed
 MOST_KEPT = 64  # planes of some 13 KB
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
-TIP_MS = 3000  # the tooltip covers what is pointed at
 SMOOTHER = 4  # pixels of the picture to a step of the finest grid
 _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
@@ -164,31 +164,24 @@ def _form(pluck: Pluck) -> tuple[object, ...]:
     return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)
 
 
-class _Map(pg.PlotWidget):
+class _Map(PointedPlot):
     """The picture with its colour bar, the trained range, the present pluck and a cursor."""
 
     pointed = Signal(float, float)  # position, amplitude in mm; NaN: nowhere
     taken = Signal(float, float)
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setAccessibleName("Map of errors")
-        self.setToolTip(
+        super().__init__(
+            "Map of errors",
             "The model's error as trained (the first figure in the header) for each pluck position and amplitude.\n"
-            "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the training range"
+            "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the training range",
         )
-        self.setToolTipDuration(TIP_MS)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMouseTracking(True)
         self.setCursor(Qt.CursorShape.CrossCursor)
         item = self.getPlotItem()
         item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
-        item.setMenuEnabled(False)
-        item.hideButtons()
         item.setMouseEnabled(False, False)
         item.setLabel("bottom", "pluck position")
-        item.getAxis("bottom").enableAutoSIPrefix(False)
-        self._label = UprightLabel(item, ("amplitude (mm)", "mm"))
+        self._label.set("amplitude (mm)", "mm")
         self._area = QRectF(
             POSITIONS[0] - _STEP_X / 2,
             math.log10(AMPLITUDES_MM[0]) - _STEP_Y / 2,
@@ -196,7 +189,6 @@ class _Map(pg.PlotWidget):
             math.log10(AMPLITUDES_MM[-1] / AMPLITUDES_MM[0]) + _STEP_Y,
         )
         item.setRange(self._area, padding=0)
-        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
         self._ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
         self._image = pg.ImageItem()
         self._image.setLevels([math.log10(end) for end in SCALE])
@@ -253,11 +245,6 @@ class _Map(pg.PlotWidget):
             for value, (low, high) in zip((position, amplitude_mm), self._trained, strict=True)
         )
 
-    def resizeEvent(self, event: QResizeEvent | None) -> None:
-        super().resizeEvent(event)
-        if self.getPlotItem() is not None:  # it is, while this is being made
-            fit_foot(self)
-
     def mousePressEvent(self, event: QMouseEvent) -> None:
         at = self._at(event.position())
         if event.button() == Qt.MouseButton.LeftButton and at is not None:
@@ -273,10 +260,6 @@ class _Map(pg.PlotWidget):
     def leaveEvent(self, event: QEvent) -> None:
         self._point_at(None)
         super().leaveEvent(event)
-
-    def event(self, event: QEvent) -> bool:
-        """Keeps Enter and Esc, which are shortcuts of the window, while the map has the focus."""
-        return keeps_own_keys(event) or bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {
@@ -300,7 +283,7 @@ class _Map(pg.PlotWidget):
 
     def _at(self, place: QPointF) -> tuple[float, float] | None:
         """The pluck that a place of the widget stands for, None beside the map."""
-        at = self.getPlotItem().vb.mapSceneToView(self.mapToScene(place.toPoint()))
+        at = self._place_at(place)
         if not self._area.contains(at):
             return None
         position = min(max(at.x(), float(POSITIONS[0])), float(POSITIONS[-1]))

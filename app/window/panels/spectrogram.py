@@ -18,9 +18,8 @@ from app.session.shown import full_scale_words
 from app.views import theme
 from app.views.controls.parts import combo_box
 from app.views.controls.segments import SMALL, Segments
-from app.views.plots.axis_label import UprightLabel, UprightTicks
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, UprightTicks, frequency_ticks
 from app.views.plots.colour_maps import level_map
-from app.views.plots.frequency_axis import LOWEST_HZ, RANGES_DB, frequency_ticks
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
 

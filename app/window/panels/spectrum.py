@@ -28,11 +28,8 @@ from app.views import theme
 from app.views.controls.parts import combo_box, faint, lay_out_view
 from app.views.controls.readout import Readout
 from app.views.controls.segments import SMALL
-from app.views.plots.axis_label import UprightLabel, fit_foot
-from app.views.plots.curves import set_curves
-from app.views.plots.frequency_axis import LOWEST_HZ, RANGES_DB, frequency_ticks
-from app.views.plots.kept_axes import keep_axes
-from app.views.plots.legend import Legend
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, fit_foot, frequency_ticks, keep_axes
+from app.views.plots.legend import Legend, set_curves
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 EVERY = 2  # moments
@@ -195,7 +192,7 @@ class SpectrumPanel(Panel):
         analyser = analyser_at(heard.rate_hz)
         last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / heard.listened.ear.full_scale
+        signal = heard.read(first, first + analyser.window_frames) / heard.of.ear.full_scale
         self.show_signal(heard.source, signal, analyser)
 
     def set_rate(self, rate_hz: int) -> None:

@@ -23,8 +23,7 @@ from app.session.shown import (
 )
 from app.views.controls.parts import lay_out_alone
 from app.views.plots.axis_label import UprightLabel
-from app.views.plots.curves import set_curves
-from app.views.plots.legend import Legend
+from app.views.plots.legend import Legend, set_curves
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel
 

@@ -14,6 +14,7 @@ from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import read_info
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 MakeTake = Callable[..., Take]
 
@@ -26,7 +27,7 @@ def make_take(small_preset: Path) -> MakeTake:
         info = read_info(small_preset)
         seconds = (len(truth_m) - 1) / info.rate_hz
         take = Take("small", info, Pluck(0.35, 4.0, "gaussian", 0.06), seconds, Ear((0.5,)))
-        take.append(model_m[:ready], truth_m[:ready])
+        append_to(take, model_m[:ready], truth_m[:ready])
         return take
 
     return make

@@ -262,7 +262,7 @@ def test_a_record_that_cannot_be_written_is_told_and_saved_elsewhere(
     monkeypatch.setattr(
         "app.views.dialogs.abx_dialog.QFileDialog.getExistingDirectory", lambda *_: str(tmp_path / "other")
     )
-    dialog._result._save.click()
+    dialog._result.save.click()
     assert len(list((tmp_path / "other").iterdir())) == 1
     assert "cannot be written" not in texts(dialog)
 

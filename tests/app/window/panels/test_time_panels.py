@@ -31,6 +31,7 @@ from app.window.panels.waveform import WaveformPanel
 from engine.pluck import Pluck
 from engine.presets import read_info
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 LEFT = Qt.MouseButton.LeftButton
 FRAMES = 4001  # a second
@@ -48,7 +49,7 @@ def take(small_preset: Path, hear: Hear) -> Take:
     truth = (0.004 * np.exp(-3 * time_s) * np.cos(2 * np.pi * made.fundamental_hz * time_s) * shape).astype(
         np.float32
     )
-    made.append(np.float32(1.01) * truth, truth)
+    append_to(made, np.float32(1.01) * truth, truth)
     hear(made, heard_ear(Choices()))
     return made
 
@@ -431,8 +432,8 @@ def test_another_preset_is_drawn_at_its_rate_when_it_is_there(
     assert len(drawn(waveform, source)) == 0
     time_s = np.arange(16_001)[:, None] / 16_000
     motion = 1e-3 * np.cos(2 * np.pi * 3_000 * time_s) * np.sin(np.pi * np.linspace(0, 1, 51))
-    take.others[source] = Motion(16_000, 51, 1.0)
-    take.others[source].append(motion.astype(np.float32))
+    take.motions[source] = Motion(16_000, 51, 1.0)
+    take.motions[source].append(motion.astype(np.float32))
     choose_and_hear(waveform)
     watch(qtbot, waveform, take, lambda: len(drawn(waveform, source)) > 0)
     watch(qtbot, spectrum, take, lambda: source in spectrum._levels_db)
@@ -480,7 +481,7 @@ def test_a_view_that_is_not_looked_at_lets_the_last_take_go(
     """Takes have tens of megabytes."""
     panel = make(kind)
     last = Take("last", take.info, take.pluck, 1.0, Ear((0.5,)))
-    last.append(take.motion_m("model"), take.motion_m("truth"))
+    append_to(last, take.motion_m("model"), take.motion_m("truth"))
     hear(last, Ear((0.5,)))
     panel.take_started(last)
     for _ in range(20):
@@ -505,8 +506,8 @@ def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None
 def test_the_string_shows_both_motions_at_one_moment_however_late_they_are(make: Make, take: Take) -> None:
     late = Take(take.preset_name, take.info, take.pluck, take.seconds, take.listened.ear)
     model, truth = take.motion_m("model"), take.motion_m("truth")
-    late.append(model[:400], truth[:400])
-    late.motion("model").append(model[400:900])  # the truth's half of a block is on its way
+    append_to(late, model[:400], truth[:400])
+    late.motions["model"].append(model[400:900])  # the truth's half of a block is on its way
     panel = make(StringPanel)
     panel.take_started(late)
     panel.show_moment(Moment(late, take.seconds, True, 0.016))
