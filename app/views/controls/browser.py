@@ -8,9 +8,13 @@ from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QFrame, QLineEdit, QListWidget, QTreeWidget, QWidget
 
+from app.views.controls.notice_bar import NoticeBar
+
 KEYS = Qt.Key
 MOVES = (KEYS.Key_Up, KEYS.Key_Down, KEYS.Key_PageUp, KEYS.Key_PageDown)
 CLOSES = (KEYS.Key_Return, KEYS.Key_Enter, KEYS.Key_Escape)
+NARROWEST_SEARCH, SHORTEST_CHOICE = 120, 6  # pixels; letters of a box beside it
+TOP = 52  # pixels: of its place without notices
 _COMMAND = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier  # on Windows
 
@@ -48,6 +52,7 @@ class Browser(QFrame):
         self.search.setAccessibleName(f"Search {what}")
         self.search.setToolTip(tip)
         self.search.setClearButtonEnabled(True)
+        self.search.setMinimumWidth(NARROWEST_SEARCH)
 
     def watch_keys(self) -> None:
         """Watches the keys of all its widgets, and hides the browser; to be called once all are made."""
@@ -96,6 +101,12 @@ class Browser(QFrame):
             self.search.setFocus()
             self.search.event(event)  # not sent: what it ignores would come back here
         return True
+
+    @property
+    def top(self) -> int:
+        """Its upper edge in the window: that of notices, which it covers."""
+        notices = self.window().findChild(NoticeBar)
+        return TOP if notices is None else notices.y()
 
     @property
     def words(self) -> tuple[str, ...]:

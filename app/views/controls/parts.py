@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QPlainTextEdit,
     QPushButton,
+    QScrollArea,
     QSizePolicy,
     QToolButton,
     QVBoxLayout,
@@ -82,6 +83,16 @@ def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, p
     column.setSpacing(0)
     column.addLayout(row)
     column.addWidget(plot, 1)
+
+
+def scrolled(part: QWidget) -> QScrollArea:
+    """A part as wide as its place, which scrolls where it is higher."""
+    area = QScrollArea(widgetResizable=True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setWidget(part)
+    return area
 
 
 def read_only_text(name: str, text: str = "") -> QPlainTextEdit:

@@ -15,11 +15,9 @@ from html import escape
 from PySide6.QtCore import QModelIndex, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QFrame,
     QGridLayout,
     QHBoxLayout,
     QHeaderView,
-    QScrollArea,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -29,8 +27,8 @@ from app.presets.filter import PresetFilter
 from app.presets.heard_words import HEARD_TIP, heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
-from app.views.controls.browser import Browser
-from app.views.controls.parts import combo_box, tool_button
+from app.views.controls.browser import SHORTEST_CHOICE, Browser
+from app.views.controls.parts import combo_box, scrolled, tool_button
 from app.views.controls.plain import Label
 from app.views.dialogs.preset_card import preset_card
 
@@ -61,6 +59,7 @@ class PresetBrowser(Browser):
         self._rates = combo_box("Rate", [("All rates", 0)])
         for box in (self._strings, self._models, self._rates):
             box.setToolTip(f"Show only presets of this {box.accessibleName().lower()}")
+            box.setMinimumContentsLength(SHORTEST_CHOICE)
             box.currentIndexChanged.connect(self._tell_filter)
         self._order = combo_box(
             "Order", [("Truest first", "truest"), ("By name", "name"), ("Smallest error", "error")]
@@ -120,13 +119,7 @@ class PresetBrowser(Browser):
         head.addWidget(self.search, 1)
         for widget in (self._strings, self._models, self._rates, self._order, self._starred, close):
             head.addWidget(widget)
-        card = QScrollArea(widgetResizable=True)
-        card.setObjectName("card")
-        card.setFrameShape(QFrame.Shape.NoFrame)
-        card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        card.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._card.setContentsMargins(14, 4, 10, 10)
-        card.setWidget(self._card)
         hint = Label(_HINT)
         hint.setObjectName("faint")
         foot = QHBoxLayout()
@@ -137,7 +130,7 @@ class PresetBrowser(Browser):
         grid.setSpacing(10)
         grid.addLayout(head, 0, 0, 1, 2)
         grid.addWidget(self.list, 1, 0)
-        grid.addWidget(card, 1, 1)
+        grid.addWidget(scrolled(self._card), 1, 1)
         grid.addLayout(foot, 2, 0, 1, 2)
         grid.addWidget(hint, 3, 0, 1, 2)
         grid.setColumnStretch(0, 7)
@@ -258,7 +251,7 @@ class PresetBrowser(Browser):
         """Under the preset bar; the transport bar stays visible where the window is high enough."""
         parent = self.parentWidget()
         if parent is not None:
-            top = 52
+            top = self.top
             width, height = min(1240, parent.width() - 28), min(560, parent.height() - top - 140)
             self.setGeometry(14, top, width, max(300, height))
 

@@ -27,8 +27,8 @@ from PySide6.QtWidgets import (
 
 from app.shared.key_names import note_name
 from app.views import theme
-from app.views.controls.browser import Browser
-from app.views.controls.parts import combo_box, label, tool_button
+from app.views.controls.browser import SHORTEST_CHOICE, Browser
+from app.views.controls.parts import combo_box, label, scrolled, tool_button
 from app.views.controls.plain import Label, plain_tip
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ class PatchBrowser(Browser):
         self._whose = combo_box("Whose", [("Shipped and own", ""), ("Shipped", "shipped"), ("Own", "own")])
         self._whose.setToolTip("Show only patches that came with the program, or only your own")
         for box in (self._category, self._whose):
+            box.setMinimumContentsLength(SHORTEST_CHOICE)
             box.currentIndexChanged.connect(self._filter_changed)
         self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
         self._starred.setCheckable(True)
@@ -136,12 +137,19 @@ class PatchBrowser(Browser):
             for button in buttons:
                 row.addWidget(button)
             row.addStretch(1)
+        told = QWidget()
+        lines = QVBoxLayout(told)
+        lines.setContentsMargins(0, 0, 0, 0)
+        lines.setSpacing(8)
+        lines.addWidget(self._words)
+        lines.addWidget(self._facts)
+        lines.addStretch(1)
         column = QVBoxLayout()
         column.setContentsMargins(8, 4, 4, 4)
         column.setSpacing(8)
-        for widget in (self._title, self._kind, self._words, self._facts):
+        for widget in (self._title, self._kind):
             column.addWidget(widget)
-        column.addStretch(1)
+        column.addWidget(scrolled(told), 1)
         column.addLayout(hearing)
         column.addLayout(own)
         return column
@@ -298,7 +306,7 @@ class PatchBrowser(Browser):
         """Above the instrument, whose keys stay visible and can be played."""
         parent = self.parentWidget()
         if parent is not None:
-            top = 52
+            top = self.top
             width, height = min(1000, parent.width() - 28), min(520, parent.height() - top - 240)
             self.setGeometry(14, top, width, max(300, height))
 
