@@ -8,4 +8,5 @@
 `sweeping`       many runs: the plan, its order, the workers
 `tables`         the paper's tables with our results beside them
 `figures`        pictures of presets and of runs
+`research`       what models are compared with, and starts that no preset needs to sound
 """

@@ -10,13 +10,11 @@ from typing import Any, Literal
 
 from engine import bounds
 from engine.models import MODELS, DiagonalModel, read_model_configuration
-from engine.models.string_modes import StartsFromModes
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, write
 
-# models that can start from what the displacement shows (`fitting.phases`)
-FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
+FROM_PHASES = ("koopman_integrated", "fgru", "frnn")  # what can start from what the displacement shows
 DIGEST_VERSION = 2  # of the rule by which runs are told apart; see `training.migration`
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 

@@ -67,7 +67,7 @@ from engine.models._diagonal import (
 )
 from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
-from engine.models.string_modes import StartsFromModes, StringModes
+from engine.models.string_modes import StringModes
 
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
 SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
@@ -172,7 +172,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
+class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -182,7 +182,6 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
     }
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
     coupling_parameters: ClassVar = frozenset({"K"})
-    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
         super().__init__()

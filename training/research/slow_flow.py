@@ -82,7 +82,7 @@ def slow_flow(
         ArithmeticError: no averaged motion starts there: the tension rises too much.
     """
     # compiles, or loads what it compiled earlier: only when it is needed
-    from engine.averaging import _slow_flow_kernel as kernel
+    from training.research import _slow_flow_kernel as kernel
 
     for name, value in (("rate_hz", rate_hz), ("node_s", node_s)):
         if not value > 0:
@@ -124,7 +124,7 @@ def _modes(resonator: Resonator) -> _Modes:
 
 def _averaged_start(modes: _Modes, amplitudes_m: Array) -> Array:
     """z of the averaged motion whose displacement is at rest at `amplitudes_m`, (2, modes)."""
-    from engine.averaging import _slow_flow_kernel as kernel
+    from training.research import _slow_flow_kernel as kernel
 
     c, frequencies, decays, stiffening, stretch = modes
     squares = stretch * amplitudes_m**2

@@ -9,11 +9,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from engine.averaging import slow_flow
 from engine.excitation import gaussian
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver, solve_linear
+from training.research.slow_flow import slow_flow
 
 RATE_HZ = 48_000.0
 STEEL_E4 = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 220e9, 8e-6, 1.4e-6, 72.2016)
