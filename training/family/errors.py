@@ -115,7 +115,7 @@ def player(model: StringModel[Any]) -> Player:
 
 def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tensor:
     displacement = (displacement_m(plucked)[None] / SCALE_M).to(torch.get_default_dtype())
-    state, blocks, done = model.release(displacement), [], 0
+    state, blocks, done = model.encode(displacement), [], 0
     while done < steps:
         count = min(4_800, steps - done)
         frames, state = model.advance(state, count)

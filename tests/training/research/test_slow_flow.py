@@ -115,8 +115,6 @@ def test_what_it_cannot_do_is_told() -> None:
         slow_flow(replace(resonator, coupling=resonator.coupling.flip(0)), amplitudes, RATE_HZ, 10)
     with pytest.raises(ValueError, match="two have nearly the same frequency"):
         slow_flow(replace(resonator, omega=resonator.omega[[0, 1, 1]]), amplitudes, RATE_HZ, 10)
-    with pytest.raises(ValueError, match="not a batch"):
-        slow_flow(Resonator.stacked([resonator, resonator]), amplitudes, RATE_HZ, 10)
     with pytest.raises(ValueError, match=r"shape \(3,\), not \(2,\)"):
         slow_flow(resonator, amplitudes[:2], RATE_HZ, 10)
     with pytest.raises(ValueError, match="node_s must be above 0"):
