@@ -43,7 +43,8 @@ class StringSource(ABC):
     """Frames of displacement in m after an initial displacement at rest.
 
     Attributes:
-        any_frame: whether frames that `sample` leaves out are not computed; otherwise it takes as long as `advance`.
+        any_frame: whether `sample` takes much less time than `advance`, because it leaves the other frames or their
+            shapes out.
     """
 
     rate_hz: int
@@ -129,7 +130,7 @@ class TruthSource(StringSource):
     def __init__(self, info: PresetInfo, substeps: int | None = None) -> None:
         self.rate_hz = info.rate_hz
         self.grid_points = info.grid_points
-        self.any_frame = True  # it steps through all of them, which is little beside their shapes
+        self.any_frame = True  # it steps through all of them; their shapes are most of the cost
         self._resonator = info.resonator
         self._solver = SplittingSolver(self._resonator, info.rate_hz, substeps=substeps, silence=SILENCE)
 

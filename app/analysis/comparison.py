@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from app.analysis.job import Cancelled, Job
 from app.presets.library import PresetEntry
 from app.rendering.job import BLOCK_FRAMES
 from app.rendering.subject import StringOf, load_subject
+from app.shared.worker import Cancelled, Job
 from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
@@ -82,7 +82,7 @@ def compare(entries: list[PresetEntry], trial: Trial, job: Job) -> None:
             raise
         except Exception as error:  # the other presets are still compared
             row = replace(ComparedRow.of(entry), note=str(error) or type(error).__name__)
-        job.report((done + 1) / len(entries), row)
+        job.report((done + 1) / len(entries), so_far=row)
 
 
 def same_string(info: PresetInfo, other: PresetInfo) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from app.analysis.job import Job
+from app.shared.worker import Job
 from engine.metrics import ErrorSums
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
 from engine.presets import Preset
@@ -97,13 +97,13 @@ class ErrorPlane:
         errors = error_of_plucks(preset)
         spacing = self.spacing
         if spacing is not None:
-            job.report(self._share, self.picture())
+            job.report(self._share, so_far=self.picture())
         for places in self._missing():
             plucks = [pluck.moved(position=POSITIONS[x], amplitude_mm=AMPLITUDES_MM[y]) for x, y in places]
             for place, error in zip(places, errors(plucks, job), strict=True):
                 self.error[place] = error
             is_finer, spacing = self.spacing != spacing, self.spacing
-            job.report(self._share, self.picture() if is_finer else None)
+            job.report(self._share, so_far=self.picture() if is_finer else None)
         picture = self.picture()
         assert picture is not None
         return picture

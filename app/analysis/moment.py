@@ -67,7 +67,7 @@ class _Range:
         return self._band
 
     def _look_at(self, block: int) -> None:
-        frames = self.motion.read(block * self._block, (block + 1) * self._block)
+        frames = self.motion.read_all(block * self._block, (block + 1) * self._block)
         self._lowest_mm[block] = frames.min(axis=0) * MM
         self._highest_mm[block] = frames.max(axis=0) * MM
         self._known[block] = True
@@ -90,7 +90,7 @@ def frame_at(
     shapes, lowest, highest = {}, {}, {}
     for motion in there:
         last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
-        frames = motion.read(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
+        frames = motion.read_all(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)
         shapes[motion.source] = motion.shape(position_s) * MM
         lowest[motion.source] = frames.min(axis=0) * MM
         highest[motion.source] = frames.max(axis=0) * MM

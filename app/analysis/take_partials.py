@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from app.analysis.job import Job
 from app.rendering import Take
+from app.shared.worker import Job
 from engine.partials import (
     LEAST_SEGMENTS,
     MOST_SIMILAR,
@@ -98,7 +98,7 @@ def _model_modes(take: Take, steps: int, block: int) -> Iterator[torch.Tensor]:
     """The model's modal amplitudes in m, (1, up to `block`, modes), of frames 1 … steps."""
     info, source = take.info, take.model
     if source is None or not source.any_frame:  # the take holds every frame
-        motion = take.motion("model")
+        motion = take.motions["model"]
         for first in range(1, steps + 1, block):
             frames = torch.from_numpy(motion.read(first, min(first + block, steps + 1)))
             yield to_modes(frames[None].double(), info.modes)

@@ -1,7 +1,7 @@
 """The sound of the app: a mixer, the output that takes its frames, and a thread that supervises the output.
 
 any thread ── voices, gains ──► Mixer ◄── device's own thread (compiled, without the interpreter) ──► loudspeaker
-caretaker thread: opens and changes devices, reopens lost ones, frees voices that have ended
+caretaker thread: opens and changes devices, reopens lost ones, frees voices that have ended, reports the load
 """
 
 from __future__ import annotations
@@ -95,6 +95,7 @@ class Sound:
         open_output: Open = DeviceOutput,
     ) -> None:
         self._on_problem, self._look_up, self._open_output = on_problem, look_up, open_output
+        self._watch: Callable[[SoundStatus], None] = lambda status: None
         self.mixer = Mixer(rate_hz)
         self._output: Output = ClockOutput(self.mixer)
         self._volume_db = 0.0
@@ -169,6 +170,10 @@ class Sound:
     def status(self) -> SoundStatus:
         return self._status
 
+    def watch(self, look: Callable[[SoundStatus], None]) -> None:
+        """Calls `look` with each status, every LOOK_EVERY_S, in the caretaker's thread. The latest call counts."""
+        self._watch = look
+
     def close(self) -> None:
         """Cuts the sound, ends the thread, for which it waits, and frees the device; may be called again."""
         self._closing.set()
@@ -196,6 +201,7 @@ class Sound:
                 self.mixer.forget_ended()
                 self._gaps.extend(self.mixer.new_gaps())
                 self._publish()
+                self._watch(self._status)
         except Exception:
             self._report(
                 AudioProblem(

@@ -1,4 +1,4 @@
-"""abx show: prints the record of a listening test."""
+"""abx show: prints the result of a listening test."""
 
 from __future__ import annotations
 
@@ -7,19 +7,18 @@ from typing import Annotated
 
 import typer
 
-abx = typer.Typer(no_args_is_help=True, help="Records of listening tests.", rich_markup_mode=None)
+abx = typer.Typer(no_args_is_help=True, help="Results of listening tests.", rich_markup_mode=None)
 
 
 @abx.callback()
 def group() -> None:
-    """Records of listening tests."""
+    """Results of listening tests."""
 
 
 @abx.command()
-def show(file: Annotated[Path, typer.Argument(metavar="FILE", help="A record that the app has saved.")]) -> None:
-    """Check the record of a listening test and print it as text."""
-    from app.analysis.abx.record import load_record
-    from app.analysis.abx.text import as_text
+def show(file: Annotated[Path, typer.Argument(metavar="FILE", help="A result that the app has saved.")]) -> None:
+    """Print the result of a listening test as text."""
+    from app.analysis.abx.record import as_text, load_record
     from engine.plain_text import printable
 
     print(printable(as_text(load_record(file))), end="")

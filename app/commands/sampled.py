@@ -50,7 +50,7 @@ def sampled(
     """
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
-    from app.export.sampled.words import counted, megabytes, needed_bytes, notes, size_words
+    from app.export.sampled.words import counted, megabytes, needed_bytes, notes, pitch_words, size_words
     from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
@@ -85,13 +85,13 @@ def sampled(
         planned(plan, out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    words = f"{counted(plan)}, {size_words(plan, soundfont)}"
+    words, pitch = f"{counted(plan)}, {size_words(plan, soundfont)}", pitch_words(plan.pitch_error_cents)
     if size_only:
-        print(f"{one_line(str(out))}: {words}")
+        print(f"{one_line(str(out))}: {words}; {pitch}")
         return
     if needed_bytes(plan, soundfont) > ASKED_ABOVE_BYTES and not yes:
         raise Failure(f"{out}: {words}; take fewer --keys, --layers or --seconds, or say --yes")
-    say(words)
+    say(f"{words}; {pitch}")
     from engine.presets import load_preset
 
     render = note_renderer(load_preset(preset_path), source)
@@ -99,8 +99,8 @@ def sampled(
         made = export_sampled(plan, out, render, progress=report)
     for note in notes(plan, made, "--dry leaves"):
         say(f"note: {note}")
-    kept = made.samples - made.rendered
-    print(f"{one_line(str(out))}: {made.rendered} samples rendered, {kept} kept, {megabytes(made.size_bytes)}")
+    samples = f"{made.rendered} samples rendered, {made.samples - made.rendered} kept"
+    print(f"{one_line(str(out))}: {samples}, {megabytes(made.size_bytes)}; {pitch}")
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:

@@ -10,7 +10,7 @@ from app.shared.vocabulary import Bits, Source
 
 
 class BatchChoices(BaseModel):
-    """The last settings of the batch page; lists as they were typed."""
+    """The last settings of the batch page; lists as they were typed. One of a single value is not used again."""
 
     model_config = ConfigDict(extra="forbid")
 

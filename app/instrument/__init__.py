@@ -2,6 +2,7 @@
 
 events     what a player does: keys, bends, pedals; with their time, where they come from a file
 strings    which string a key is: its length for the pitch, and how a bend, a slide or a damper changes it
+glide      by how many cents a key starts above its resting pitch
 loudness   the gain that makes all keys of a patch equally loud
 player     events to voices: which strings ring, are held, are plucked again
 bodies     which bodies there are: the engine's, and impulse responses of the user's own

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from app.instrument.strings import KeyString, Strings
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
+from app.shared.parameters import OF_PATCHES
 from engine.resonators.family import BRIGHT_HZ, inharmonicity
 from engine.resonators.string import StringParameters
 
@@ -21,12 +22,10 @@ class Figure:
     """What a knob of the string changes, as it is measured on one.
 
     Attributes:
-        unit: of what `of` gives; "" where it has none.
         of: the figure of a string.
         falls: whether it falls while the knob rises.
     """
 
-    unit: str
     of: Callable[[StringParameters], float]
     falls: bool = False
 
@@ -42,14 +41,14 @@ def t60_s(string: StringParameters, mode: int) -> float:
 
 
 FIGURES: Mapping[str, Figure] = {  # by the field of the patch
-    "knobs.tension": Figure("N", lambda string: string.tension_n),
-    "knobs.length": Figure("mm", lambda string: 1000 * string.length_m),
-    "knobs.gauge": Figure("mm", lambda string: 2000 * math.sqrt(string.area_m2 / math.pi)),
-    "knobs.density": Figure("kg/m³", lambda string: string.density_kg_m3),
-    "knobs.modulus": Figure("GPa", lambda string: string.youngs_modulus_pa / 1e9),
-    "knobs.stiffness": Figure("", inharmonicity),
-    "knobs.decay": Figure("s", lambda string: t60_s(string, 1), falls=True),
-    "knobs.brightness_decay": Figure("s", lambda string: t60_s(string, bright_mode(string)), falls=True),
+    "knobs.tension": Figure(lambda string: string.tension_n),
+    "knobs.length": Figure(lambda string: 1000 * string.length_m),
+    "knobs.gauge": Figure(lambda string: 2000 * math.sqrt(string.area_m2 / math.pi)),
+    "knobs.density": Figure(lambda string: string.density_kg_m3),
+    "knobs.modulus": Figure(lambda string: string.youngs_modulus_pa / 1e9),
+    "knobs.stiffness": Figure(inharmonicity),
+    "knobs.decay": Figure(lambda string: t60_s(string, 1), falls=True),
+    "knobs.brightness_decay": Figure(lambda string: t60_s(string, bright_mode(string)), falls=True),
 }
 
 
@@ -66,7 +65,7 @@ def facts_of(string: KeyString) -> dict[str, str]:
 
 def figures_of(string: StringParameters) -> dict[str, str]:
     """The figures of a string with their units, by field."""
-    return {field: told(figure.of(string), figure.unit) for field, figure in FIGURES.items()}
+    return {field: told(figure.of(string), OF_PATCHES[field].figure_unit or "") for field, figure in FIGURES.items()}
 
 
 def told(figure: float, unit: str) -> str:
@@ -80,22 +79,19 @@ def told(figure: float, unit: str) -> str:
     return f"{text} {unit}".rstrip()
 
 
-def knob_for(
-    patch: Patch, key: tuple[int, int | None], field: str, wanted: float, limits: tuple[float, float]
-) -> float:
+def knob_for(patch: Patch, key: tuple[int, int | None], field: str, wanted: float) -> float:
     """Where a knob makes a figure of a key's string what is wanted, or as near to it as it goes.
 
     Args:
         key: and on which string of the set it is played, as in `Strings.of_key`.
         field: one of FIGURES.
-        wanted: in the figure's unit.
-        limits: of the knob.
+        wanted: in the parameter's `figure_unit`.
 
     Raises:
         ValueError: the key is silent.
     """
     figure, name = FIGURES[field], field.removeprefix("knobs.")
-    low, high = limits
+    low, high = OF_PATCHES[field].limits
     for _ in range(HALVINGS):
         middle = math.sqrt(low * high)
         turned = patch.model_copy(update={"knobs": patch.knobs.model_copy(update={name: middle})})

@@ -1,8 +1,10 @@
 """A patch that is played: events become voices, and change those that ring.
 
-Strings are known by their places: a key, or a channel of a guitar, which is one string. A place that is struck again
-goes on with the motion that it has; a key that is released damps its string, unless the pedal or the patch lets it
-ring. Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
+Strings are known by their places: a key, or a channel of a guitar, which is one string. What plucks a place again
+stops its string first, or, where the patch says so, adds to its motion. A key that is released damps its string,
+unless the pedal or the patch lets it ring.
+
+Bends, slides, dampers and knobs change the modes of a string's voices, the model's and the truth's alike.
 
 In guitar mode the first channels are the strings, the highest first, as guitars with MIDI send them. The first of
 them alone may as well be a keyboard: until another has played, it plays any key, each on the string that the key
@@ -22,6 +24,7 @@ from app.instrument.hands import GUITAR_STRINGS, Hands
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
 from app.patches.patch import Patch, StringSet
+from app.shared.parameters import OF_PATCHES
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.presets import Preset
@@ -34,25 +37,9 @@ SOURCES = ("model", "truth")
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03
+PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
 KEPT_KEYS = 512
 GOALS = 8  # values that are tried for a wheel all the way up
-# What a wheel all the way up makes of a field: a factor of its own value, or a value
-WHEEL_FACTORS = {
-    "knobs": 4.0,
-    "knobs.length": 2.0,
-    "damping": 10.0,
-    "pluck.hardest_mm": 2.0,
-    "body.size": 2.0,
-    "room.t60_s": 3.0,
-}
-WHEEL_VALUES = {
-    "pluck.position": 0.5,
-    "pluck.width": 0.02,
-    "pluck.width_hard": 0.02,
-    "pluck.curve": 1.0,
-    "body.mix": 1.0,
-    "room.mix": 1.0,
-}
 
 
 @dataclass(frozen=True)
@@ -84,6 +71,7 @@ class Struck:
         gain: the factor of its voices.
         voices: by source.
         parameters: of the string, with bends, slides, dampers and knobs.
+        begin_frame: of the mixer, for which it was struck; 0: at once.
         held: whether the key is down.
         kept: whether it was released while the pedal was down.
         damped: whether the damper is on it.
@@ -98,6 +86,7 @@ class Struck:
     gain: float
     voices: dict[str, Voice]
     parameters: StringParameters
+    begin_frame: int = 0
     held: bool = True
     kept: bool = False
     damped: bool = False
@@ -107,8 +96,13 @@ class Struck:
         """Whether all its voices have ended."""
         return all(voice.over for voice in self.voices.values())
 
-    def retune(self, parameters: StringParameters, seconds: float) -> None:
-        """Lets the voices glide to the modes of other parameters."""
+    @property
+    def scheduled(self) -> bool:
+        """Whether the frame for which it was struck is still to come."""
+        return self.begin_frame > 0 and all(voice.waits for voice in self.voices.values())
+
+    def retune(self, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
+        """Lets the voices glide to the modes of other parameters, from a frame of the mixer on."""
         self.parameters = parameters
         own = self.key.resonator
         modes = own.modes
@@ -120,7 +114,7 @@ class Struck:
             stretch=parameters.wavenumbers(modes).square(),
         )
         for voice in self.voices.values():
-            voice.retune(resonator, seconds)
+            voice.retune(resonator, seconds, frame)
 
 
 class Player:
@@ -156,6 +150,7 @@ class Player:
         self._ringing: dict[Place, Struck] = {}
         self._all: list[Struck] = []  # with those whose place was struck again, until they are over
         self._listens: Ear | None = None
+        self._frame = 0  # at which the event counts that is being handled
         self._take(patch)
 
     # What is played
@@ -227,32 +222,42 @@ class Player:
 
     # Events
 
-    def handle(self, event: Event) -> Struck | None:
+    def handle(self, event: Event, frame: int = 0) -> Struck | None:
         """Plays an event; what it struck, or None.
+
+        Args:
+            frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. Events
+                of frames to come must be given in their order. 0: at once.
 
         Raises:
             ValueError: a key has no possible string.
         """
         with self._lock:
-            if isinstance(event, NoteOn):
-                return self._note_on(event)
-            if isinstance(event, NoteOff):
-                self._note_off(event)
-            elif isinstance(event, Bend):
-                self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
-                self._follow_bend(event.channel)
-            elif isinstance(event, Controller):
-                self._controller(event)
-            else:
-                self.set_patch(event.patch)
-        return None
+            self._frame = frame
+            try:
+                return self._play(event)
+            finally:
+                self._frame = 0
+
+    def cancel(self) -> None:
+        """Ends strings that were struck for frames to come, without a sound; others have their places again."""
+        with self._lock:
+            for struck in self._all:
+                if struck.scheduled:
+                    for voice in struck.voices.values():
+                        voice.release(STOP_S)
+            self._all = [struck for struck in self._all if not (struck.over or struck.scheduled)]
+            self._ringing = {struck.place: struck for struck in self._all}
 
     def stop(self, seconds: float = STOP_S) -> None:
         """Lets all strings fade out, and forgets them."""
         with self._lock:
             for struck in self._all:
                 for voice in struck.voices.values():
-                    voice.release(seconds)
+                    if self._frame > 0:
+                        voice.release_at(self._frame)
+                    else:
+                        voice.release(seconds)
             self._ringing.clear()
             self._all.clear()
 
@@ -298,6 +303,20 @@ class Player:
         self._ringing = {place: struck for place, struck in self._ringing.items() if not struck.over}
         return list(self._ringing.values())
 
+    def _play(self, event: Event) -> Struck | None:
+        if isinstance(event, NoteOn):
+            return self._note_on(event)
+        if isinstance(event, NoteOff):
+            self._note_off(event)
+        elif isinstance(event, Bend):
+            self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
+            self._follow_bend(event.channel)
+        elif isinstance(event, Controller):
+            self._controller(event)
+        else:
+            self.set_patch(event.patch)
+        return None
+
     def _note_on(self, event: NoteOn) -> Struck | None:
         if event.velocity <= 0:
             self._note_off(NoteOff(event.key, event.channel))
@@ -317,10 +336,15 @@ class Player:
             before = None
         if before is not None:
             for source, voice in voices.items():
-                if not before.voices[source].over:
-                    voice.continues(before.voices[source])
+                ringing = before.voices[source]
+                if not ringing.over and self._patch.pluck.stops:
+                    voice.stops(ringing, PLUCK_STOPS_S)
+                elif not ringing.over:
+                    voice.continues(ringing)
+        for voice in voices.values():
+            voice.begin_at(self._frame)
         own = key.string.parameters
-        struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own)
+        struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own, self._frame)
         parameters = self._with_hands(struck)
         if parameters != own:
             struck.retune(parameters, 0.0)
@@ -425,9 +449,8 @@ class Player:
         name, share = self._patch.mod_wheel, self._hands.wheel / 127
         if share == 0 or not name.startswith(parts):
             return self._patch
-        value = self._patch.value(name)
-        factor = WHEEL_FACTORS.get(name, WHEEL_FACTORS.get(name.split(".")[0], 0.0))
-        goal = WHEEL_VALUES.get(name, value * factor if factor else value)
+        value, parameter = self._patch.value(name), OF_PATCHES[name]
+        goal = value * parameter.wheel_factor if parameter.wheel is None else parameter.wheel
         for _ in range(GOALS):
             try:
                 self._patch.with_value(name, goal)
@@ -458,7 +481,7 @@ class Player:
     def _retune(self, struck: Struck, seconds: float) -> None:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
-            struck.retune(parameters, seconds)
+            struck.retune(parameters, seconds, self._frame)
 
 
 def is_another(patch: Patch, than: Patch) -> bool:

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from app.shared.parameters import OF_PATCHES, modulated_by
 from app.shared.vocabulary import Pickup as PickupKind
 from engine import bounds
-from engine.effects.body import SIZE
-from engine.effects.room import T60_S
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
+from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 
 if TYPE_CHECKING:
     from engine.resonators.string import StringParameters
@@ -24,32 +23,8 @@ if TYPE_CHECKING:
 Category = Literal["guitar", "bass", "harp", "keys", "world", "experimental"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 Mode = Literal["poly", "guitar", "mpe"]
-ASSIGNABLE: tuple[str, ...] = (
-    "knobs.stiffness",
-    "knobs.decay",
-    "knobs.brightness_decay",
-    "knobs.modulus",
-    "knobs.density",
-    "knobs.gauge",
-    "knobs.tension",
-    "knobs.length",
-    "pluck.position",
-    "pluck.width",
-    "pluck.width_hard",
-    "pluck.softest_mm",
-    "pluck.hardest_mm",
-    "pluck.curve",
-    "pickup.points.0",
-    "pickup.points.1",
-    "damping.release_t60_s",
-    "body.mix",
-    "body.size",
-    "room.mix",
-    "room.t60_s",
-    "level_db",
-)  # what macros may turn
-ONLY_MACROS = ("pluck.softest_mm", "pickup.points.0", "pickup.points.1", "level_db")
-WHEEL: tuple[str, ...] = tuple(field for field in ASSIGNABLE if field not in ONLY_MACROS)  # by the modulation wheel
+ASSIGNABLE = tuple(each.id for each in modulated_by("macro"))  # what macros may turn
+WHEEL = tuple(each.id for each in modulated_by("wheel"))  # what the modulation wheel may turn
 
 LONGEST_NAME = 60  # characters
 LONGEST_DESCRIPTION = 400
@@ -60,16 +35,6 @@ MOST_TARGETS = 8
 FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on Linux, macOS or Windows
 HIGHEST_KEY = 127
 VELOCITIES = (1, 127)
-LEVEL_RANGE_DB = (-60.0, 24.0)
-MULTIPLIER_RANGE = (0.05, 20.0)
-GAUGE_RANGE = (0.25, 4.0)
-LENGTH_RANGE = (0.25, 4.0)
-TENSION_RANGE = (0.0625, 16.0)  # over which the length goes through its own range
-AMPLITUDE_RANGE_MM = (0.001, LARGEST_AMPLITUDE_MM)
-CURVE_RANGE = (-1.0, 1.0)
-RELEASE_RANGE_S = (0.01, 60.0)  # of the damping's T60
-A4_RANGE_HZ = (220.0, 880.0)
-TRANSPOSE_RANGE = (-48, 48)
 
 
 def _plain(text: str) -> str:
@@ -108,16 +73,19 @@ def _number(low: float, high: float) -> Any:
     return Field(ge=low, le=high, strict=True, allow_inf_nan=False)
 
 
+def _parameter(id: str) -> Any:
+    """A field with range and default of the table of parameters."""
+    parameter = OF_PATCHES[id]
+    low, high = parameter.limits
+    return Field(parameter.default, ge=low, le=high, strict=True, allow_inf_nan=False)
+
+
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_safe)]
 Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe)]  # a name elsewhere, "" for none
 Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(_plain)]
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
 Key = Annotated[int, _number(0, HIGHEST_KEY)]
 Share = Annotated[float, _number(0, 1)]
-Multiplier = Annotated[float, _number(*MULTIPLIER_RANGE)]
-Position = Annotated[float, _number(*POSITION_RANGE)]
-Width = Annotated[float, _number(*WIDTH_RANGE)]
-Millimetres = Annotated[float, _number(*AMPLITUDE_RANGE_MM)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
@@ -196,14 +164,14 @@ class Knobs(_Value):
         length: of the length; the tension grows with its square. As `tension`, with what follows exchanged.
     """
 
-    stiffness: Multiplier = 1.0
-    decay: Multiplier = 1.0
-    brightness_decay: Multiplier = 1.0
-    modulus: Multiplier = 1.0
-    density: Multiplier = 1.0
-    gauge: Annotated[float, _number(*GAUGE_RANGE)] = 1.0
-    tension: Annotated[float, _number(*TENSION_RANGE)] = 1.0
-    length: Annotated[float, _number(*LENGTH_RANGE)] = 1.0
+    stiffness: float = _parameter("knobs.stiffness")
+    decay: float = _parameter("knobs.decay")
+    brightness_decay: float = _parameter("knobs.brightness_decay")
+    modulus: float = _parameter("knobs.modulus")
+    density: float = _parameter("knobs.density")
+    gauge: float = _parameter("knobs.gauge")
+    tension: float = _parameter("knobs.tension")
+    length: float = _parameter("knobs.length")
 
 
 class PluckChoices(_Value):
@@ -213,15 +181,18 @@ class PluckChoices(_Value):
         width, width_hard: of the softest and of the hardest pluck.
         softest_mm, hardest_mm: amplitudes of velocity 1 and 127; between them a step of velocity is a step in dB.
         curve: 0 is even; towards 1 the middle velocities are louder, towards -1 softer.
+        stops: whether what plucks a string that rings stops it first, as a finger or a plectrum does. Otherwise the
+            pluck is added to the motion, as under a hammer.
     """
 
     shape: Shape = "triangular"
-    position: Position = 0.2
-    width: Width = 0.12
-    width_hard: Width = 0.06
-    softest_mm: Millimetres = 0.1
-    hardest_mm: Millimetres = 3.0
-    curve: Annotated[float, _number(*CURVE_RANGE)] = 0.0
+    position: float = _parameter("pluck.position")
+    width: float = _parameter("pluck.width")
+    width_hard: float = _parameter("pluck.width_hard")
+    softest_mm: float = _parameter("pluck.softest_mm")
+    hardest_mm: float = _parameter("pluck.hardest_mm")
+    curve: float = _parameter("pluck.curve")
+    stops: Flag = True
 
     @model_validator(mode="after")
     def _softest_is_softer(self) -> Self:
@@ -244,14 +215,14 @@ class PluckChoices(_Value):
 class Pickup(_Value):
     """Where the string is heard, one point or left and right, and whether as displacement or its velocity."""
 
-    points: Annotated[tuple[Share, ...], Field(min_length=1, max_length=2)] = (0.37,)
+    points: Annotated[tuple[Share, ...], Field(min_length=1, max_length=2)] = (DEFAULT_LISTEN,)
     kind: PickupKind = "displacement"
 
 
 class Damping(_Value):
     """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`."""
 
-    release_t60_s: Annotated[float, _number(*RELEASE_RANGE_S)] = 0.3
+    release_t60_s: float = _parameter("damping.release_t60_s")
     let_ring: Flag = False
 
 
@@ -265,10 +236,10 @@ class TuningChoice(_Value):
         transpose: by how many keys everything sounds higher.
     """
 
-    a4_hz: Annotated[float, _number(*A4_RANGE_HZ)] = 440.0
+    a4_hz: float = _parameter("tuning.a4_hz")
     scale: ScalaText = ""
     keymap: ScalaText = ""
-    transpose: Annotated[int, _number(*TRANSPOSE_RANGE)] = 0
+    transpose: int = _parameter("tuning.transpose")
 
     @model_validator(mode="after")
     def _gives_pitches(self) -> Self:
@@ -283,15 +254,15 @@ class Body(_Value):
     """The body of the instrument: the name of an impulse response ("": none), its mix, its size (1: as it is)."""
 
     name: Reference = ""
-    mix: Share = 0.5
-    size: Annotated[float, _number(*SIZE)] = 1.0
+    mix: float = _parameter("body.mix")
+    size: float = _parameter("body.size")
 
 
 class Room(_Value):
     """The room: its mix (0: none), and its reverberation time."""
 
-    mix: Share = 0.0
-    t60_s: Annotated[float, _number(*T60_S)] = 1.2
+    mix: float = _parameter("room.mix")
+    t60_s: float = _parameter("room.t60_s")
 
 
 class Target(_Value):
@@ -342,7 +313,7 @@ class Patch(_Value):
     tuning: TuningChoice = TuningChoice()
     body: Body = Body()
     room: Room = Room()
-    level_db: Annotated[float, _number(*LEVEL_RANGE_DB)] = 0.0
+    level_db: float = _parameter("level_db")
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
 
     @model_validator(mode="after")
@@ -408,7 +379,7 @@ class Patch(_Value):
         """The name of the patch's own field that changes, and its new and checked value."""
         name, *inner = field.split(".")
         if not inner:  # the level, which is the patch's own
-            bounds.check(name, value, LEVEL_RANGE_DB, "dB")
+            bounds.check(name, value, OF_PATCHES[name].limits, "dB")
             return name, value
         section: _Value = getattr(self, name)
         changed: Any = value

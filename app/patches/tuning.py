@@ -86,6 +86,7 @@ def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
 
     # only comments and descriptions may hold other than ASCII, and they have no effect
     scale, keymap = (text.encode("ascii", "replace").decode() for text in (choice.scale, choice.keymap))
+    _check_count(scale)
     field = "scale"
     try:
         if scale.strip():
@@ -111,6 +112,21 @@ def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
         told = f"key {bad[0]}" if len(bad) else "any key"
         raise ValueError(f"{field}: gives no pitch to {told}; its intervals or its reference pitch are impossible")
     return mapped, np.log2(pitch_hz)
+
+
+def _check_count(scale: str) -> None:
+    """Raises ValueError where a scale lists other than as many notes as it says, with both counts.
+
+    Notes are the lines below the count that begin with a number; a file that has no count is the library's to refuse.
+    """
+    lines = [line.strip() for line in scale.splitlines() if not line.startswith("!")]
+    words = lines[1].split() if len(lines) > 1 else []
+    said = words[0].lstrip("0") if words else ""
+    if not said.isdecimal():
+        return
+    listed = sum(line.startswith(tuple("+-.0123456789")) for line in lines[2:])
+    if said != str(listed):
+        raise ValueError(f"scale: says {said[:20]} notes and lists {listed}; correct its count or its list of notes")
 
 
 def _check_numbers(keymap: str) -> None:

@@ -6,7 +6,7 @@ stroke                      what is plucked and how it is mixed: values
 sources                     presets in memory, and the programs of their voices
 notes, ahead                the notes that ring; models that are rendered before they are heard
 live                        a patch that is played: events of keys and MIDI become notes
-playback                    a MIDI file, played in its time
+playback, due               a MIDI file, played in its time
 pair                        two sounds side by side, for the listening test
 
 Nothing is imported here: settings name a MIDI port before the engine is loaded.

@@ -41,6 +41,7 @@ _PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
     _UPPER_LETTERS[n]: s for n, s in _BLACK.items()
 }
 LOWEST_C = 48  # the MIDI key that A plays at octave 0
+SPAN = max(_WHITE)  # semitones from the lowest to the highest of the computer's keys
 OCTAVE_STEPS = {"Z": -1, "X": 1}
 LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
 
@@ -109,6 +110,12 @@ def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
 def letters_of(octave: int) -> dict[int, str]:
     """MIDI key -> what is printed on the computer's key that plays it."""
     return {LOWEST_C + 12 * octave + semitone: letter for letter, semitone in _PIANO_LETTERS.items()}
+
+
+def octaves_of(low: int, high: int) -> tuple[int, int]:
+    """The lowest and the highest octave with a computer's key for one of the MIDI keys from `low` to `high`."""
+    lowest, highest = -((LOWEST_C + SPAN - low) // 12), (high - LOWEST_C) // 12
+    return max(min(lowest, HIGHEST_OCTAVE), LOWEST_OCTAVE), max(min(highest, HIGHEST_OCTAVE), LOWEST_OCTAVE)
 
 
 def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:

@@ -20,6 +20,7 @@ from app.instrument.events import (
 )
 from app.instrument.player import SOURCES, Player, Struck
 from app.patches.patch import Patch, Pickup
+from app.playing.due import Due
 from app.playing.notes import Note, Notes
 from app.playing.sources import Sources
 from app.playing.stroke import Stroke
@@ -63,6 +64,7 @@ class Live:
         self._ear: Ear | None = None
         self._struck_s = 0.0
         self._made: tuple[Struck, Note] | None = None
+        self._due: Due | None = None  # of the event that is being handled
         self._recorded: list[TimedEvent] | None = None
         self._recording_began_s = 0.0
         self._told_full = False
@@ -118,24 +120,33 @@ class Live:
             player.listen(ear)
             self._prepare(player)
 
-    def handle(self, event: Event) -> tuple[Struck, Note] | None:
-        """Plays an event at once; what it struck, and the note. None where it struck nothing."""
-        struck_s = self._notes.now_s()
+    def handle(self, event: Event, due: Due | None = None) -> tuple[Struck, Note] | None:
+        """Plays an event, at once or when it is due; what it struck, and the note. None where it struck nothing."""
+        struck_s = self._notes.now_s() if due is None else 0.0
         with self._lock:
             player = self._player
             if player is None:
                 return None
             if player.rate_hz != self._notes.rate_hz:
                 player.set_rate(self._notes.rate_hz)
-            self._struck_s, self._made = struck_s, None
-            self._note_down(event)
+            self._struck_s, self._due, self._made = struck_s, due, None
+            self._note_down(event, time.monotonic() if due is None else due.time_s)
             try:
-                player.handle(event)
+                player.handle(event, 0 if due is None else due.frame_in(self._notes.mixer))
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
             if isinstance(event, Controller) and moves_effects(event, player.patch):
                 self._wish_effects(player.heard_through)
             return self._made
+
+    def cancel(self) -> None:
+        """What was handed over and is not due yet is not played."""
+        with self._lock:
+            if self._player is not None:
+                self._player.cancel()
+            if self._recorded is not None:
+                played_s = time.monotonic() - self._recording_began_s
+                self._recorded = [each for each in self._recorded if each.time_s <= played_s]
 
     def stop(self) -> None:
         """All strings fade out."""
@@ -216,7 +227,7 @@ class Live:
             if self._player is not None:
                 self._note_down_patch(self._player.patch)
                 for event in self._player.at_hand:
-                    self._note_down(event)
+                    self._note_down(event, time.monotonic())
 
     def end_recording(self) -> list[TimedEvent]:
         """The events, with times in s from the first note on; empty where there was no note.
@@ -224,8 +235,9 @@ class Live:
         Keys that are down and pedals are let go at its end.
         """
         with self._lock:
-            events, self._recorded = self._recorded or [], None
+            recorded, self._recorded = self._recorded or [], None
             end_s = time.monotonic() - self._recording_began_s
+        events = sorted((each for each in recorded if each.time_s <= end_s), key=lambda each: each.time_s)
         events += [TimedEvent(end_s, event) for event in still_down(each.event for each in events)]
         first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
         if first is None:
@@ -237,13 +249,13 @@ class Live:
         if self._ear is not None:
             pickup = Pickup(points=self._ear.points, kind=self._ear.pickup)
             patch = patch.model_copy(update={"pickup": pickup})
-        self._note_down(PatchTurned(patch))
+        self._note_down(PatchTurned(patch), time.monotonic())
 
-    def _note_down(self, event: Event) -> None:
+    def _note_down(self, event: Event, time_s: float) -> None:
         if self._recorded is None:
             return
         if len(self._recorded) < LONGEST_RECORDING:
-            self._recorded.append(TimedEvent(time.monotonic() - self._recording_began_s, event))
+            self._recorded.append(TimedEvent(time_s - self._recording_began_s, event))
         elif not self._told_full:
             self._told_full = True
             self._report(FULL, "")
@@ -276,4 +288,4 @@ class Live:
         subject = StringOf(self._path, struck.key.string.parameters)
         self._struck = struck
         stroke = Stroke(subject, struck.pluck, struck.ear, self.seconds, SOURCES, gain=struck.gain)
-        self._made = struck, self._notes.adopt(stroke, struck.voices, self._struck_s)
+        self._made = struck, self._notes.adopt(stroke, struck.voices, self._struck_s, self._due)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from app.instrument.events import Controller, Event, NoteOn
 from app.playing.keyboard import Reach
-from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+from app.shared.parameters import OF_CHOICES
 
 LOWEST_NOTE, HIGHEST_NOTE = 36, 96  # of a keyboard of 61 keys
 LARGEST_VALUE = 127
@@ -18,35 +17,14 @@ LARGEST_VALUE = 127
 NoteMode = Literal["pitch", "position", "preset"]
 
 
-@dataclass(frozen=True)
-class Turned:
-    """What a controller can be assigned to: the label of a field of `Choices`, and its range in the field's unit."""
-
-    label: str
-    low: float
-    high: float
-    logarithmic: bool = False
-
-    def value(self, controller_value: int) -> float:
-        """The field's value for a controller at 0 … 127."""
-        share = min(max(controller_value, 0), LARGEST_VALUE) / LARGEST_VALUE
-        if self.logarithmic:
-            return min(self.low * (self.high / self.low) ** share, self.high)
-        return min(self.low + share * (self.high - self.low), self.high)
-
-
-TURNED = {  # field of `Choices` -> what it is
-    "position": Turned("position", *POSITION_RANGE),
-    "amplitude_mm": Turned("amplitude", 0.0, LARGEST_AMPLITUDE_MM),
-    "width": Turned("width", *WIDTH_RANGE, logarithmic=True),
-    "listen": Turned("listening point", 0.0, 1.0),
-    "listen_right": Turned("right listening point", 0.0, 1.0),
-    "seconds": Turned("duration", *SECONDS_RANGE),
-    "speed": Turned("slow motion", *SPEED_RANGE, logarithmic=True),
-    "volume_db": Turned("volume", *VOLUME_RANGE_DB),
-}
-TurnedField = Literal["position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db"]
+TURNED = tuple(field for field, parameter in OF_CHOICES.items() if parameter.allows("learn"))
 ControllerNumber = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
+
+
+def _learnable(field: str) -> str:
+    if field not in TURNED:
+        raise ValueError(f"is no field that a controller can turn; try {', '.join(TURNED)}")
+    return field
 
 
 class MidiChoices(BaseModel):
@@ -62,7 +40,7 @@ class MidiChoices(BaseModel):
 
     port: str = ""
     notes: NoteMode = "pitch"
-    controllers: dict[TurnedField, ControllerNumber] = {}
+    controllers: dict[Annotated[str, AfterValidator(_learnable)], ControllerNumber] = {}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
         """These choices with `controller` assigned to `field`, and to no other."""
@@ -90,7 +68,7 @@ def meaning_of(event: Event, choices: MidiChoices, reach: Reach, presets: list[s
     """
     if isinstance(event, Controller):
         fields = [field for field, controller in choices.controllers.items() if controller == event.number]
-        return Meaning({field: TURNED[field].value(event.value) for field in fields})
+        return Meaning({field: OF_CHOICES[field].value(event.value / LARGEST_VALUE) for field in fields})
     if not isinstance(event, NoteOn):
         return Meaning({})
     changes: dict[str, Any] = {"amplitude_mm": reach.amplitude_of(event.velocity)}

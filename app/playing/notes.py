@@ -16,8 +16,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from app.audio.sound import Sound
+from app.audio.sound import Sound, SoundStatus
 from app.playing.ahead import Ahead, AheadVoice
+from app.playing.due import Due
 from app.playing.sources import Sources
 from app.playing.stroke import Mix, Stroke
 from app.rendering.subject import Subject
@@ -32,6 +33,7 @@ STOLEN_S = 0.03  # the fade of one that makes room
 STOP_S = 0.012  # the fade of `stop`
 REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
+LEAST_RELIEF = 2  # notes that end then, at each look at the load
 MATCHED_S = 1.0  # from the pluck on: the part whose levels are compared
 LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
 KEPT_MATCHES = 256
@@ -144,6 +146,7 @@ class Notes:
         self._helper = ThreadPoolExecutor(1, "notes-helper", step_back, (Rank.BACKGROUND,))
         self._closed = False
         self._wished_plucks: object = None
+        sound.watch(self._bound_load)
 
     # Gestures
 
@@ -171,27 +174,40 @@ class Notes:
             begin()
         return note
 
-    def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float) -> Note:
+    def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float, due: Due | None = None) -> Note:
         """A note of given voices, which have the rate of the present mixer; it sounds with the next quantum.
 
         It ends when the device changes its rate. All its sources have the gain of the stroke: they are not matched.
 
         Args:
-            struck_s: when the gesture was, by `now_s`.
+            struck_s: when the gesture was, by `now_s`; 0 where there was none.
+            due: when it sounds instead.
         """
-        note = Note(stroke)
+        mixer = self._sound.mixer
+        note = Note(stroke, begin_frame=0 if due is None else due.frame_in(mixer))
         note.adopted, note.voices, note.match = True, dict(voices), dict.fromkeys(voices, 1.0)
         for voice in voices.values():
             voice.set_struck(struck_s)
+            voice.begin_at(note.begin_frame)
         with self._lock:
             self._notes.append(note)
-        if not self._hand_over(note, self._sound.mixer):
+        if not self._hand_over(note, mixer):
             note.end()
         return note
 
     def now_s(self) -> float:
         """The clock by which gestures are timed."""
         return self._sound.now_s()
+
+    @property
+    def mixer(self) -> Mixer:
+        """The present one, whose frames are the time of events."""
+        return self._sound.mixer
+
+    @property
+    def buffer_s(self) -> float:
+        """The length of the device's buffer: so much may be rendered at once."""
+        return self._sound.status().latency_s
 
     @property
     def rate_hz(self) -> int:
@@ -279,7 +295,7 @@ class Notes:
         return tuple(self._latencies_s)
 
     def poll(self) -> None:
-        """Forgets notes that ended, moves listening points, bounds the load. The window calls it at each frame."""
+        """Forgets notes that ended, and moves listening points. The window calls it at each frame."""
         with self._lock:
             self._carry()
             self._notes = [note for note in self._notes if not note.over]
@@ -294,8 +310,6 @@ class Notes:
                 if self._ear is not None:
                     for voice in note.voices.values():
                         voice.listen(self._ear)
-            if self._sound.status().load > BUSY:
-                self._make_room(max(1, self.ringing - 2))
 
     def close(self) -> None:
         """Ends the threads; may be called again."""
@@ -426,6 +440,13 @@ class Notes:
             self._make_room(MOST_NOTES)
         self._wish_match(note)
         return True
+
+    def _bound_load(self, status: SoundStatus) -> None:
+        """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound."""
+        if status.load > BUSY:
+            with self._lock:
+                ringing = self.ringing
+                self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / status.load))))
 
     def _make_room(self, most: int) -> None:
         """Releases the oldest notes where more than `most` ring."""

@@ -1,27 +1,50 @@
-"""Plays a MIDI file: its events at their times, from a thread of its own."""
+"""Plays a MIDI file: a thread of its own hands each event over before its time, with the frame at which it counts."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 from app.instrument.events import Event, TimedEvent, channels_in, let_go
+from app.playing.due import Due
+from engine.voices import Mixer
 
-LEAD_S = 0.05  # before the first event
+AHEAD_S = 0.05  # by which an event is handed over early, and by the device's buffer: so late the thread may be
+LOOK_S = 0.05  # between two looks at the mixer, at most: it may be another
 JOIN_S = 2.0
+
+
+class Clock(Protocol):
+    """By what events are timed: the frames that a device has taken."""
+
+    @property
+    def mixer(self) -> Mixer:
+        """The present one."""
+
+    @property
+    def buffer_s(self) -> float:
+        """How much the device takes at once."""
 
 
 class Playback:
     """Plays one list of events at a time.
 
     Args:
-        handle: plays an event; called in the playback's thread.
+        handle: plays an event when it is due, or, for None, at once; called in the playback's thread.
+        cancel: ends what was handed over and is not due yet; called there as well.
         ended: is called when the last event was played, or it was stopped; in the playback's thread.
     """
 
-    def __init__(self, handle: Callable[[Event], object], ended: Callable[[], None] = lambda: None) -> None:
-        self._handle, self._ended = handle, ended
+    def __init__(
+        self,
+        handle: Callable[[Event, Due | None], object],
+        clock: Clock,
+        cancel: Callable[[], None],
+        ended: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._handle, self._clock, self._cancel, self._ended = handle, clock, cancel, ended
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -46,11 +69,50 @@ class Playback:
             thread.join(JOIN_S)
 
     def _run(self, events: Sequence[TimedEvent], stopping: threading.Event) -> None:
-        began_s = time.monotonic() + LEAD_S
+        beginning, due = _Beginning(self._clock, self._ahead_s), None
+        nobody_plays = let_go(channels_in(each.event for each in events))
         for each in events:
-            if stopping.wait(max(0.0, began_s + each.time_s - time.monotonic())):
+            due = beginning.wait(each.time_s, self._ahead_s, stopping)
+            if stopping.is_set():
                 break
-            self._handle(each.event)
-        for event in let_go(channels_in(each.event for each in events)):
-            self._handle(event)
+            self._handle(each.event, due)
+        else:
+            for event in nobody_plays:  # with the last event
+                self._handle(event, due)
+            if events:
+                beginning.wait(events[-1].time_s, 0.0, stopping)
+        if stopping.is_set():
+            self._cancel()
+            for event in nobody_plays:
+                self._handle(event, None)
         self._ended()
+
+    @property
+    def _ahead_s(self) -> float:
+        return AHEAD_S + self._clock.buffer_s
+
+
+class _Beginning:
+    """The frame at which a list of events begins; if there is another mixer, it goes on in that one."""
+
+    def __init__(self, clock: Clock, ahead_s: float) -> None:
+        self._clock, self._mixer = clock, clock.mixer
+        self._frame = self._mixer.frames + round(ahead_s * self._mixer.rate_hz)
+        self._began_s = time.monotonic() + ahead_s
+
+    def due(self, time_s: float) -> Due:
+        """When an event is due, `time_s` after the beginning."""
+        mixer = self._clock.mixer
+        if mixer is not self._mixer:
+            played_s = (self._mixer.frames - self._frame) / self._mixer.rate_hz
+            self._mixer, self._frame = mixer, mixer.frames - round(played_s * mixer.rate_hz)
+            self._began_s = time.monotonic() - played_s
+        return Due(mixer, self._frame + round(time_s * mixer.rate_hz), self._began_s + time_s)
+
+    def wait(self, time_s: float, ahead_s: float, stopping: threading.Event) -> Due:
+        """Waits until `ahead_s` before an event is due, or until it is to stop."""
+        while True:
+            due = self.due(time_s)
+            early_s = (due.frame - due.mixer.frames) / due.mixer.rate_hz - ahead_s
+            if early_s <= 0 or stopping.wait(min(early_s, LOOK_S)):
+                return due

@@ -105,7 +105,7 @@ class Job:
             ("model", loaded.model, loaded.model_program),
             ("truth", loaded.truth, loaded.truth_program),
         ):
-            motion = take.motion(name)
+            motion = take.motions[name]
             self._lines[name] = Line(source, program, info, request.pluck, motion, request.seconds, stride)
         self._errors = ErrorSums(take.frames - 1)
         take.listened = self._listened(request.ear)
@@ -130,7 +130,7 @@ class Job:
                 line.show(self._strobe)
             listened = self._coming or take.listened
             listened.signals[name] = line.listen(listened.ear)
-            take.others[name] = motion
+            take.motions[name] = motion
 
     def _show(self, take: Take) -> None:
         """Begins new flashes where the slow motion has changed; flashes that are under way are finished first."""
@@ -186,7 +186,7 @@ class Job:
         """Adds the error of new pictures."""
         first, stop = self._measured, take.ready_frames
         if stop > first:
-            model, truth = (torch.from_numpy(take.motion(name).read(first, stop)[None]) for name in SOURCES)
+            model, truth = (torch.from_numpy(take.motions[name].read(first, stop)[None]) for name in SOURCES)
             self._errors.add(model, truth, first - 1, row=0)
             self._measured = stop
 

@@ -29,22 +29,20 @@ def picture_stride(rate_hz: int) -> int:
     return math.ceil(rate_hz / PICTURE_HZ)
 
 
-class Motion:
-    """Displacement of one source on its grid, (frames, grid_points) in m, growing at its end.
+class Series:
+    """Frames of one source, (frames, places), growing at their end.
 
     Attributes:
-        rate_hz: pictures per second; the first is the initial displacement.
-        frames: pictures when complete.
-        ready_frames: pictures so far.
-        flashes: the string at the times that slow motion shows; None: there are none.
+        rate_hz: frames per second; the first is at the release.
+        frames: when complete.
+        ready_frames: so far.
     """
 
-    def __init__(self, rate_hz: float, grid_points: int, seconds: float) -> None:
-        self.rate_hz = rate_hz
+    def __init__(self, rate_hz: float, places: int, seconds: float) -> None:
+        self.rate_hz, self.places = rate_hz, places
         self.frames = int(seconds * rate_hz + _TINY) + 1
         self.ready_frames = 0
-        self.flashes: Flashes | None = None
-        self._m = np.empty((self.frames, grid_points), np.float32)
+        self._values = np.empty((self.frames, places), np.float32)
 
     @property
     def complete(self) -> bool:
@@ -53,21 +51,46 @@ class Motion:
     @property
     def bytes(self) -> int:
         """Memory in bytes."""
-        return self._m.nbytes + (self.flashes.bytes if self.flashes is not None else 0)
+        return self._values.nbytes
 
-    def append(self, frames_m: NDArray[np.float32]) -> None:
-        start, stop = self.ready_frames, self.ready_frames + len(frames_m)
-        self._m[start:stop] = frames_m
+    def append(self, values: NDArray[np.float32]) -> None:
+        start, stop = self.ready_frames, self.ready_frames + len(values)
+        self._values[start:stop] = values
         self.ready_frames = stop
 
     def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
-        """The pictures start … stop - 1 that are ready."""
+        """The frames start … stop - 1 that are ready."""
         ready = self.ready_frames
-        return self._m[min(start, ready) : ready if stop is None else min(stop, ready)]
+        return self._values[min(start, ready) : ready if stop is None else min(stop, ready)]
+
+
+class Signal(Series):
+    """What is heard of a source at the listening points, in m or m/s, at the source's own rate."""
+
+    rate_hz: int
+
+    def end_in_silence(self) -> None:
+        """Completes the signal with zeros."""
+        self._values[self.ready_frames :] = 0.0
+        self.ready_frames = self.frames
+
+
+class Motion(Series):
+    """Pictures: the displacement of a source on its grid, in m.
+
+    Attributes:
+        flashes: the string at the times that slow motion shows; None: there are none.
+    """
+
+    flashes: Flashes | None = None
+
+    @property
+    def bytes(self) -> int:
+        return super().bytes + (self.flashes.bytes if self.flashes is not None else 0)
 
     def shape_m(self, position_s: float) -> NDArray[np.float32]:
-        """The string (grid_points,) that the strobe shows; the nearest picture where its flash is not ready."""
-        shown = self.flash_m(position_s)
+        """The string (places,) that the strobe shows; the nearest picture where its flash is not ready."""
+        shown = self._flash_m(position_s)
         if shown is None:
             nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
             shown = self.read(nearest, nearest + 1)[0]
@@ -75,52 +98,11 @@ class Motion:
 
     def strobe_at(self, position_s: float) -> Strobe | None:
         """The strobe whose flash `shape_m` returns; None where that is a picture."""
-        flashes = self.flashes
-        return None if flashes is None or self.flash_m(position_s) is None else flashes.strobe
+        return self.flashes.strobe if self.flashes is not None and self._flash_m(position_s) is not None else None
 
-    def flash_m(self, position_s: float) -> NDArray[np.float32] | None:
-        """As `shape_m`, but None where the flash is not ready."""
+    def _flash_m(self, position_s: float) -> NDArray[np.float32] | None:
         flashes = self.flashes
         return None if flashes is None else flashes.shape_m(flashes.strobe.flash(position_s))
-
-
-class Signal:
-    """What is heard of one source, (frames, points) in m or m/s at the source's own rate, growing at its end.
-
-    Attributes:
-        frames: samples of each point when complete.
-        ready_frames: so far.
-    """
-
-    def __init__(self, rate_hz: int, points: int, seconds: float) -> None:
-        self.rate_hz = rate_hz
-        self.frames = int(seconds * rate_hz + _TINY) + 1
-        self.ready_frames = 0
-        self._samples = np.empty((self.frames, points), np.float32)
-
-    @property
-    def complete(self) -> bool:
-        return self.ready_frames == self.frames
-
-    @property
-    def bytes(self) -> int:
-        """Memory in bytes."""
-        return self._samples.nbytes
-
-    def append(self, samples: NDArray[np.float32]) -> None:
-        start, stop = self.ready_frames, self.ready_frames + len(samples)
-        self._samples[start:stop] = samples
-        self.ready_frames = stop
-
-    def end_in_silence(self) -> None:
-        """Completes the signal with zeros."""
-        self._samples[self.ready_frames :] = 0.0
-        self.ready_frames = self.frames
-
-    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float32]:
-        """The frames start … stop - 1 that are ready."""
-        ready = self.ready_frames
-        return self._samples[min(start, ready) : ready if stop is None else min(stop, ready)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +127,7 @@ class Take:
         stride: samples between two pictures of model and truth.
         model: renders more of the model where it is needed; has no state.
         model_ends_s: the time of the last valid frame where the model's output ran away; it is at rest from then on.
-        others: motions of other presets' models for the same pluck, by source, each at its own rate and on its
-            own grid.
+        motions: by source; those of other presets' models each at its own rate and on its own grid.
         listened: the signals of all of them; replaced as a whole when the listening points change.
         fundamental_hz: of the string at small amplitudes.
     """
@@ -168,9 +149,8 @@ class Take:
         self.stride = stride
         self.model = model
         self.model_ends_s: float | None = None
-        self._motions = {name: Motion(info.rate_hz / stride, info.grid_points, seconds) for name in SOURCES}
-        self.frames = self._motions["truth"].frames
-        self.others: dict[str, Motion] = {}
+        self.motions = {name: Motion(info.rate_hz / stride, info.grid_points, seconds) for name in SOURCES}
+        self.frames = self.motions["truth"].frames
         self.listened = Listened(ear, {name: Signal(info.rate_hz, len(ear.points), seconds) for name in SOURCES})
         self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
 
@@ -182,7 +162,7 @@ class Take:
     @property
     def ready_frames(self) -> int:
         """Pictures that are ready of both model and truth."""
-        return min(motion.ready_frames for motion in self._motions.values())
+        return min(self.motions[name].ready_frames for name in SOURCES)
 
     @property
     def complete(self) -> bool:
@@ -192,7 +172,7 @@ class Take:
     @property
     def progress(self) -> tuple[object, ...]:
         """A value that changes whenever more of it is ready, or signals or flashes are replaced."""
-        motions, signals = [*self._motions.values(), *self.others.values()], list(self.listened.signals.values())
+        motions, signals = list(self.motions.values()), list(self.listened.signals.values())
         flashes = [motion.flashes for motion in motions if motion.flashes is not None]
         return (
             self.listened,
@@ -203,17 +183,8 @@ class Take:
 
     def bytes(self, source: str) -> int:
         """Memory that a source takes, in bytes."""
-        return self.motion(source).bytes + self.listened.signals[source].bytes
-
-    def motion(self, source: str) -> Motion:
-        """The growing motion of a source: "model", "truth" or one of `others`."""
-        return self._motions[source] if source in self._motions else self.others[source]
-
-    def append(self, model_m: NDArray[np.float32], truth_m: NDArray[np.float32]) -> None:
-        """Adds pictures (frames, grid_points) in m of both sources."""
-        self._motions["model"].append(model_m)
-        self._motions["truth"].append(truth_m)
+        return self.motions[source].bytes + self.listened.signals[source].bytes
 
     def motion_m(self, source: str) -> NDArray[np.float32]:
         """The pictures so far, (ready_frames, grid_points), in m."""
-        return self.motion(source).read(0, self.ready_frames if source in SOURCES else None)
+        return self.motions[source].read(0, self.ready_frames if source in SOURCES else None)

@@ -5,7 +5,7 @@ All choices are one immutable, validated value; the session replaces it and sign
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any, Literal
 
 from psygnal import Signal
@@ -13,16 +13,20 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from app.patches.patch import Patch, PhysicalString
 from app.session.instrument import EARS, heard_at, picked_up
-from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Pickup
-from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Pluck, Shape
+from app.shared.parameters import OF_CHOICES
+from app.shared.vocabulary import Pickup
+from engine.pluck import Pluck, Shape
 
 Slot = Literal["a", "b"]  # two sources to compare; each holds "model", "truth", "difference" or "preset:NAME"
 SLOT_PATTERN = r"^(model|truth|difference|preset:.+)$"
 
-SECONDS_RANGE = (0.5, 12.0)
-VOLUME_RANGE_DB = (-60.0, 12.0)
 HIGHEST_MODE = 9_999  # of any grid that a preset may have
-SPEED_RANGE = (0.001, 1.0)  # 1 is real time; a thousandth shows one period of a low string in seconds
+
+
+def _parameter(name: str) -> Any:
+    """A field with range and default of the table of parameters."""
+    low, high = OF_CHOICES[name].limits
+    return Field(OF_CHOICES[name].default, ge=low, le=high)
 
 
 class Choices(BaseModel):
@@ -43,13 +47,13 @@ class Choices(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     preset: str = ""
-    position: float = Field(0.35, ge=POSITION_RANGE[0], le=POSITION_RANGE[1])
-    amplitude_mm: float = Field(4.0, ge=0, le=LARGEST_AMPLITUDE_MM)
+    position: float = _parameter("position")
+    amplitude_mm: float = _parameter("amplitude_mm")
     shape: Shape = "gaussian"
-    width: float = Field(0.06, ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])
-    listen: float = Field(DEFAULT_LISTEN, ge=0, le=1)
-    seconds: float = Field(4.0, ge=SECONDS_RANGE[0], le=SECONDS_RANGE[1])
-    listen_right: float = Field(1 - DEFAULT_LISTEN, ge=0, le=1)  # used in stereo, where `listen` is the left one
+    width: float = _parameter("width")
+    listen: float = _parameter("listen")
+    seconds: float = _parameter("seconds")
+    listen_right: float = _parameter("listen_right")  # used in stereo, where `listen` is the left one
     stereo: bool = False
     pickup: Pickup = "displacement"
     solo: int = Field(0, ge=0, le=HIGHEST_MODE)  # above 0: this mode is heard alone
@@ -57,10 +61,10 @@ class Choices(BaseModel):
     b: str = Field("truth", pattern=SLOT_PATTERN)
     heard: Slot = "a"
     level_match: bool = True
-    difference_gain_db: float = Field(20.0, ge=DIFFERENCE_GAIN_RANGE_DB[0], le=DIFFERENCE_GAIN_RANGE_DB[1])
+    difference_gain_db: float = _parameter("difference_gain_db")
     loop: bool = False
-    volume_db: float = Field(4.0, ge=VOLUME_RANGE_DB[0], le=VOLUME_RANGE_DB[1])
-    speed: float = Field(0.004, ge=SPEED_RANGE[0], le=SPEED_RANGE[1])
+    volume_db: float = _parameter("volume_db")
+    speed: float = _parameter("speed")
     left_view: str = "spectrum"  # names of panels
     right_view: str = "waveform"
     motion: bool = True  # whether the string's picture shows its motion, and the envelope of it
@@ -86,6 +90,26 @@ class Choices(BaseModel):
     @property
     def source_heard(self) -> str:
         return self.a if self.heard == "a" else self.b
+
+    @property
+    def plays_pitches(self) -> bool:
+        """Whether keys are pitches of the patch; otherwise they pluck at ten places."""
+        return self.keys_play == "pitch" and self.patch is not None
+
+    def changed(self, changes: Mapping[str, Any]) -> Choices:
+        """These choices with other values: the one way to change them. Another preset resets `string`, unless given.
+
+        Raises:
+            ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
+        """
+        if changes.get("preset", self.preset) != self.preset:
+            changes = {"string": None, **changes}
+        try:  # of the other fields, which are valid, only the slots: without them `heard` is read as an old one
+            checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        return _with_one_ear(self.model_copy(update={name: getattr(checked, name) for name in changes}), changes)
 
 
 class Session:
@@ -127,28 +151,20 @@ class Session:
             self.played.emit(names)
             self.changed.emit(names)
 
-    def _take(self, changes: dict[str, Any]) -> frozenset[str]:
-        """Returns the fields that have new values. Another preset resets `string`, unless that is given."""
-        if changes.get("preset", self._choices.preset) != self._choices.preset:
-            changes = {"string": None, **changes}
-        try:
-            new = Choices.model_validate({**dict(self._choices), **changes})
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-        new = _with_one_ear(new, changes)
-        before, self._choices = self._choices, new
-        return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(new, n))
+    def _take(self, changes: Mapping[str, Any]) -> frozenset[str]:
+        """Returns the fields that have new values."""
+        before, self._choices = self._choices, self._choices.changed(changes)
+        return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(self._choices, n))
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
         """Takes the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
         self.update(
-            position=_clamp(position, POSITION_RANGE),
-            amplitude_mm=_clamp(amplitude_mm, (0, LARGEST_AMPLITUDE_MM)),
+            position=OF_CHOICES["position"].clamped(position),
+            amplitude_mm=OF_CHOICES["amplitude_mm"].clamped(amplitude_mm),
         )
 
     def move_listening_point(self, listen: float) -> None:
-        self.update(listen=_clamp(listen, (0, 1)))
+        self.update(listen=OF_CHOICES["listen"].clamped(listen))
 
     @property
     def source_heard(self) -> str:
@@ -171,13 +187,9 @@ def _with_one_ear(choices: Choices, asked: Collection[str]) -> Choices:
         ValueError: the patch cannot be heard so.
     """
     patch = choices.patch
-    if patch is None or choices.keys_play != "pitch":
+    if patch is None or not choices.plays_pitches:
         return choices
     if "patch" not in asked and any(name in asked for name in EARS):
         heard = picked_up(patch, choices.listen, choices.listen_right, choices.stereo, choices.pickup)
         return choices.model_copy(update={"patch": heard})
     return choices.model_copy(update=heard_at(patch))
-
-
-def _clamp(value: float, limits: tuple[float, float]) -> float:
-    return min(max(value, limits[0]), limits[1])

@@ -8,9 +8,10 @@ import numpy as np
 
 from app.presets.library import Library
 from app.rendering import SOURCES, Take
-from app.session.choices import VOLUME_RANGE_DB, Choices
+from app.session.choices import Choices
 from app.session.ears import heard_ear
 from app.session.slots import info_of, other_preset
+from app.shared.parameters import OF_CHOICES
 from engine.presets import outside_training
 from engine.resonators.sine_transform import to_modes
 
@@ -22,7 +23,7 @@ def why_silent(choices: Choices, library: Library) -> str:
     """A reason that is known before anything is rendered: from amplitude, volume, presets, points and modes."""
     if choices.amplitude_mm == 0:
         return "silent: the amplitude is 0"
-    if choices.volume_db <= VOLUME_RANGE_DB[0]:
+    if choices.volume_db <= OF_CHOICES["volume_db"].limits[0]:
         return "silent: the volume is at its minimum"
     if (name := other_preset(choices.source_heard)) and library.find(name) is None:
         return f"silent: the preset {name} was not found"

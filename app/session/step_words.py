@@ -9,50 +9,33 @@ from pydantic import BaseModel
 
 from app.patches.patch import Patch
 from app.session.instrument import EARS
+from app.shared.parameters import OF_CHOICES, OF_PATCHES
 
 MOST_NAMED = 2  # fields in one step's name
 SEVERAL = "several settings"
 CHOICES = {  # fields of `Choices`
-    "position": "pluck position",
-    "amplitude_mm": "amplitude",
+    **{
+        name: OF_CHOICES[name].name
+        for name in ("position", "amplitude_mm", "width", "seconds", "listen", "listen_right")
+    },
     "shape": "pluck shape",
-    "width": "pluck width",
-    "seconds": "duration",
-    "listen": "listening point",
-    "listen_right": "right listening point",
     "stereo": "stereo",
     "pickup": "pick-up",
     "string": "string",
 }
-PATCH = {  # fields of a patch, by their path; a field that is not here is named by the last part of its path
+PATCH = {  # other fields of a patch than parameters, by their path; the rest are named by the last part of theirs
     "name": "name of the patch",
     "preset": "model",
-    "knobs.brightness_decay": "dulling",
-    "knobs.length": "string length",
     "range": "range of keys",
-    "pluck.position": "pluck position",
-    "pluck.width": "soft width",
-    "pluck.width_hard": "hard width",
-    "pluck.softest_mm": "softest amplitude",
-    "pluck.hardest_mm": "hardest amplitude",
     "pluck.shape": "pluck shape",
-    "pluck.curve": "velocity curve",
     "pickup.points": "listening point",
     "pickup.kind": "pick-up",
-    "damping.release_t60_s": "release",
     "mode": "playing mode",
     "bend_semitones": "range of bends",
     "bend_by": "kind of bends",
     "mod_wheel": "modulation wheel",
-    "tuning.a4_hz": "pitch of A4",
     "tuning.keymap": "keyboard mapping",
-    "tuning.transpose": "transposition",
     "body.name": "body",
-    "body.mix": "body mix",
-    "body.size": "body size",
-    "room.mix": "room",
-    "room.t60_s": "reverberation time",
-    "level_db": "level",
 }
 PICKUP = {"pickup.points", "pickup.kind"}  # fields of a patch that are EARS of `Choices` too
 
@@ -104,6 +87,8 @@ def _of_patch(before: Patch | None, after: Patch | None) -> str:
 
 def field_words(field: str) -> str:
     """A patch's field, by its path."""
+    if field in OF_PATCHES:
+        return OF_PATCHES[field].name
     return PATCH.get(field, field.rpartition(".")[2].replace("_", " "))
 
 

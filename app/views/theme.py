@@ -1,4 +1,4 @@
-"""Colours, fonts and the style sheet. A theme, dark or light, has a colour for each role.
+"""Colours, fonts and the style sheet (`sheet.qss`). A theme, dark or light, has a colour for each role.
 
 Read the colours as `theme.TEXT` when painting; never import one by name, for they change with the theme. Plots keep
 the pens that they were made with: `app.views.plots.plots.recolour` exchanges these.
@@ -6,7 +6,8 @@ the pens that they were made with: `app.views.plots.plots.recolour` exchanges th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -80,6 +81,7 @@ LIGHT = Theme(
     shade_alpha=26,
 )
 
+SHEET = Path(__file__).with_name("sheet.qss")
 SIGNS = Path(__file__).parent / "signs"  # pictures for the style sheet, in the themes' colours
 
 _SCHEMES: dict[ThemeChoice, Qt.ColorScheme] = {
@@ -89,18 +91,14 @@ _SCHEMES: dict[ThemeChoice, Qt.ColorScheme] = {
 }
 
 present = DARK
-BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT = (
-    DARK.background,
-    DARK.panel,
-    DARK.raised,
-    DARK.line,
-    DARK.text,
-    DARK.faint,
-)
-MODEL, TRUTH, WARNING, GOOD = DARK.model, DARK.truth, DARK.warning, DARK.good
-DISABLED = DARK.disabled
-DIFFERENCE, OTHER = DARK.difference, DARK.other
-SOURCE_COLOURS = {"model": MODEL, "truth": TRUTH, "difference": DIFFERENCE, "other": OTHER}
+SOURCE_COLOURS = {kind: getattr(DARK, kind) for kind in ("model", "truth", "difference", "other")}
+
+
+def __getattr__(name: str) -> str:
+    """The present theme's colour of a role, as `theme.TEXT`."""
+    if name.lower() not in Theme.__annotations__:
+        raise AttributeError(name)
+    return str(getattr(present, name.lower()))
 
 
 def source_kind(source: str) -> str:
@@ -117,13 +115,9 @@ changes = _Changes()
 
 def use(new: Theme) -> None:
     """Makes `new` the present theme and emits `changes.theme_changed`; the style sheet is set by `apply_theme`."""
-    global present, BACKGROUND, PANEL, RAISED, LINE, TEXT, FAINT, DISABLED
-    global MODEL, TRUTH, DIFFERENCE, OTHER, WARNING, GOOD
+    global present
     old, present = present, new
-    BACKGROUND, PANEL, RAISED, LINE = new.background, new.panel, new.raised, new.line
-    TEXT, FAINT, WARNING, GOOD, DISABLED = new.text, new.faint, new.warning, new.good, new.disabled
-    MODEL, TRUTH, DIFFERENCE, OTHER = new.model, new.truth, new.difference, new.other
-    SOURCE_COLOURS.update(model=MODEL, truth=TRUTH, difference=DIFFERENCE, other=OTHER)
+    SOURCE_COLOURS.update({kind: getattr(new, kind) for kind in SOURCE_COLOURS})
     if new != old:
         changes.theme_changed.emit(old, new)
 
@@ -143,139 +137,28 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
-    tick = (SIGNS / f"tick_{'dark' if present == DARK else 'light'}.svg").as_posix()
-    slots = "\n".join(
-        f"QPushButton#{kind}:checked {{ background: {colour}; color: {BACKGROUND}; border-color: {colour};"
-        f" font-weight: 600; }} QPushButton#{kind} {{ border-left: 3px solid {colour}; padding: 6px; }}"
-        f" QPushButton#{kind}:disabled {{ background: {RAISED}; color: {DISABLED}; border-color: {LINE}; }}"
-        for kind, colour in SOURCE_COLOURS.items()
-    )
-    return f"""
-QWidget {{ color: {TEXT}; font-size: 12px; }}
-QMainWindow, QDialog {{ background: {BACKGROUND}; }}
-QFrame#rule {{ background: {LINE}; }}
-QFrame#panel {{ background: {PANEL}; border: 1px solid {LINE}; border-radius: 6px; }}
-QFrame#panel QScrollArea, QFrame#panel QScrollArea > QWidget > QWidget {{ background: transparent; }}
-QFrame#browser {{ background: {PANEL}; border: 1px solid {FAINT}; border-radius: 8px; }}
-QFrame#browser QScrollArea, QFrame#browser QScrollArea > QWidget > QWidget {{ background: transparent; }}
-QTreeWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
-QTreeWidget::item {{ padding: 6px 5px; }}
-QTreeWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
-QTreeWidget:focus {{ border: 1px solid {FAINT}; }}
-QHeaderView::section {{ background: {BACKGROUND}; color: {FAINT}; border: none; padding: 5px; }}
-QPushButton#preset {{ text-align: left; font-weight: 600; padding: 6px 12px; }}
-QLabel {{ background: transparent; }}
-QLabel#faint {{ color: {FAINT}; }}
-QLabel#knob {{ color: {FAINT}; font-size: 10px; padding-top: 4px; }}
-QLabel#group {{ color: {FAINT}; font-size: 9px; font-weight: 600; letter-spacing: 1px; }}
-QLabel#hint {{
-    color: {TEXT}; background: {PANEL}; border: 1px solid {FAINT}; border-radius: 10px; padding: 3px 12px; }}
-QLabel#brand {{ font-size: 14px; font-weight: 600; letter-spacing: 3px; color: {TEXT}; }}
-QLabel#badge {{
-    color: {FAINT}; background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; padding: 3px 8px; }}
-QLabel#badge[fault="true"] {{ color: {WARNING}; border-color: {WARNING}; }}
-QLabel#warning {{ color: {WARNING}; }}
-QLabel#good {{ color: {GOOD}; }}
-QLabel#title {{ font-size: 15px; font-weight: 600; }}
-QPushButton, QToolButton {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 6px 12px; }}
-QPushButton {{ outline: none; }}
-QPushButton:hover, QToolButton:hover {{ border-color: {FAINT}; }}
-QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
-QPushButton:checked, QToolButton:checked {{ background: {LINE}; border-color: {TEXT}; }}
-QPushButton:focus, QToolButton:focus, QComboBox:focus, QLineEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus,
-QCheckBox:focus, QPlainTextEdit:focus, QTextBrowser:focus, QListWidget:focus, QTableView:focus, QMenuBar:focus
-    {{ border: 1px solid {TEXT}; }}
-QPushButton:disabled, QToolButton:disabled, QComboBox:disabled, QLineEdit:disabled, QDoubleSpinBox:disabled,
-QSpinBox:disabled, QListWidget:disabled {{ color: {DISABLED}; }}
-{slots}
-QToolButton#filter, QToolButton#solo {{ color: {TRUTH}; border-color: {TRUTH}; padding: 6px 9px; }}
-QToolButton#solo {{ padding: 1px 9px; }}
-QPushButton#play {{ font-weight: 600; min-width: 84px; padding: 9px 14px; }}
-QPushButton#play:checked {{ background: {GOOD}; color: {BACKGROUND}; border-color: {GOOD}; }}
-*[compact="true"] {{ padding: 6px 4px; }}
-QPushButton#play[compact="true"] {{ min-width: 56px; padding: 9px 4px; }}
-QToolButton#small {{ padding: 4px 8px; }}
-QToolButton#record {{ padding: 2px 8px; }}
-QToolButton#record:checked {{ background: {WARNING}; color: {BACKGROUND}; border-color: {WARNING}; }}
-QToolButton#narrow {{ padding: 6px 5px; }}
-QToolButton::menu-indicator {{ image: none; }}
-QToolButton#chip {{ color: {FAINT}; background: transparent; padding: 2px 8px; border-radius: 4px; font-size: 11px; }}
-QToolButton#chip:checked {{ color: {TEXT}; background: {LINE}; border-color: {LINE}; }}
-QToolButton#chip:hover, QToolButton#chip:focus {{ border-color: {FAINT}; }}
-QToolButton#chip:disabled {{ color: {DISABLED}; }}
-QComboBox, QLineEdit, QDoubleSpinBox, QSpinBox, QPlainTextEdit, QTextBrowser, QListWidget {{
-    background: {RAISED}; border: 1px solid {LINE}; border-radius: 5px; padding: 5px 8px;
-    selection-background-color: {TRUTH}; selection-color: {BACKGROUND}; }}
-QDoubleSpinBox QLineEdit, QSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
-QDoubleSpinBox::up-button, QDoubleSpinBox::down-button, QSpinBox::up-button, QSpinBox::down-button
-    {{ width: 0; border: none; }}
-QComboBox::drop-down {{ border: none; width: 22px; }}
-QComboBox::down-arrow {{ image: none; width: 0; height: 0; border-left: 4px solid {RAISED};
-    border-right: 4px solid {RAISED}; border-top: 5px solid {FAINT}; }}
-QCheckBox {{ spacing: 8px; border: 1px solid transparent; border-radius: 4px; padding: 1px 4px; }}
-QCheckBox:disabled {{ color: {DISABLED}; }}
-QCheckBox::indicator, QListWidget::indicator {{
-    width: 13px; height: 13px; background: {RAISED}; border: 1px solid {FAINT}; border-radius: 3px; }}
-QCheckBox::indicator:checked, QListWidget::indicator:checked {{
-    background: {TEXT}; border-color: {TEXT}; image: url("{tick}"); }}
-QCheckBox::indicator:disabled {{ border-color: {DISABLED}; }}
-QCheckBox::indicator:checked:disabled {{ background: {DISABLED}; }}
-QListWidget {{ background: {BACKGROUND}; border: 1px solid {LINE}; border-radius: 6px; outline: none; }}
-QListWidget:focus {{ border: 1px solid {FAINT}; }}
-QListWidget::item {{ padding: 3px 5px; }}
-QListWidget::item:selected {{ background: {LINE}; color: {TEXT}; }}
-QPushButton#primary {{ background: {TEXT}; color: {BACKGROUND}; border-color: {TEXT}; font-weight: 600; }}
-QPushButton#primary:disabled {{ background: {RAISED}; color: {FAINT}; border-color: {LINE}; }}
-QComboBox QAbstractItemView, QMenu {{
-    background: {RAISED}; border: 1px solid {LINE}; selection-background-color: {LINE}; }}
-QMenu::item:selected {{ background: {LINE}; }}
-QSlider::groove:horizontal {{ height: 4px; background: {LINE}; border-radius: 2px; }}
-QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; background: {TEXT}; }}
-QSlider::handle:horizontal:focus {{ background: {TRUTH}; }}
-QProgressBar {{ background: {RAISED}; border: 1px solid {LINE}; border-radius: 4px; text-align: center; }}
-QProgressBar::chunk {{ background: {TRUTH}; }}
-QTabWidget::pane {{ border: none; }}
-QTabBar {{ background: transparent; qproperty-drawBase: 0; }}
-QTabBar QToolButton {{ padding: 0; border-radius: 3px; }}
-QTabBar::tab {{ color: {FAINT}; padding: 4px 9px; border: none; border-bottom: 2px solid transparent; }}
-QTabBar::tab:hover {{ color: {TEXT}; }}
-QTabBar::tab:selected {{ color: {TEXT}; border-bottom-color: {FAINT}; }}
-QTabBar::tab:focus {{ border-bottom-color: {TEXT}; }}
-QScrollBar {{ background: transparent; border: none; }}
-QScrollBar:horizontal {{ height: 9px; }}
-QScrollBar:vertical {{ width: 9px; }}
-QScrollBar::handle {{
-    background: {DISABLED}; border-radius: 3px; margin: 1px; min-width: 24px; min-height: 24px; }}
-QScrollBar::handle:hover {{ background: {FAINT}; }}
-QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
-QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
-QTableView {{ background: {PANEL}; border: none; selection-background-color: {LINE}; }}
-QHeaderView {{ background: {PANEL}; border: none; }}
-QHeaderView::section {{
-    background: {PANEL}; color: {FAINT}; border: none; border-bottom: 1px solid {LINE}; padding: 6px 6px 4px 6px; }}
-QHeaderView::up-arrow, QHeaderView::down-arrow {{
-    subcontrol-origin: border; subcontrol-position: top center; width: 8px; height: 6px; }}
-QToolTip {{ background: {RAISED}; color: {TEXT}; border: 1px solid {LINE}; }}
-"""
+    tick = SIGNS / f"tick_{'dark' if present == DARK else 'light'}.svg"
+    values = {**asdict(present), "tick": tick.as_posix()}
+    return re.sub(r"@(\w+)", lambda found: str(values[found[1]]), SHEET.read_text("utf-8"))
 
 
 def _palette() -> QPalette:
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in {
-        roles.Window: BACKGROUND,
-        roles.Base: RAISED,
-        roles.AlternateBase: PANEL,
-        roles.Button: RAISED,
-        roles.Text: TEXT,
-        roles.WindowText: TEXT,
-        roles.ButtonText: TEXT,
-        roles.PlaceholderText: FAINT,
-        roles.ToolTipBase: RAISED,
-        roles.ToolTipText: TEXT,
-        roles.Highlight: TRUTH,
-        roles.HighlightedText: BACKGROUND,
-        roles.Link: TRUTH,
+        roles.Window: present.background,
+        roles.Base: present.raised,
+        roles.AlternateBase: present.panel,
+        roles.Button: present.raised,
+        roles.Text: present.text,
+        roles.WindowText: present.text,
+        roles.ButtonText: present.text,
+        roles.PlaceholderText: present.faint,
+        roles.ToolTipBase: present.raised,
+        roles.ToolTipText: present.text,
+        roles.Highlight: present.truth,
+        roles.HighlightedText: present.background,
+        roles.Link: present.truth,
     }.items():
         palette.setColor(role, QColor(colour))
     return palette

@@ -16,12 +16,13 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from app.analysis.abx.subject import subject_of
+from app.analysis.abx.record import subject_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn
 from app.instrument.player import Struck
 from app.playing.chosen import mix_of
+from app.playing.due import Due
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices, Session
 from app.session.history import History
@@ -232,11 +233,11 @@ class Controller(QObject):
         if self._abx is None:
             self.performance.strike(choices)
 
-    def _handle(self, event: Event) -> Struck | None:
+    def _handle(self, event: Event, due: Due | None) -> Struck | None:
         """An event of an instrument; called in the instrument's thread."""
         if self._abx is not None and isinstance(event, NoteOn):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.performance.handle(event)
+        return self.performance.handle(event, due)
 
     def play_or_stop(self) -> None:
         if self._abx is None:
@@ -330,7 +331,7 @@ class Controller(QObject):
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:
-            panel.close()
+            panel.end()
         self.performance.close()
         self.sound.close()
 
@@ -402,7 +403,7 @@ class Controller(QObject):
             self.audio.show(status, performance.notes, take)
         moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
         for panel in self.panels:
-            if isinstance(panel, StringPanel) and panel.view.isVisible():
+            if isinstance(panel, StringPanel) and panel.isVisible():
                 panel.show_moment(moment)
         self._deck_timer.start()
         self.patches.tick()
@@ -421,7 +422,7 @@ class Controller(QObject):
         elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
         moment = Moment(performance.take, performance.position_s, performance.moving, elapsed_s)
         for panel in self.panels:
-            if not isinstance(panel, StringPanel) and panel.on_the_left == on_the_left and panel.view.isVisible():
+            if not isinstance(panel, StringPanel) and panel.on_the_left == on_the_left and panel.isVisible():
                 panel.show_moment(moment)
 
     def _show_level(self, elapsed_s: float) -> None:

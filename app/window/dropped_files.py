@@ -12,8 +12,7 @@ from app.instrument.bodies import ENDINGS, install_body
 from app.presets.folders import user_folder
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
-from app.session.choices import SECONDS_RANGE
-from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
+from app.shared.parameters import OF_CHOICES
 from app.shared.whole_file import WriteError
 
 
@@ -66,28 +65,36 @@ def _preset(file: Path, library: Library) -> Dropped:
 def _recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
+    choices = {"preset": path.stem, **restored_choices(recipe)}
     notices = [] if exact else [changed_preset_notice(recipe)]
-    if not SECONDS_RANGE[0] <= recipe.seconds <= SECONDS_RANGE[1]:
-        notices.append(f"its duration of {recipe.seconds:g} s is out of the window's range, and was limited")
+    if choices.get("seconds", recipe.seconds) != recipe.seconds:
+        low, high = OF_CHOICES["seconds"].limits
+        limits = f"the window's range ({low:g} … {high:g} s)"
+        notices.append(f"its duration of {recipe.seconds:g} s is out of {limits}, shown are {choices['seconds']:g} s")
     notice = f"{file.name}: {'; '.join(notices)}." if notices else ""
-    return Dropped({"preset": path.stem, **restored_choices(recipe)}, notice)
+    return Dropped(choices, notice)
 
 
 def restored_choices(recipe: Recipe) -> dict[str, Any]:
-    """The fields of `Choices` that a recipe sets, without the preset."""
-    low, high = SECONDS_RANGE
+    """The fields of `Choices` that a recipe sets, without the preset.
+
+    Its pluck is one at a place of the string, so that keys choose places: the patch and its pick-up stay as they are.
+    A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
+    """
     found: dict[str, Any] = {
         "position": recipe.pluck.position,
         "amplitude_mm": recipe.pluck.amplitude_mm,
         "shape": recipe.pluck.shape,
         "width": recipe.pluck.width,
         "listen": recipe.listen,
-        "seconds": min(max(recipe.seconds, low), high),
+        "keys_play": "place",
     }
+    if recipe.decay_db is None:
+        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
     found |= {"a": "model", "b": "truth", "heard": "b" if recipe.source == "truth" else "a", "solo": 0}
     if recipe.source == "difference":
-        low, high = DIFFERENCE_GAIN_RANGE_DB
-        found |= {"a": "difference", "difference_gain_db": min(max(recipe.difference_gain_db, low), high)}
+        gain_db = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
+        found |= {"a": "difference", "difference_gain_db": gain_db}
     if recipe.string is not None:
         found["string"] = asdict(recipe.string)
     found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}

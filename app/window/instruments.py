@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn
 from app.instrument.player import Struck
 from app.patches.patch import Patch, PhysicalString
+from app.playing.due import Due
 from app.playing.keyboard import LOWEST_C, KeyPress, Reach, play, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.presets.library import Library
@@ -48,7 +49,7 @@ class Instruments(QObject):
         library: Library,
         midi: MidiChoices,
         strike: Callable[[Choices], object],
-        handle: Callable[[Event], Struck | None],
+        handle: Callable[[Event, Due | None], Struck | None],
     ) -> None:
         super().__init__(window)
         self._session = session
@@ -91,20 +92,19 @@ class Instruments(QObject):
 
     @property
     def plays_pitches(self) -> bool:
-        """Whether the computer's keys are a piano's; otherwise they pluck at ten places."""
-        choices = self._session.choices
-        return choices.keys_play == "pitch" and choices.patch is not None
+        """As `Choices.plays_pitches`: what the computer's keys are."""
+        return self._session.choices.plays_pitches
 
     def choices_changed(self) -> None:
         self._keys.piano = self.plays_pitches
         self.midi.show_patch(self._session.choices.patch)
 
-    def play(self, event: Event) -> bool:
-        """Plays an event through the patch. Any thread. False where no patch is chosen."""
+    def play(self, event: Event, due: Due | None = None) -> bool:
+        """Plays an event through the patch, at once or when it is due. Any thread. False where no patch is chosen."""
         choices = self._session.choices
         if choices.patch is None:
             return False
-        struck = self._handle(event)
+        struck = self._handle(event, due)
         if struck is not None:
             self.latest = choices.patch, struck
             self.latest_key = struck.event.key, struck.string
@@ -116,8 +116,7 @@ class Instruments(QObject):
                 "shape": struck.pluck.shape,
                 "width": struck.pluck.width,
             }
-            with self._lock:
-                self._told = {**self._told, **changes}
+            self._note(changes)
             self._struck.emit(changes)
         return True
 
@@ -125,13 +124,17 @@ class Instruments(QObject):
         """Applies new values of `Choices`, and plucks with them. Without `plucks` in the window's thread alone."""
         if plucks:
             self.latest = None
-            with self._lock:
-                self._told = {**self._told, **changes}
-                choices = self._session.choices.model_copy(update=self._told)
-            self._strike(choices)
+            self._strike(self._note(changes))
             self._struck.emit(changes)
         else:
             self._session.update(**changes)
+
+    def _note(self, changes: dict[str, Any]) -> Choices:
+        """Keeps the values of a struck note for the session; the choices with them and all notes before it."""
+        with self._lock:
+            after = self._session.choices.changed(self._told).changed(changes)
+            self._told = {name: getattr(after, name) for name in {*self._told, *changes, "string"}}
+        return after
 
     def _turn_patch(self, field: str, value: object) -> None:
         patch = self._session.choices.patch
@@ -141,9 +144,11 @@ class Instruments(QObject):
     def _tell_session(self, changes: dict[str, Any]) -> None:
         """Updates the session, once for all notes that were struck meanwhile."""
         with self._lock:
-            told, self._told = self._told, {}
+            told = self._told
         if told:
             self._session.play(**told)
+            with self._lock:  # a note that was struck meanwhile has a message of its own
+                self._told = {name: value for name, value in self._told.items() if told.get(name, told) != value}
             self.played.emit()
 
     def _press(self, press: KeyPress) -> None:

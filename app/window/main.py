@@ -45,7 +45,7 @@ def with_patch(settings: Settings) -> Settings:
     with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places
         patch = read_patch(FIRST_PATCH)
         update = {"patch": patch} if settings.choices.preset else choices_of(patch)
-        return settings.model_copy(update={"choices": settings.choices.model_copy(update=update)})
+        return settings.model_copy(update={"choices": settings.choices.changed(update)})
     return settings
 
 

@@ -68,10 +68,10 @@ KEYS = (  # (key, name of the signal, what it does)
 KEY_NAMES = {"Return": "Enter", "PgUp": "Page up", "PgDown": "Page down"}  # as tooltips call them
 FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
-WIDE, HIGH = 1100, 560  # pixels: a narrower window hides brand and instrument button; a lower one the patch bar
+WIDE, HIGH = 1100, 560  # pixels: a narrower window hides brand and instrument button; a lower one the preset's facts
 ROOMY = 1240  # pixels: in a narrower window the controls are compact
-ALL_HIGH, KNOBS_HIGH = 660, 170  # pixels: least height for views beside the instrument; more with its knobs
-NOTICE_HIGH = 52  # pixels: and more with a notice
+ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
+KNOBS_HIGH = 780  # pixels: in a lower one the string's knobs take the place of the keys, and all stands closer
 FACTS_HEIGHT = 20
 BRIEFLY_MS = 1_800  # a text over the window
 TITLE_BAR = 40  # pixels, at most; its height is known only once the window is shown
@@ -150,8 +150,6 @@ class MainWindow(QMainWindow):
         self._instrument_button.setChecked(True)
         self._instrument_button.toggled.connect(self.show_instrument)
         self.instrument_asked.connect(self._instrument_button.toggle)
-        self.instrument.surface_changed.connect(self._share_height)
-        self.notices.came_or_went.connect(self._share_height)
         self.menu = AppMenu(self)
         self._menu_button = menu_button(self.menu)
         self._lay_out()
@@ -178,7 +176,9 @@ class MainWindow(QMainWindow):
         aside = (self._instrument_button, test, self.rate_label, self.notices.bell)
         for widget in (*aside, self._audio_button, self._menu_button):
             head.addWidget(widget)
-        facts = QHBoxLayout()
+        self._facts = QWidget()
+        self._facts_row = facts = QHBoxLayout(self._facts)
+        facts.setContentsMargins(0, 0, 0, 0)
         facts.setSpacing(24)
         for part in (self.presets.card, self._solo):  # of one height, so that the solo button moves nothing
             part.setFixedHeight(FACTS_HEIGHT)
@@ -202,14 +202,14 @@ class MainWindow(QMainWindow):
             splitter.setHandleWidth(8)
         self._column = column = QVBoxLayout()
         column.addLayout(head)
-        column.addLayout(facts)
-        column.addWidget(self.notices)
+        column.addWidget(self._facts)
         column.addWidget(self._stage, 1)
         column.addWidget(Sideways(self.transport))
         column.addWidget(self.instrument)
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
+        self.notices.setParent(middle)
         FocusRing(middle)
 
     def show_string(self, view: QWidget) -> None:
@@ -276,14 +276,16 @@ class MainWindow(QMainWindow):
         self._share_height()
 
     def _share_height(self) -> None:
-        """A low window hides the views beside the instrument, then parts of the instrument."""
+        """A low window hides the views beside the instrument, a lower one also the preset's facts."""
         height = self.height()
-        needed = 0
-        if self.shows_instrument:
-            told, unfolded = not self.notices.isHidden(), self.instrument.unfolded
-            needed = ALL_HIGH + NOTICE_HIGH * told + KNOBS_HIGH * unfolded
-        self.instrument.set_low(height < ALL_HIGH, height < HIGH)
-        self._decks.setVisible(self._alive and height >= needed)
+        self.instrument.set_low(height < KNOBS_HIGH)
+        self._decks.setVisible(self._alive and (height >= ALL_HIGH or not self.shows_instrument))
+        self._facts.setVisible(height >= HIGH)
+        home, place = (self._facts_row, 1) if height >= HIGH else (self._head, 2)
+        if home.indexOf(self._solo) < 0:
+            shown = not self._solo.isHidden()
+            home.insertWidget(place, self._solo)
+            self._solo.setVisible(shown)
 
     def show_solo(self, mode: int) -> None:
         """The soloed mode; 0: none, all are heard."""
@@ -313,12 +315,14 @@ class MainWindow(QMainWindow):
         for spared in (self._brand, self._instrument_button):  # the menu shows and hides the instrument too
             spared.setVisible(self.width() >= WIDE)
         self._share_height()
-        narrow, low = self.width() < ROOMY, self.height() < HIGH
+        narrow, low = self.width() < ROOMY, self.height() < KNOBS_HIGH
         self.transport.set_compact(narrow)
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)
         self._column.setSpacing(6 if low else 10)
+        under_head = QPoint(aside, above + self._head.sizeHint().height() + 2)
+        self.notices.place(under_head, self.width() - 2 * aside)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

@@ -13,11 +13,11 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.instrument.events import Controller, Event, NoteOn
-from app.patches.patch import WHEEL, Patch
+from app.patches.patch import Patch
 from app.playing.keyboard import Reach
 from app.playing.midi import TURNED, MidiChoices, meaning_of
 from app.playing.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
-from app.session.step_words import field_words
+from app.shared.parameters import OF_CHOICES, modulated_by
 from app.views.dialogs.midi_dialog import MidiDialog
 
 
@@ -77,8 +77,8 @@ class MidiControl(QObject):
         """Opens the dialog, which does not block the window, or brings it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(
-                {field: turned.label for field, turned in TURNED.items()},
-                {field: field_words(field) for field in WHEEL},
+                {field: OF_CHOICES[field].name for field in TURNED},
+                {each.id: each.name for each in modulated_by("wheel")},
                 window,
             )
             dialog.patch_turned.connect(self.patch_turned)

@@ -30,7 +30,7 @@ from app.patches.library import (
 )
 from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice, explained
 from app.patches.tuning import SCALA_FILES, read_scala
-from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of
+from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octaves_of
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
@@ -51,6 +51,7 @@ AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 NOTE_TOLD_AFTER_MS = 150
 MANY_STRINGS = "studio_any_string"
+C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
 MIDI_FILES = (".mid", ".midi")
 STRING_FILE = ".toml"
@@ -86,7 +87,7 @@ class PatchDesk(QObject):
         self._shown_s = 0.0
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._told_other = ""  # the source that the user was told is not heard from keys
-        self._playback = Playback(instruments.play)
+        self._playback = Playback(instruments.play, performance.notes, performance.live.cancel)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
         self.recordings = Recordings(session, library, performance.live, panel.bar, self)
@@ -196,11 +197,11 @@ class PatchDesk(QObject):
 
     def turn_to(self, field: str, figure: float) -> None:
         """Turns a knob of the string to a figure of the string that is shown, or as near to it as the knob goes."""
-        patch, limits = self.patch, self._panel.knobs.knobs[field].limits
+        patch = self.patch
         if patch is None:
             return
         try:
-            self.change(field, knob_for(patch, self._shown_key(patch), field, figure, (limits.low, limits.high)))
+            self.change(field, knob_for(patch, self._shown_key(patch), field, figure))
         except ValueError as error:
             self.told.emit(one_line(str(error)))
 
@@ -233,13 +234,14 @@ class PatchDesk(QObject):
 
     def _save(self, patch: Patch, replace: Path | None = None) -> None:
         try:
-            save_patch(patch, replace)
+            saved = save_patch(patch, replace)
         except WriteError as error:
             self.told.emit(one_line(str(error)))
             return
         self.reload()
         self._session.update(patch=patch)
         self._show_patch()
+        self.browser.reveal(saved.name)
 
     def rename(self, name: str = "") -> None:
         """Asks for a new name of one of the user's own patches, by default the present one."""
@@ -261,6 +263,7 @@ class PatchDesk(QObject):
         if self.patch is not None and self.patch.name == entry.patch.name:
             self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
         self.reload()
+        self.browser.reveal(renamed.name)
 
     def delete(self, name: str) -> None:
         """Deletes one of the user's own patches."""
@@ -372,9 +375,11 @@ class PatchDesk(QObject):
             self._show_patch()
         if "patch" in names:
             self._panel.bar.show_comparing(False)
+        if names & {"octave", "patch"}:
+            self._keep_octave_in_range("octave" in names)
         if names & {"octave", "velocity", "keys_play", "patch"}:
             choices, pitches = self._session.choices, self._instruments.plays_pitches
-            self._panel.set_octave(LOWEST_C // 12 - 1 + choices.octave)
+            self._panel.set_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
@@ -382,6 +387,25 @@ class PatchDesk(QObject):
             self._judge_anew()
         if names & {"heard", "a", "b", "keys_play", "patch"}:
             self._show_source()
+
+    @property
+    def _octaves(self) -> tuple[int, int]:
+        """The lowest and the highest octave at which one of the computer's keys sounds."""
+        return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.patch is None else octaves_of(*self.patch.range)
+
+    def _keep_octave_in_range(self, asked: bool) -> None:
+        """Moves the octave of the computer's keys to where one sounds, and says why.
+
+        `asked`: the octave was to change; otherwise another patch made it change.
+        """
+        patch, octave, (lowest, highest) = self.patch, self._session.choices.octave, self._octaves
+        within = min(max(octave, lowest), highest)
+        if patch is None or within == octave:
+            return
+        end = "Lowest octave" if octave < lowest else "Highest octave"
+        low, high = map(note_name, patch.range)
+        self._session.update(octave=within)
+        self._panel.bar.say_octave(f"{end if asked else 'Octave moved'}: {patch.name} has {low} to {high}")
 
     def _show_source(self) -> None:
         """In whose colour keys are lit; says once that keys do not play another preset which a slot holds."""

@@ -20,6 +20,7 @@ from app.instrument.events import Event
 from app.instrument.player import Struck
 from app.patches.patch import Patch
 from app.playing.chosen import mix_of, render_request, stroke_of, subject_of
+from app.playing.due import Due
 from app.playing.keyboard import PLACES, Reach
 from app.playing.live import Live
 from app.playing.notes import Note, Notes
@@ -43,7 +44,7 @@ from engine.resonators.string import StringParameters
 MotionKey = tuple[str, StringParameters, Pluck, float]  # the preset's name, its string, the pluck, how long it is
 LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
-KEY_FIELDS = {"preset", "string", "amplitude_mm", "shape", "width"}  # what plucks of keys at ten places depend on
+PLACE_FIELDS = {"preset", "string", "amplitude_mm", "shape", "width", "patch", "keys_play"}  # of keys at ten places
 SLOT_FIELDS = {"a", "b", "heard"}
 MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
 
@@ -154,9 +155,9 @@ class Performance(QObject):
         self._latest = note
         return note
 
-    def handle(self, event: Event) -> Struck | None:
+    def handle(self, event: Event, due: Due | None = None) -> Struck | None:
         """Plays an event through the patch. Any thread; `follow` then shows it. None where it struck no string."""
-        made = self.live.handle(event)
+        made = self.live.handle(event, due)
         if made is None:
             return None
         struck, self._latest = made
@@ -225,7 +226,7 @@ class Performance(QObject):
         elif names & EAR_FIELDS:
             self.live.listen(heard_ear(choices))
         self.live.seconds = choices.seconds
-        if names & KEY_FIELDS and entry is not None:
+        if names & PLACE_FIELDS and entry is not None and not choices.plays_pitches:
             reach = Reach.of(entry.info)
             places = (reach.place(number / (PLACES - 1)) for number in range(PLACES))
             plucks = [replace(choices.pluck, position=place) for place in places]
@@ -244,7 +245,7 @@ class Performance(QObject):
         """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
         if patch is not None:
-            choices = choices.model_copy(update=choices_of(patch))
+            choices = choices.changed(choices_of(patch))
         self.notes.listen(heard_ear(choices))
         self.live.set_patch(choices.patch, heard_ear(choices))
 

@@ -37,16 +37,17 @@ class PresetDesk(QObject):
         self.favourites = set(favourites)
         self._session, self._library, self._bar, self.browser = session, library, bar, browser
         self._filter = PresetFilter()
+        self._known = set(library.names)
         bar.step_asked.connect(self.step)
         bar.browse_asked.connect(self.toggle)
         bar.all_asked.connect(browser.clear_filter)
         browser.opened.connect(self._reload)
         browser.filter_changed.connect(self._apply)
-        browser.preset_chosen.connect(lambda name: session.update(preset=name))
+        browser.chosen.connect(lambda name: session.update(preset=name))
         browser.favourite_asked.connect(self.toggle_favourite)
         browser.pluck_asked.connect(self.pluck_asked)
         browser.folder_asked.connect(self._open_folder)
-        library.changed.connect(self._show)
+        library.changed.connect(self._library_changed)
         self._show()
 
     def toggle(self) -> None:
@@ -78,6 +79,13 @@ class PresetDesk(QObject):
     def _apply(self, wanted: PresetFilter) -> None:
         self._filter = wanted
         self._show()
+
+    def _library_changed(self) -> None:
+        """Shows what there is now; a filter that hides an added preset is cleared."""
+        added, self._known = set(self._library.names) - self._known, set(self._library.names)
+        self._show()
+        for name in added:
+            self.browser.reveal(name)
 
     def _reload(self) -> None:
         """Reads the folders again: the user may have added files."""

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from platformdirs import user_config_path
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.analysis.abx.choices import AbxChoices
+from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices

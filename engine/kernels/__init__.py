@@ -1,6 +1,6 @@
 """Everything compiled that makes sound: voices, and the mixer that a sound device calls without the interpreter.
 
-    memory     pointers and fences
+    memory     pointers, fences, and what is published to another thread
     layout     what lies where in a voice, a program and a mixer
     bank       a voice of complex exponentials whose phases follow their energies: models with a linear decoder
     truth      a voice of the solved string

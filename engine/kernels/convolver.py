@@ -27,16 +27,6 @@ _SHARE = -(-(at.WINDOW + 1) // _SUMMING)  # frequencies in each
 
 
 @njit(**COMPILED)
-def publish(mixer: np.ndarray, convolver: int, impulse: int) -> None:
-    """Wants another response; what is read of the mixer afterwards tells which ones are still in use."""
-    counts = mixer.view(np.int64)
-    counts[at.M_CONVOLVER] = convolver
-    fence()
-    counts[at.M_EFFECTS] = impulse
-    fence()
-
-
-@njit(**COMPILED)
 def convolve(mixer: np.ndarray) -> None:
     """Replaces the mix, (QUANTUM, 2), by what is heard of it. Without a response it is left as it is."""
     counts = mixer.view(np.int64)

@@ -45,7 +45,7 @@ LOUDNESS = 21  # R nepers below full scale that the loudest latent, or all of th
 GAIN_FROM = 22  # R where the present change of gain began
 GAIN_TO = 23  # R and where it leads
 GAIN_DONE = 24  # W frames of it
-SILENT = 25  # W it counts as loudness what is below
+SILENT = 25  # R nepers of full scale: a voice whose loudness has fallen below is over
 MODULATED = 26  # W whether a bank's modulation can still be heard
 SAMPLES = 27  # W address of a rendered voice's samples, float32 (frames, points)
 READY = 28  # W of them, set by whoever renders
@@ -56,15 +56,15 @@ BEGAN_FRAME = 32  # W the mixer's frame at which it began, after any samples it 
 REFRESH = 33  # W quanta until a bank looks again which of its modulation can be heard
 ROWS = 34  # W latents whose modulation can be heard
 COLUMNS = 35  # W latents that can be heard in others' modulation
-BEGIN_AT = 36  # W the mixer's frame before which it waits
+BEGIN_AT = 36  # W the mixer's frame at which it begins; in the past: with the next quantum
 RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
 LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins anew after its last sample
 ALIVE = 39  # W latents up to the last that can be heard
 WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
-RESONATOR = 41  # W address of the modes that it is to have; the kernel glides there
+RESONATOR = 41  # W address of the latest of these that are due; the kernel glides there
 TAKEN = 42  # W the one that it is gliding to, or has reached
 GLIDE = 43  # W quanta left of the way
-CONTINUES = 44  # W address of the voice whose string this pluck is added to; 0: the string is at rest, or it is done
+BEFORE = 44  # W address of the voice that has the string until this one begins; 0: none has, or it is taken over
 PREPARED = 45  # W whether the rows that follow from its modes are there
 STEPS = 46  # W nodes, or sub-steps, of a frame, for which they were made
 DECAY = 47  # R of the largest energy in a frame
@@ -74,7 +74,10 @@ PEAK = 50  # R m: of the displacement as it is let go, a least one
 JOINS = 51  # W whether its fade-in is the complement of the other's fade
 ENDS_AT = 52  # W frames since the pluck, from which on it fades out whatever it still gives
 ENDS_IN = 53  # W frames of that fade
-HEADER = 54
+STOPS_IN = 54  # W frames of the fade in which it stops the voice before; 0: it is added to that motion
+LATE = 55  # W frames after the beginning of the mixer's quantum at which its own begins, below QUANTUM
+WISHES = 56  # W address of the first modes that it was to have; each names the next
+HEADER = 57
 
 
 @njit(inline="always", **COMPILED)
@@ -95,9 +98,15 @@ def history(modes: int, point: int) -> int:
 
 
 @njit(inline="always", **COMPILED)
+def left_over(modes: int) -> int:
+    """First slot of what reaches into the mixer's next quantum, (QUANTUM, 2), of a voice that is late."""
+    return HEADER + 8 * modes + 4 + 6 * QUANTUM
+
+
+@njit(inline="always", **COMPILED)
 def state(modes: int) -> int:
     """First slot of what a kind keeps for itself."""
-    return HEADER + 8 * modes + 4 + 6 * QUANTUM
+    return HEADER + 8 * modes + 4 + 8 * QUANTUM
 
 
 # Rows (modes,) of a bank's state, from `state` on
@@ -120,7 +129,9 @@ TENSION_ROWS = PHYSICAL + 2
 
 # Slots of the modes that a voice is to have, then the four rows above
 B_QUANTA = 0  # W of the way there
-B_HEADER = 2
+B_NEXT = 1  # W address of the modes that were wished for next; 0: none yet
+B_AT = 2  # W the mixer's frame from which they count
+B_HEADER = 3
 
 # Slots of a bank's program
 P_MODES = 0  # W

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import njit, types
 from numba.extending import intrinsic
+
+from engine.kernels.compiled import COMPILED
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -30,3 +33,14 @@ def fence(typing_context: Any):
         return context.get_dummy_value()
 
     return types.void(), generate
+
+
+@njit(**COMPILED)
+def publish(slots: np.ndarray, slot: int, whole: int) -> None:
+    """Writes a whole number into one of the slots, int64 (n,), after all that was written before.
+
+    A thread that reads the number before a fence sees what it stands for. What is read afterwards is no older.
+    """
+    fence()
+    slots[slot] = whole
+    fence()

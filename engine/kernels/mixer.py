@@ -18,7 +18,7 @@ from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
 from engine.kernels.voice import add, note_gap, take_over
 
-TONE_HZ, TONE_LEVEL, TONE_FADE = 440.0, 0.1, 960
+TONE_HZ, TONE_LEVEL, TONE_FADE_S = 440.0, 0.1, 0.020
 UNDERFLOW = 4  # PortAudio's flag
 
 
@@ -53,10 +53,10 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
     _take_up(counts)
-    for place in range(counts[at.M_ACTIVE]):  # before any goes on
+    for place in range(counts[at.M_ACTIVE]):  # before any sounds on
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)
-        if whole[at.CONTINUES] != 0 and whole[at.BEGIN_AT] <= counts[at.M_FRAMES]:
+        while whole[at.BEFORE] != 0 and whole[at.BEGIN_AT] < counts[at.M_FRAMES] + at.QUANTUM:
             take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0
@@ -106,7 +106,7 @@ def _finish(mixer: np.ndarray) -> None:
         right = mixer[at.M_MIX + 2 * frame + 1] * volume
         if counts[at.M_TONE_FRAME] < counts[at.M_TONE_LENGTH]:
             now, length = counts[at.M_TONE_FRAME], counts[at.M_TONE_LENGTH]
-            envelope = min(1.0, min(now, length - now) / TONE_FADE)
+            envelope = min(1.0, min(now, length - now) / (TONE_FADE_S * mixer[at.M_RATE]))
             wave = TONE_LEVEL * envelope * math.sin(2 * math.pi * TONE_HZ * now / mixer[at.M_RATE])
             if counts[at.M_TONE_SIDE] & 1:
                 left += wave

@@ -17,6 +17,7 @@ from engine.kernels.modes import damped, following, glide, gliding, rest_above, 
 
 SPARE = 1.5  # of the energy at the start, as in the model
 HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
+NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 
 
@@ -182,28 +183,41 @@ def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.nd
 
 @njit(**COMPILED)
 def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
-    """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: `set_out` back."""
+    """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     x, y = row(voice, n, 0), row(voice, n, 1)
     rows = following(voice, n)
     sigmas, stretches = row(voice, n, at.SIGMA), row(voice, n, at.STRETCH)
     for m in range(n):
-        q[m], v[m] = x[m], y[m]
+        v[m] = y[m]
     _half_kick(rows, x, voice[at.LARGEST_STRETCH], v, 1.0)
-    for _ in range(8):  # x = q (1 + κ p S(q)), where κ p S is small
-        tension = 0.0
+    tension = 0.0  # S₀ of x = q (1 + κ p S₀), by Newton's method
+    for _ in range(NEWTON_STEPS):
+        value, slope = -tension, 1.0
         for m in range(n):
-            tension += stretches[m] * q[m] * q[m]
-        for m in range(n):
-            q[m] = x[m] / (1 + rows[6, m] * tension)
+            lift = 1 + rows[6, m] * tension
+            square = stretches[m] * (x[m] / lift) ** 2
+            value += square
+            slope += 2 * square * rows[6, m] / lift
+        change = value / slope
+        tension += change
+        if not abs(change) > NEWTON_DONE * abs(tension):
+            break
+    moved = 0.0
     for m in range(n):
+        q[m] = x[m] / (1 + rows[6, m] * tension)
         v[m] = -math.sqrt(rows[7, m]) * v[m] - sigmas[m] * q[m]
+        moved += stretches[m] * q[m] * v[m]
+    for m in range(n):
+        v[m] = v[m] * (1 + rows[6, m] * tension) + 2 * rows[6, m] * q[m] * moved
 
 
 @njit(**COMPILED)
 def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
+
+    As `KoopmanTension._set_out`.
 
     Args:
         bounded: the largest energy is there, and may only fall; otherwise it follows from what is given.
@@ -224,8 +238,17 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
     largest = SPARE * (energy + 0.5 * tension * held)
     voice[at.LARGEST_ENERGY] = min(voice[at.LARGEST_ENERGY], largest) if bounded else largest
     voice[at.LARGEST_STRETCH] = voice[at.LARGEST_ENERGY] * widest
+    moved, share = 0.0, 1.0
     for m in range(n):
-        x[m] = q[m] * (1 + rows[6, m] * tension)
+        part = stretches[m] * q[m] / (1 + rows[6, m] * tension)
+        moved += part * v[m]
+        share += 2 * part * rows[6, m] * q[m]
+    moved /= share
+    for m in range(n):
+        lift = 1 + rows[6, m] * tension
+        lifted = (v[m] - 2 * rows[6, m] * q[m] * moved) / lift
+        x[m] = q[m] * lift
+        y[m] -= (lifted - v[m]) / math.sqrt(rows[7, m])
     _half_kick(rows, x, voice[at.LARGEST_STRETCH], y, -1.0)
 
 

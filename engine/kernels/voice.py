@@ -13,13 +13,13 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import row
 
-MOVE_QUANTA = 15  # of the fade to another listening point: 20 ms at 48 kHz
+MOVE_S = 0.020  # the fade to another listening point
+END_S = 0.020  # the fade of a voice that has become silent
 WARMED = 3  # quanta: the one that is heard, and those before and after it
-_END = 960  # frames of the fade of a voice that has become silent
 
 
 @njit(**COMPILED)
-def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     counts = voice.view(np.int64)
     kind = counts[at.KIND]
@@ -37,10 +37,10 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     else:
         truth.generate(voice, program, fading, heard, out)
     if fading:
-        done, frames = counts[at.WEIGHTS_FADED], MOVE_QUANTA * at.QUANTUM
+        done, frames = counts[at.WEIGHTS_FADED], round(MOVE_S * rate_hz)
         for point in range(counts[at.POINTS]):
             for frame in range(at.QUANTUM):
-                share = (done + frame + 1) / frames
+                share = min((done + frame + 1) / frames, 1.0)
                 out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
         counts[at.WEIGHTS_FADED] = done + at.QUANTUM
         if counts[at.WEIGHTS_FADED] >= frames or not heard:
@@ -54,7 +54,9 @@ def _generate(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 
 @njit(**COMPILED)
-def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray) -> None:
+def _velocity(
+    voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
+) -> None:
     """As `_generate`, differentiated; the voice is generated a quantum ahead for that.
 
     What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
@@ -65,7 +67,7 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
     if begins:
         counts[at.WARM] = 0
     for turn in range(2 if begins else 1):
-        _generate(voice, heard, out, scratch)
+        _generate(voice, heard, rate_hz, out, scratch)
         counts[at.WARM] = min(counts[at.WARM] + 1, WARMED) if heard else 0
         for point in range(counts[at.POINTS]):
             slot = at.history(n, point)
@@ -91,14 +93,42 @@ def _velocity(voice: np.ndarray, heard: bool, out: np.ndarray, scratch: np.ndarr
 
 @njit(**COMPILED)
 def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
-    """A pluck of a string that rings is added to its motion, as this voice begins; the voice that had it fades.
+    """The string of the voice before is this one's as it begins: its motion is stopped, or this pluck added to it.
+
+    One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
+    the voice before that one, which is left as what is to be taken over.
+    """
+    counts = voice.view(np.int64)
+    before = carray(pointer(counts[at.BEFORE]), (1 << 40,), np.float64)
+    befores = before.view(np.int64)
+    stops, waits, earlier = counts[at.STOPS_IN], befores[at.STATE] == at.WAITING, 0
+    later = befores[at.BEGIN_AT] >= now + at.QUANTUM and befores[at.JOINS] == 0
+    if waits and (later or stops > 0):
+        _never_begin(before)
+        earlier = befores[at.BEFORE]
+    elif stops == 0:
+        _join(voice, before, now, scratch)
+    elif befores[at.RELEASE] == 0:
+        befores[at.RELEASE] = stops
+    fence()
+    counts[at.BEFORE] = earlier
+
+
+@njit(inline="always", **COMPILED)
+def _never_begin(voice: np.ndarray) -> None:
+    """A voice that waits ends without a sound."""
+    voice[at.GAIN] = voice[at.GAIN_TO] = voice[at.WANTED_GAIN] = 0.0
+    voice.view(np.int64)[at.RELEASE] = 1
+
+
+@njit(**COMPILED)
+def _join(voice: np.ndarray, before: np.ndarray, now: int, scratch: np.ndarray) -> None:
+    """The pluck is added to the motion of the voice before, which fades as this one begins.
 
     One that has not begun yet is not heard at all: both plucks are this voice's. Where it is over, or of another
     kind, the string is at rest.
     """
-    counts = voice.view(np.int64)
-    before = carray(pointer(counts[at.CONTINUES]), (1 << 40,), np.float64)
-    befores = before.view(np.int64)
+    counts, befores = voice.view(np.int64), before.view(np.int64)
     rings = befores[at.STATE] == at.SOUNDING and befores[at.GENERATED] > 0
     waits = befores[at.STATE] == at.WAITING and befores[at.PREPARED] == 0
     if (rings or waits) and befores[at.KIND] == counts[at.KIND]:
@@ -118,17 +148,15 @@ def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
             speeds[mode] += v[mode]
             widest += math.sqrt(q[mode] ** 2 + v[mode] ** 2 / row(voice, n, at.OMEGA_SQUARED)[mode])
         voice[at.LIMIT] *= 1 + widest / voice[at.PEAK]
+        counts[at.LATE] = befores[at.LATE]
         if waits:
             counts[at.BEGIN_AT] = max(counts[at.BEGIN_AT], befores[at.BEGIN_AT])
-            before[at.GAIN] = before[at.GAIN_TO] = before[at.WANTED_GAIN] = 0.0
-            befores[at.RELEASE] = 1
+            _never_begin(before)
         else:  # what senses velocity has been generated further than it is heard: so much later this one begins
             counts[at.BEGIN_AT] = now + befores[at.GENERATED] - befores[at.FRAME]
             befores[at.FADE_FRAMES] = max(1, counts[at.ATTACK])
             befores[at.RELEASE_AT] = max(1, counts[at.BEGIN_AT])
         counts[at.JOINS] = joins
-    fence()
-    counts[at.CONTINUES] = 0
 
 
 @njit(**COMPILED)
@@ -149,6 +177,21 @@ def _past(voice: np.ndarray, before: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
+def _look_at_wishes(voice: np.ndarray, now: int) -> None:
+    """Goes on to the latest modes that are due. Wishes count in their order, and wait for those before them."""
+    counts = voice.view(np.int64)
+    latest = counts[at.RESONATOR]
+    wished = counts[at.WISHES] if latest == 0 else carray(pointer(latest), (at.B_HEADER,), np.int64)[at.B_NEXT]
+    while wished != 0:
+        fence()
+        block = carray(pointer(wished), (at.B_HEADER,), np.int64)
+        if block[at.B_AT] > now:
+            break
+        counts[at.RESONATOR] = wished
+        wished = block[at.B_NEXT]
+
+
+@njit(**COMPILED)
 def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     """Adds the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
     counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
@@ -156,9 +199,17 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
     scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
-    now = mix_counts[at.M_FRAMES]
-    if counts[at.BEGIN_AT] > now and counts[at.STATE] == at.WAITING:
-        return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
+    now, rate_hz = mix_counts[at.M_FRAMES], mixer[at.M_RATE]
+    if counts[at.STATE] == at.WAITING:
+        if counts[at.BEGIN_AT] >= now + quantum:
+            return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
+        counts[at.LATE] = max(counts[at.LATE], counts[at.BEGIN_AT] - now)
+    late, left_over = counts[at.LATE], voice[at.left_over(counts[at.MODES]) : at.state(counts[at.MODES])]
+    for frame in range(late):
+        mix[frame, 0] += left_over[2 * frame]
+        mix[frame, 1] += left_over[2 * frame + 1]
+        left_over[2 * frame] = left_over[2 * frame + 1] = 0.0
+    _look_at_wishes(voice, now + late)
     if counts[at.RELEASE_AT] > 0 and counts[at.RELEASE_AT] <= now and counts[at.RELEASE] == 0:
         counts[at.RELEASE] = counts[at.FADE_FRAMES]
     if counts[at.FRAME] >= counts[at.ENDS_AT] and counts[at.RELEASE] == 0:
@@ -174,9 +225,9 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     was_dry, generated = counts[at.DRY], counts[at.GENERATED]
     if counts[at.VELOCITY]:
         taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
-        _velocity(voice, heard, out, scratch, taps)
+        _velocity(voice, heard, rate_hz, out, scratch, taps)
     else:
-        _generate(voice, heard, out, scratch)
+        _generate(voice, heard, rate_hz, out, scratch)
     points = counts[at.POINTS]
     if counts[at.DRY] and not was_dry:
         note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
@@ -203,19 +254,25 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
                     gain *= (first + frame + 1) / attack
                 else:
                     gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
-            mix[frame, 0] += gain * out[0, frame]
-            mix[frame, 1] += gain * out[points - 1, frame]
+            place = frame + late
+            if place < quantum:
+                mix[place, 0] += gain * out[0, frame]
+                mix[place, 1] += gain * out[points - 1, frame]
+            else:
+                left_over[2 * (place - quantum)] = gain * out[0, frame]
+                left_over[2 * (place - quantum) + 1] = gain * out[points - 1, frame]
         counts[at.GAIN_DONE] = min(done + quantum, length)
         voice[at.GAIN] = goal if done + quantum >= length else source + (goal - source) * ((done + quantum) / length)
     if counts[at.GENERATED] > generated:  # else it stands still
         if counts[at.BEGAN_FRAME] < 0:
-            counts[at.BEGAN_FRAME] = mix_counts[at.M_FRAMES]
+            counts[at.BEGAN_FRAME] = now + late
             voice[at.BEGAN_S] = now_s
         counts[at.FRAME] += quantum
-    if release > 0 and (not heard or (voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0)):
+    faded = voice[at.GAIN] == 0 and voice[at.GAIN_TO] == 0 and late == 0
+    if release > 0 and (not heard or faded):
         return at.OVER
     if release == 0 and voice[at.LOUDNESS] < voice[at.SILENT]:
-        counts[at.RELEASE] = _END
+        counts[at.RELEASE] = max(1, round(END_S * rate_hz))
     return at.SOUNDING
 
 
@@ -238,6 +295,7 @@ def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
     if counts[at.KIND] == at.RENDERED:  # there need not be samples yet
         counts[at.GENERATED] = quanta * at.QUANTUM
         quanta = 0
+    _look_at_wishes(voice, 0)
     for _ in range(quanta):
-        _generate(voice, False, out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+        _generate(voice, False, mixer[at.M_RATE], out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     counts[at.FRAME] = counts[at.GENERATED]

@@ -18,7 +18,8 @@ from engine.models.lru import LRU, LRUConfiguration
 from engine.models.s5 import S5, S5Configuration
 from engine.schema import SchemaError, read, without_retired
 
-# name in presets and on the command line -> (class, configuration, whose defaults are the paper's sizes)
+# name in presets and on the command line -> (class, configuration). Defaults are the paper's sizes, and our own for
+# models that the paper does not have: `koopman_integrated`, `koopman_tension`.
 MODELS: dict[str, tuple[type[StringModel[Any]], type]] = {
     "dmd": (DMD, DMDConfiguration),
     "koopman": (Koopman, KoopmanConfiguration),
@@ -39,7 +40,7 @@ RETIRED: dict[str, dict[str, Any]] = {
 
 
 def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> StringModel[Any]:
-    """The model of a name with its weights not yet set; `configuration` as plain data, None or {} the paper's sizes.
+    """The model of a name with its weights not yet set; `configuration` as plain data, None or {} the defaults.
 
     Raises:
         SchemaError: a field is unknown, of another type, or refused by the configuration.

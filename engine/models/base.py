@@ -87,7 +87,8 @@ class StringModel(nn.Module, ABC, Generic[State]):
                 `sine_transform.listening_weights`; None decodes on the whole grid. Fewer points cost less.
 
         Returns:
-            displacement (batch, steps, points or grid_points) in normalised units, and the last state.
+            displacement (batch, steps, points or grid_points) in normalised units and the model's own precision,
+            and the last state.
         """
 
     @torch.no_grad()
@@ -106,15 +107,23 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
+    @torch.no_grad()
+    def check_physics(self, physics: Physics) -> None:
+        """Raises ValueError, naming the tensor, where the model holds another resonator than this one.
+
+        A model that learned one string holds none: its weights are all there is of it.
+        """
+
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
         """Frames 1 … steps after a release from `displacement` (batch, grid_points): (batch, steps, points)."""
         return self.advance(self.encode(displacement), steps, readout)[0]
 
 
 class AnyFrameModel(StringModel[State]):
-    """A model of which some frames can be had for little more than their own cost.
+    """A model that computes some frames of a motion in much less time than all of them.
 
-    Any can be had without those before it, or it is the frames' shapes that cost, not the way to them.
+    Most compute any frame by itself. `koopman_tension` steps through all frames and computes the wanted shapes alone;
+    they are the larger part of its cost.
     """
 
     @abstractmethod

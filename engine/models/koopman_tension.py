@@ -10,7 +10,14 @@ adds turns them together (κ_n = h² k_n, which is a share of (hω_n)²):
 the exact flow of the potential c/4 (S² - 2 S² R), between exact flows of the damped linear string. What sets out and
 what is seen are other coordinates than those in which the kicks act:
 
-    x_n(0) = q_n (1 + p_n κ_n S₀),      q̂_n = x_n (1 - p_n κ_n S).
+    x_n(0) = q_n (1 + p_n κ_n S₀),      q̂_n = x_n (1 - p_n κ_n S),      S₀ = Σ_m η_m² q_m².
+
+Momenta go with the coordinates. A string that rings sets out with the speed w instead of its own, v:
+
+    v_n = w_n (1 + p_n κ_n S₀) + 2 p_n κ_n q_n Σ_m η_m² q_m w_m,      y_n(0) = -(w_n + σ_n q_n)/ω_n,
+
+the momentum that belongs to x where p is one number (the lift of a point transformation, as the processor of Blanes,
+Casas and Ros needs it). Half a kick before the first node follows. From rest, w = v = 0.
 
 A, r and p are what is learned: three curves over the phase hω that a mode turns between two nodes, even polynomials
 (Chebyshev, of (hω)²), A(0) = 1. They are shared by all modes of all strings, so that the model takes any resonator
@@ -28,8 +35,9 @@ bounded and decays to silence. A string never comes near that bound, and neither
 
 Any rate: nodes are a whole number to a frame, as many as keep ω₁h below `node_phase` and the highest mode's below
 `highest_phase` (where two modes' phases add up to 2π, kicks would pump them). A pluck that is hard and has its
-stretch in high modes takes more of them, as many as keep Σ η²κ q² at its start below `HARDEST_KICK`²: that sum is
-the square of the phase of the modes that stretch the string, times how far they raise the tension.
+stretch in high modes takes more of them, as many as keep Σ η²κ (q² + v²/ω²) at its start below
+`HARDEST_KICK`²: that sum is the square of the phase of the modes that stretch the string, times how far they raise
+the tension.
 """
 
 from __future__ import annotations
@@ -50,8 +58,9 @@ SERIES = 1 / 12  # r and p of small hω
 SPARE = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
-HARDEST_KICK = 0.3  # of the root of Σ η²κ q² as a string is let go: beyond it nodes come closer
+HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
 MOST_NODES = 3  # times as many as a soft pluck has
+SAME_RESONATOR = 1e-9  # relative: processors round logarithms and sines differently
 LEAST_PHASE = 0.02  # between nodes: a voice of more would take too much of the device's time
 
 
@@ -88,7 +97,8 @@ class KoopmanTensionState:
     """Where the latents are.
 
     Attributes:
-        x, y: z before the kick at the present node, float64 (batch, modes); before the first frame, as it is let go.
+        x, y: z before the kick at the present node, float64 (batch, modes); before the first frame, the mode itself:
+            q and -(v + σq)/ω.
         largest_energy: of Σ ω² |z|², at the present, (batch,).
         largest_stretch: of S, (batch,).
         step_size: samples of the trained rate in a frame; None before the first.
@@ -182,10 +192,28 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         other._take(physics)
         return other.train(self.training)
 
-    def encode(self, displacement: Tensor) -> KoopmanTensionState:
+    @torch.no_grad()
+    def check_physics(self, physics: Physics) -> None:
+        """See the contract."""
+        other = KoopmanTension(self.configuration)
+        other._take(physics)
+        own = dict(self.named_buffers())
+        for name, expected in other.named_buffers():
+            largest = float(expected.abs().max())
+            if not torch.allclose(own[name], expected, rtol=SAME_RESONATOR, atol=1e-3 * SAME_RESONATOR * largest):
+                raise ValueError(f"tensor {name!r} is of another string, or of other modes, rate_hz or scale_m")
+
+    def encode(self, displacement: Tensor, velocity: Tensor | None = None) -> KoopmanTensionState:
+        """See the contract; here of strings that may ring.
+
+        Args:
+            velocity: in normalised displacement a sample, (batch, grid_points); None: at rest.
+        """
         sigma, omega = self._rates()
         q = displacement.double() @ self.analysis
         x, y = q, -sigma * q / omega
+        if velocity is not None:
+            y = y - velocity.double() @ self.analysis / omega
         stretch = (self._stretch * q.square()).sum(-1)
         # 2 × the energy: of the linear string, and what the tension holds
         energy = (omega.square() * (x.square() + y.square())).sum(-1)
@@ -250,9 +278,8 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
     ) -> tuple[Tensor, KoopmanTensionState]:
         step = self.step(size, nodes)
         if state.step_size is None:
-            state = self._let_go(state, step, size)
+            state = self._set_out(state, step, size)
         to_points = self.shapes if readout is None else self.shapes @ readout.double()
-        to_points = to_points.to(torch.get_default_dtype())
         blocks, done = [], 0
         while done < steps:
             count = min(FRAMES_AT_ONCE, steps - done)
@@ -260,10 +287,11 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             amplitudes, state = (self._compiled if compiled else self._plain)(state, step, count)
             if frames is not None:
                 amplitudes = amplitudes[:, frames[(frames > done) & (frames <= done + count)] - done - 1]
-            blocks.append(amplitudes.to(to_points.dtype) @ to_points)
+            blocks.append(amplitudes @ to_points)
             done += count
         return torch.cat(blocks, dim=1), state
 
+    @torch.no_grad()
     def amplitudes(self, state: KoopmanTensionState, steps: int) -> Tensor:
         """Modal amplitudes of the next frames, float64 (batch, steps, modes), without gradients, on the CPU."""
         size = Fraction(1)
@@ -272,17 +300,18 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
 
         def run(part: KoopmanTensionState, nodes: int) -> tuple[Tensor, KoopmanTensionState]:
             step = self.step(size, nodes)
-            part = part if part.step_size is not None else self._let_go(part, step, size)
+            part = part if part.step_size is not None else self._set_out(part, step, size)
             return self._compiled(part, step, steps)
 
         return self._by_nodes(state, run)[0]
 
     def _nodes(self, state: KoopmanTensionState, size: Fraction) -> Tensor:
-        """Of a frame, for strings as they are let go, (batch,)."""
+        """Of a frame, for strings as they set out, (batch,)."""
         c, (_, omega) = self.configuration, self._rates()
         fastest = max(float(omega[0]) / c.node_phase, float(omega[-1]) / c.highest_phase)
-        pluck = (state.x.detach().square() @ (self._stretch * self._coupling)).sqrt() / HARDEST_KICK
-        closest = pluck.clamp(min=fastest, max=MOST_NODES * fastest)
+        swings = (state.x.square() + self._swing(state).square()).detach()
+        kick = (swings @ (self._stretch * self._coupling)).sqrt()
+        closest = (kick / HARDEST_KICK).clamp(min=fastest, max=MOST_NODES * fastest)
         return (float(size) * closest).ceil().clamp(min=1).long()
 
     def step(self, size: Fraction, nodes: int) -> Step:
@@ -313,14 +342,24 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         growth = 1 + phase.square() * (basis @ self.A)
         return growth.clamp(0, 2), (basis @ self.r).clamp(-1, 1), (basis @ self.p).clamp(-1, 1)
 
-    def _let_go(self, state: KoopmanTensionState, step: Step, size: Fraction) -> KoopmanTensionState:
+    def _swing(self, state: KoopmanTensionState) -> Tensor:
+        """v/ω of strings before their first frame, (batch, modes); exactly 0 at rest."""
+        sigma, omega = self._rates()
+        return -state.y - sigma * state.x / omega
+
+    def _set_out(self, state: KoopmanTensionState, step: Step, size: Fraction) -> KoopmanTensionState:
         """The coordinates in which kicks act, half a kick before the first node."""
-        stretch = (self._stretch * state.x.square()).sum(-1, keepdim=True)
-        x = state.x * (1 + step.seen * stretch)
+        q, swing, (_, omega) = state.x, self._swing(state), self._rates()
+        share = step.seen * (self._stretch * q.square()).sum(-1, keepdim=True)
+        x = q * (1 + share)
+        # of w/ω, whose sum Σ η² q w follows from that of v
+        moved = (self._stretch * q * omega * swing / (1 + share)).sum(-1, keepdim=True)
+        moved = moved / (1 + 2 * (step.seen * self._stretch * q.square() / (1 + share)).sum(-1, keepdim=True))
+        lifted = (swing - 2 * step.seen * q * moved / omega) / (1 + share)
         first = torch.minimum((step.stretch * x.square()).sum(-1, keepdim=True), state.largest_stretch[:, None])
         second = (step.second_stretch * x.square()).sum(-1, keepdim=True)
         kick = step.kick * first * (1 - 2 * second) - step.second_kick * first.square()
-        return replace(state, x=x, y=state.y - 0.5 * kick * x, step_size=size)
+        return replace(state, x=x, y=state.y + (swing - lifted) - 0.5 * kick * x, step_size=size)
 
     def _compiled(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Tensor, KoopmanTensionState]:
         from engine.kernels.tension import advance  # Numba only when it is needed

@@ -23,6 +23,7 @@ from torch import Tensor
 
 from engine import bounds
 from engine.models import StringModel, build_model, count_parameters, read_model_configuration
+from engine.models.base import Physics
 from engine.plain_text import one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
@@ -87,7 +88,8 @@ def load_preset(path: Path) -> Preset:
     """A preset with its model in evaluation mode.
 
     Raises:
-        PresetError: see `read_info`; also a tensor that is missing, unknown, re-shaped, re-typed or not finite.
+        PresetError: see `read_info`; also a tensor that is missing, unknown, re-shaped, re-typed or not finite, or of
+            another string than the metadata's.
     """
     with _open(path) as file:
         info = _info_of(path, file)
@@ -105,6 +107,7 @@ def load_preset(path: Path) -> Preset:
     for name, tensor in tensors.items():
         _check_finite(path, name, tensor)
     model.load_state_dict(tensors, assign=True)
+    _check_physics(path, info, model)
     for parameter in model.parameters():
         parameter.requires_grad_(True)
     return Preset(path.stem, path, info, model.eval())
@@ -241,6 +244,14 @@ def _check_form(path: Path, name: str, expected: Tensor, found: Any) -> None:
             f"{path}: tensor {name!r} is of type {kind}, expected {_SAFETENSORS_TYPES[expected.dtype]}; "
             "get the preset again"
         )
+
+
+def _check_physics(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
+    """Sound follows the metadata and pictures the tensors: both must be of one string."""
+    try:
+        model.check_physics(Physics(info.resonator, info.rate_hz, info.scale_m))
+    except (ValueError, OverflowError) as error:
+        raise PresetError(f"{path}: metadata.string: {error}; get the preset again") from error
 
 
 def _check_finite(path: Path, name: str, tensor: Tensor) -> None:

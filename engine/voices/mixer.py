@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from engine.effects import Effects
 from engine.effects.partitions import convolver, partitioned
 from engine.kernels import layout as at
+from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.derivative import differentiator_taps
 from engine.voices.voice import Voice
@@ -85,7 +86,7 @@ class Mixer:
                 self._voices.append(voice)
             for voice in voices[room:]:
                 voice.refuse()
-            counts[at.M_PUSHED] = pushed + min(len(voices), room)
+            publish(counts, at.M_PUSHED, pushed + min(len(voices), room))
 
     def set_effects(self, effects: Effects | None) -> None:
         """All voices sound through these from now on: body and room, before the volume. Any thread.
@@ -94,8 +95,6 @@ class Mixer:
         48 kHz, of which the last is the fade), at once where nothing has been rendered yet. It takes the caller some
         milliseconds, and tens where a body or a room has not been in use before.
         """
-        from engine.kernels.convolver import publish
-
         effects = effects or Effects()
         with self._effects_lock:
             if effects == self.effects:
@@ -108,7 +107,8 @@ class Mixer:
                 address = int(memory.ctypes.data)
                 self._impulses[address] = memory
             if self._convolver is not None:
-                publish(self.memory, self._convolver.ctypes.data, address)
+                publish(self._counts, at.M_CONVOLVER, self._convolver.ctypes.data)
+                publish(self._counts, at.M_EFFECTS, address)
             self.effects = effects
             self._forget_impulses()
 
@@ -150,6 +150,11 @@ class Mixer:
         self._counts[at.M_TONE_FRAME] = 0
         self._counts[at.M_TONE_SIDE] = {"left": 1, "right": 2}.get(side, 3)
         self._counts[at.M_TONE_LENGTH] = self.rate_hz
+
+    @property
+    def frames(self) -> int:
+        """Of sound, given so far."""
+        return int(self._counts[at.M_FRAMES])
 
     @property
     def seconds(self) -> float:

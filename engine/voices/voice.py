@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
+from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
@@ -150,11 +151,14 @@ class Voice:
         self.memory[at.GAIN_FROM] = self.memory[at.GAIN_TO] = gain
 
     def begin_at(self, frame: int) -> None:
-        """Before it is handed over: it waits for this frame of the mixer."""
+        """Before it is handed over: it begins at this frame of the mixer, or with the next quantum if that is past.
+
+        One that is added to the motion of another begins with a quantum of that one, less than a quantum off.
+        """
         self._counts[at.BEGIN_AT] = frame
 
     def release_at(self, frame: int) -> None:
-        """It fades out from this frame of the mixer on; 0: it does not."""
+        """It fades out from the first quantum on that begins at this frame of the mixer or later; 0: it does not."""
         self._counts[at.RELEASE_AT] = frame
 
     def fade_out_by(self, seconds: float) -> None:
@@ -163,6 +167,11 @@ class Voice:
         if self._counts[at.ENDS_AT] + self._counts[at.ENDS_IN] > end:
             self._counts[at.ENDS_AT] = max(0, min(int(self._counts[at.ENDS_AT]), end - fade))
             self._counts[at.ENDS_IN] = fade
+
+    @property
+    def waits(self) -> bool:
+        """Whether it has not begun."""
+        return bool(self._counts[at.STATE] == at.WAITING)
 
     @property
     def began_frame(self) -> int:
@@ -186,14 +195,17 @@ class Voice:
             return False
         self._set_weights(1, ear)
         self._counts[at.WEIGHTS_FADED] = 0
-        self._counts[at.NEXT_WEIGHTS] = 1
+        publish(self._counts, at.NEXT_WEIGHTS, 1)
         self.ear = ear
         return True
 
-    def retune(self, resonator: Resonator, seconds: float = 0.005) -> None:
+    def retune(self, resonator: Resonator, seconds: float = 0.005, frame: int = 0) -> None:
         """Other modes while it rings, as a tension, a length or a damping that changes: it gets there evenly.
 
         Amplitude and speed of each mode go on. Any one thread; the latest wish counts.
+
+        Args:
+            frame: of the mixer, from which they count, within a quantum; they wait for those wished for before.
 
         Raises:
             ValueError: the voice has no modes of its own, or not so many.
@@ -201,17 +213,21 @@ class Voice:
         if self.program.resonator is None or resonator.modes != self.program.modes:
             raise ValueError(f"a voice with {self.program.modes} modes cannot take {resonator.modes} others")
         block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
-        block.view(np.int64)[at.B_QUANTA] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM))
+        own = block.view(np.int64)
+        own[at.B_QUANTA], own[at.B_AT] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM)), frame
         taken = int(self._counts[at.TAKEN])
         for place, each in enumerate(self._blocks):
             if int(each.ctypes.data) == taken:
                 del self._blocks[:place]
                 break
+        if self._blocks:
+            publish(self._blocks[-1].view(np.int64), at.B_NEXT, block.ctypes.data)
+        else:
+            publish(self._counts, at.WISHES, block.ctypes.data)
         self._blocks.append(block)
-        self._counts[at.RESONATOR] = int(block.ctypes.data)
 
     def continues(self, before: Voice) -> None:
-        """Before it is handed over: it is the same string, plucked again while `before` rings.
+        """Before it is handed over: it is the same string, plucked again while `before` rings on.
 
         Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
 
@@ -220,13 +236,25 @@ class Voice:
         """
         if self.program.resonator is None or before.program.resonator is None:
             raise ValueError("a voice without modes of its own has no string that is plucked again")
-        before.forget_before()
-        self._before = before
-        self._counts[at.CONTINUES] = before.address
+        self._follow(before)
 
-    def forget_before(self) -> None:
-        """Lets go of the voice that it continues, once it has taken its motion over."""
-        if self._counts[at.CONTINUES] == 0:
+    def stops(self, before: Voice, seconds: float) -> None:
+        """Before it is handed over: it is the same string, stopped by what plucks it again.
+
+        It begins as a pluck of a string at rest, and `before` fades out in so many seconds from then on. One that
+        has not begun by then never sounds.
+        """
+        self._follow(before)
+        self._counts[at.STOPS_IN] = max(1, round(seconds * self.program.rate_hz))
+
+    def _follow(self, before: Voice) -> None:
+        """Keeps the voice before in memory until this one, which is the same string, has begun."""
+        before._forget_before()
+        self._before = before
+        self._counts[at.BEFORE] = before.address
+
+    def _forget_before(self) -> None:
+        if self._counts[at.BEFORE] == 0:
             self._before = None
 
     def append(self, samples: NDArray[np.floating]) -> None:
@@ -235,7 +263,7 @@ class Voice:
         ready = int(self._counts[at.READY])
         count = min(len(samples), len(self._samples) - ready)
         self._samples[ready : ready + count] = samples[:count]
-        self._counts[at.READY] = ready + count
+        publish(self._counts, at.READY, ready + count)
 
     def level_of_samples(self, seconds: float) -> float:
         """Root mean square of what a rendered voice was given for its first seconds."""
@@ -288,4 +316,4 @@ def _rows(resonator: Resonator) -> NDArray[np.float64]:
 
 
 def _state(modes: int) -> int:
-    return at.HEADER + 8 * modes + 4 + 6 * at.QUANTUM
+    return at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM

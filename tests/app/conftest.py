@@ -17,7 +17,7 @@ from app.audio.devices import AudioDevice
 from app.audio.output import ClockOutput
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.sound import Sound
-from app.rendering import SOURCES, Take
+from app.rendering import Take
 from app.rendering.take import Listened, Signal
 from engine.voices import Ear, Mixer
 
@@ -36,8 +36,8 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
 
     def heard(take: Take, ear: Ear) -> None:
         listened = Listened(ear)
-        for name in (*SOURCES, *take.others):
-            motion = take.motion(name)
+        for name in take.motions:
+            motion = take.motions[name]
             frames_m, rate_hz = motion.read(), round(motion.rate_hz)
             signal = listened.signals[name] = Signal(rate_hz, len(ear.points), take.seconds)
             samples = frames_m @ ear.weights(frames_m.shape[1]).float().numpy()

@@ -8,8 +8,9 @@ from random import Random
 from typing import Any
 
 from app.patches.patch import Patch, PhysicalString, StringSet
-from app.session.choices import SPEED_RANGE, Choices
+from app.session.choices import Choices
 from app.session.instrument import choices_of
+from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
 
@@ -64,7 +65,7 @@ _CHANGES: tuple[_Change, ...] = (
     lambda r, c, of: {"difference_gain_db": r.uniform(*DIFFERENCE_GAIN_RANGE_DB)},
     lambda r, c, of: {"loop": not c.loop},
     lambda r, c, of: {"volume_db": r.uniform(*VOLUME_RANGE_DB)},
-    lambda r, c, of: {"speed": r.uniform(*SPEED_RANGE)},
+    lambda r, c, of: {"speed": r.uniform(*OF_CHOICES["speed"].limits)},
     lambda r, c, of: {"left_view": r.choice(of.left_views)},
     lambda r, c, of: {"right_view": r.choice(of.right_views)},
     lambda r, c, of: {"motion": not c.motion},

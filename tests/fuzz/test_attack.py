@@ -17,7 +17,7 @@ import pytest
 import soundfile
 import torch
 
-from app.analysis.abx.record import RecordError, load_record
+from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
 from app.commands.console import Failure
@@ -333,7 +333,7 @@ TARGETS = (
     Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),
     Target("pcm.wav", lambda p: impulse(p, "WAV", "PCM_16"), sounded, (ImpulseError,)),
     Target("body.flac", lambda p: impulse(p, "FLAC", "PCM_24"), sounded, (ImpulseError,)),
-    Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (RecordError,), json_or_bytes),
+    Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (SchemaError,), json_or_bytes),
 )
 
 

@@ -1,144 +1,158 @@
-"""The record of a test: a JSON file with what was played, what was answered, and the result.
+"""The result of a test: its words, and the JSON file that keeps it.
 
-A record is checked when it is read: its numbers must follow from its trials, and its order from its seed, so that a
-damaged or edited file is refused.
+Score and p-value follow from the trials. The file has them for its readers; they are computed again when it is read.
 """
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
 from platformdirs import user_documents_path
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, computed_field
 
-from app.analysis.abx.trials import LARGEST_SEED, MOST_TRIALS, Run, Trial, draw_order, p_value
-from app.patches.patch import PhysicalString
+from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
+from app.presets.library import PresetEntry
+from app.session.choices import Choices
 from app.shared.version import program_version
-from app.shared.vocabulary import Pickup
 from app.shared.whole_file import WriteError, explain, whole_file
-from engine.plain_text import one_line
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE, Shape
-from engine.read_file import UnusableFile, read_bounded
+from engine.presets import preset_digest
+from engine.read_file import read_bounded
 from engine.schema import SchemaError, parse_json
 
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
-VERSION: Literal[2] = 2  # 1 did not tell the string
 LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-_FROZEN = ConfigDict(frozen=True, extra="forbid")
-
-
-class RecordError(ValueError):
-    """A record cannot be used. The message, one line, names the file, what is wrong with it and the remedy."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(one_line(message))
+SCORE_FIELDS = {"kind", "trials", "planned_trials", "correct", "complete", "p_value"}
+PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "listen", "pickup", "solo", "seconds", "string"}
+MEANING = (
+    "The p-value is the probability that guessing alone would give at least this many right answers. "
+    f"Below {LEVEL:g}, luck is an unlikely explanation; a larger value does not show that A and B sound the same, "
+    "only that this test did not tell them apart."
+)
 
 
-class HeardSource(BaseModel):
-    """A or B: its name for people, the preset that made it (for the truth, the one whose string it is), its gain."""
-
-    model_config = _FROZEN
-
-    label: str
-    preset: str
-    preset_sha256: Sha256
-    gain_db: Annotated[float, Field(le=0, allow_inf_nan=False)]
-
-
-class HeardPluck(BaseModel):
-    """The pluck, and where and how it was heard; positions and width as fractions of the string's length.
+class Candidate(BaseModel):
+    """A sound that can be A or B.
 
     Attributes:
-        string: which one was chosen, of a preset of many; None: the preset's own.
+        source: its name among the sounds of a pluck.
+        label: its name for people.
+        preset, preset_sha256: the preset that made it; for the truth, the one whose string it is.
+        gain_db: by which it was turned down.
     """
 
-    model_config = _FROZEN
+    model_config = ConfigDict(frozen=True)
 
-    position: Annotated[float, Field(ge=POSITION_RANGE[0], le=POSITION_RANGE[1])]
-    amplitude_mm: Annotated[float, Field(ge=0, le=LARGEST_AMPLITUDE_MM)]
-    shape: Shape
-    width: Annotated[float, Field(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])]
-    listen: Annotated[float, Field(ge=0, le=1)]  # the left or only one
-    listen_right: Annotated[float, Field(ge=0, le=1)] | None = None
-    pickup: Pickup = "displacement"
-    solo: Annotated[int, Field(ge=0)] = 0
-    seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)]
-    string: PhysicalString | None = None
+    source: str = ""
+    label: str
+    preset: str
+    preset_sha256: str
+    gain_db: float = 0.0
 
 
-class HeardThrough(BaseModel):
-    """The sound device, and how it was played."""
+@dataclass(frozen=True)
+class Subject:
+    """What is compared.
 
-    model_config = _FROZEN
+    Attributes:
+        candidates: two or more; the first two are A and B until others are chosen.
+        pluck: its fields, and where it is heard, by name.
+        volume_db: of the playback, which stays the same during the test.
+    """
 
-    device: str
-    host_api: str
-    rate_hz: Annotated[int, Field(gt=0)]
-    volume_db: Finite
-    restart_at_switch: bool
+    candidates: tuple[Candidate, ...]
+    pluck: dict[str, object]
+    volume_db: float
+
+
+def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
+    """Model and truth of a preset, plucked and heard as chosen.
+
+    Raises:
+        PresetError: its file cannot be read.
+    """
+    made = {"preset": entry.name, "preset_sha256": preset_digest(entry.path)}
+    candidates = tuple(Candidate(source=name, label=name.capitalize(), **made) for name in ("model", "truth"))
+    fields = PLUCK_FIELDS | ({"listen_right"} if choices.stereo else set())
+    return Subject(candidates, choices.model_dump(mode="json", include=fields), choices.volume_db)
 
 
 class AbxRecord(BaseModel):
-    """See the module.
+    """The result.
 
     Attributes:
+        pluck: see `Subject`.
+        through: the sound device, and how it was played.
         trials: those that were answered, in order.
-        correct: how many of them were answered right.
-        p_value: None unless the test is complete: stopping early would bias it.
-        remark: why it is not complete, if that is known.
+        remark: why the test is not complete, if that is known.
     """
 
-    model_config = _FROZEN
+    model_config = ConfigDict(frozen=True)
 
-    kind: Literal["learned-strings-abx"]
-    version: Literal[1, 2]
-    program: str
-    date: AwareDatetime
-    a: HeardSource
-    b: HeardSource
-    pluck: HeardPluck
-    through: HeardThrough
+    kind: Literal["learned-strings-abx"] = KIND
+    program: str = Field(default_factory=program_version)
+    date: AwareDatetime = Field(default_factory=lambda: datetime.now().astimezone().replace(microsecond=0))
+    a: Candidate
+    b: Candidate
+    pluck: dict[str, object]
+    through: dict[str, object]
     planned_trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)]
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-    trials: tuple[Trial, ...]
-    correct: int
-    p_value: Finite | None
-    complete: bool
+    seed: int
+    trials: Annotated[tuple[Trial, ...], Field(max_length=MOST_TRIALS)]
     remark: str = ""
 
-    @model_validator(mode="after")
-    def _numbers_follow_from_trials(self) -> AbxRecord:
-        if self.version == 1 and self.pluck.string is not None:
-            raise ValueError("pluck.string belongs to version 2")
-        answered = len(self.trials)
-        if self.complete != (answered == self.planned_trials) or answered > self.planned_trials:
-            raise ValueError(f"complete does not fit {answered} answers to {self.planned_trials} trials")
-        if tuple(trial.x for trial in self.trials) != draw_order(self.seed, self.planned_trials)[:answered]:
-            raise ValueError("the trials are not in the order of the seed")
-        if self.correct != sum(trial.correct for trial in self.trials):
-            raise ValueError("correct is not the number of right answers")
-        expected = p_value(self.correct, answered) if self.complete else None
-        if expected is None or self.p_value is None:
-            if expected is not self.p_value:
-                raise ValueError("p_value belongs to a complete test, and to no other")
-        elif not math.isclose(expected, self.p_value, rel_tol=1e-6):
-            raise ValueError(f"p_value is {self.p_value:g}, but the answers give {expected:g}")
-        return self
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def correct(self) -> int:
+        """The number of right answers."""
+        return sum(trial.correct for trial in self.trials)
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def complete(self) -> bool:
+        return len(self.trials) == self.planned_trials
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def p_value(self) -> float | None:
+        """None unless the test is complete: stopping early would bias it."""
+        return p_value(self.correct, self.planned_trials) if self.complete else None
+
+    @property
+    def verdict(self) -> str:
+        """What follows from the result, in a sentence."""
+        if self.p_value is None:
+            return "The test was not completed, so no p-value can be given."
+        if self.p_value < LEVEL:
+            return "You can tell them apart: luck is an unlikely explanation."
+        return "This test did not show that you can tell them apart."
+
+
+def p_text(p_value: float) -> str:
+    """A p-value for people: three decimals, the smallest as a bound."""
+    return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.3f}"
+
+
+def as_text(record: AbxRecord) -> str:
+    """The result and its circumstances, a line each."""
+    p = "incomplete" if record.p_value is None else p_text(record.p_value)
+    lines = [f"{record.correct} of {len(record.trials)} right, {record.planned_trials} planned: {p}", record.verdict]
+    for name, value in record.model_dump(mode="json", exclude=SCORE_FIELDS).items():
+        parts = [f"{key} {each}" for key, each in value.items()] if isinstance(value, dict) else [f"{value}"]
+        lines.append(f"{name:<14} {', '.join(parts)}")
+    lines += [f"trial {n}: X is {t.x}, answer {t.answer}" for n, t in enumerate(record.trials, 1)]
+    return "\n".join(lines) + "\n"
 
 
 def default_folder() -> Path:
-    """Where records are saved by default: a folder within the user's documents."""
+    """The folder of results within the user's documents."""
     return user_documents_path() / "Learned Strings" / "Listening tests"
 
 
 def save_record(folder: Path, record: AbxRecord) -> Path:
-    """Writes a new file, whole or not at all, and returns its path; makes the folder, overwrites no earlier record.
+    """Writes a new file, whole or not at all, and returns its path; makes the folder, overwrites no earlier result.
 
     Raises:
         WriteError: the folder or the file cannot be written.
@@ -157,70 +171,14 @@ def save_record(folder: Path, record: AbxRecord) -> Path:
 
 
 def load_record(path: Path) -> AbxRecord:
-    """Reads and checks one file.
+    """Reads a result, of this version or an earlier one.
 
     Raises:
-        RecordError: it is missing, damaged, edited, or of a newer version.
+        SchemaError: it is missing, damaged, or no result of a listening test.
     """
     try:
-        data = parse_json(read_bounded(path, LARGEST_FILE_BYTES), "the record")
-    except UnusableFile as error:
-        raise RecordError(f"{path}: {error.strerror}; choose the record of a listening test") from error
+        return AbxRecord.model_validate(parse_json(read_bounded(path, LARGEST_FILE_BYTES), "the result"))
     except OSError as error:
-        raise RecordError(f"{path}: cannot be read ({error.strerror}); check the name") from error
-    except SchemaError as error:
-        told = "not a JSON file, or cut short; choose the record of a listening test"
-        raise RecordError(one_line(f"{path}: {told} ({error})")) from error
-    try:
-        return AbxRecord.model_validate(data)
-    except ValidationError as error:
-        raise RecordError(_explain(path, error)) from error
-    except OverflowError as error:
-        raise RecordError(f"{path}: holds a number that is too large ({error}); choose another file") from error
-
-
-def list_records(folder: Path) -> tuple[list[tuple[Path, AbxRecord]], list[str]]:
-    """The records of a folder, the latest first, and a line for each file that cannot be used."""
-    found, problems = [], []
-    for path in folder.glob("abx_*.json"):
-        try:
-            found.append((path, load_record(path)))
-        except RecordError as error:
-            problems.append(str(error))
-    return sorted(found, key=lambda entry: entry[1].date, reverse=True), problems
-
-
-def make_record(
-    run: Run, a: HeardSource, b: HeardSource, pluck: HeardPluck, through: HeardThrough, remark: str = ""
-) -> AbxRecord:
-    """The record of a run as it stands, dated now."""
-    correct = sum(trial.correct for trial in run.trials)
-    return AbxRecord(
-        kind=KIND,
-        version=VERSION,
-        program=program_version(),
-        date=datetime.now().astimezone().replace(microsecond=0),
-        a=a,
-        b=b,
-        pluck=pluck,
-        through=through,
-        planned_trials=run.planned,
-        seed=run.seed,
-        trials=run.trials,
-        correct=correct,
-        p_value=p_value(correct, run.planned) if run.complete else None,
-        complete=run.complete,
-        remark=remark,
-    )
-
-
-def _explain(path: Path, error: ValidationError) -> str:
-    faults = error.errors(include_url=False, include_input=False)
-    first, fields = faults[0], {entry["loc"][0] for entry in faults if entry["loc"]}
-    if "kind" in fields or (not first["loc"] and first["type"] != "value_error"):
-        return f"{path}: not the record of a listening test; choose another file"
-    if "version" in fields:
-        return f"{path}: of a version that is not known here; read it with a newer Learned Strings"
-    field = ".".join(map(str, first["loc"]))
-    what = first["msg"].removeprefix("Value error, ")
-    return f"{path}: {f'{field}: ' if field else ''}{what}; the file was damaged or edited"
+        raise SchemaError(f"{path}: {error.strerror}; choose the result of a listening test") from error
+    except (SchemaError, ValidationError, OverflowError) as error:
+        raise SchemaError(f"{path}: not the result of a listening test, or damaged ({error})") from error

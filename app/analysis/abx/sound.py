@@ -23,22 +23,6 @@ TRIVIAL_CONVERGENCE = 0.5  # spectral distance above which the difference is obv
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A source that can be A or B.
-
-    Attributes:
-        source: its name among the sounds of a pluck.
-        label: its name for people.
-        preset, preset_sha256: the preset that made it; for the truth, the one whose string it is.
-    """
-
-    source: str
-    label: str
-    preset: str
-    preset_sha256: str
-
-
-@dataclass(frozen=True)
 class Stimuli:
     """A and B, ready to be played.
 

@@ -23,6 +23,16 @@ LARGEST_SEED = 2**32 - 1
 LEVEL = 0.05  # below it, luck is an unlikely explanation
 
 
+class AbxChoices(BaseModel):
+    """The last settings. `restart`: each switch starts the sound again; `folder`: "" for `record.default_folder`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    trials: int = Field(16, ge=1, le=MOST_TRIALS)
+    restart: bool = False
+    folder: str = ""
+
+
 def new_seed() -> int:
     """A seed that cannot be foreseen, 0 … `LARGEST_SEED`."""
     return secrets.randbelow(LARGEST_SEED + 1)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import soundfile
 
 from app.export.files import ExportError
+from app.export.sampled.levels import headroom_db
 from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
@@ -107,7 +108,7 @@ def export_sampled(
             with whole_file(out) as file:
                 if out.suffix.lower() == ".sfz":
                     file.write(sfz_text(plan, samples, store.folder.name).encode())
-                    gain_db = sfz_gain_db(samples)
+                    gain_db = sfz_gain_db(plan.patch, samples)
                 else:
                     gain_db = write_sf2(file, plan, samples, store.folder, cancelled)
             size = out.stat().st_size
@@ -122,7 +123,8 @@ def export_sampled(
     if out.suffix.lower() == ".sf2":
         store.remove()
     cut = sum(sample.cut for sample in samples.values())
-    loudest_db = max(sample.peak_db for sample in samples.values())
+    headrooms_db = headroom_db(plan.patch, samples)
+    loudest_db = max(sample.peak_db + headrooms_db[zone] for zone, sample in samples.items())
     return SampledReport(out, len(samples), rendered, size, cut, gain_db, loudest_db + gain_db)
 
 

@@ -23,7 +23,7 @@ def by_key(samples: Mapping[Zone, StoredSample]) -> Iterator[tuple[list[Zone], l
 
 
 def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]) -> Levels:
-    """The levels of one key. Below the softest layer's velocity they fall as steeply as from the next layer to it.
+    """The levels of one key. Outside the rendered velocities they go on as steeply as between the nearest two.
 
     Where a layer is silent, or there is only one, they follow the amplitudes of the plucks.
     """
@@ -36,6 +36,20 @@ def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]
     # plucks of equal amplitude still differ in width, and so in level
     along = plucks_db if np.ptp(plucks_db) > 0 else np.array(velocities, np.float64)
     places = along[rendered]
-    slope = (measured_db[1] - measured_db[0]) / (places[1] - places[0])
-    below = measured_db[0] + slope * (along - places[0])
-    return np.where(np.array(velocities) < rendered[0], below, np.interp(along, places, measured_db))
+    slopes = np.diff(measured_db) / np.diff(places)
+    levels_db = np.interp(along, places, measured_db)
+    softer, harder = along < places[0], along > places[-1]
+    levels_db[softer] = measured_db[0] + slopes[0] * (along[softer] - places[0])
+    levels_db[harder] = measured_db[-1] + slopes[-1] * (along[harder] - places[-1])
+    return levels_db
+
+
+def headroom_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, float]:
+    """By zone: how much louder its loudest velocity is than the one it was rendered at."""
+    found = {}
+    for layers, stored in by_key(samples):
+        levels_db = velocity_levels(patch, layers, stored)
+        for zone in layers:
+            softest, hardest = zone.velocities
+            found[zone] = float(levels_db[softest : hardest + 1].max() - levels_db[zone.velocity])
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, Protocol, get_args
 
@@ -79,7 +79,8 @@ class SampledPlan:
     Attributes:
         keys: the lowest and the highest MIDI key; None: all of the patch's range.
         every: one of so many keys is sampled; the others transpose its samples. 1 transposes none.
-        layers: velocity layers, of equal widths; each is rendered at its highest velocity.
+        layers: velocity layers, of equal widths; each is rendered at the velocity whose pitch glide is nearest to the
+            middle of all that it sounds for.
         seconds: the longest sample. One that is silent sooner ends there; one that still rings is faded out.
         preset_sha256: of the model that plays the patch, so that samples of an earlier one are not kept.
         body_sha256: of the impulse response of the user's own that is its body, for the same reason.
@@ -130,11 +131,12 @@ class SampledPlan:
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
         """By key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
-        return tuple(
-            Zone(low + (high - low) // 2, velocities[1], (low, high), velocities)
-            for low, high in self._key_spans()
-            for velocities in self._layers()
-        )
+        return tuple(self._zone(keys, velocities) for keys in self._key_spans() for velocities in self._layers())
+
+    @property
+    def pitch_error_cents(self) -> float:
+        """The largest error of the pitch at which a note starts: a sample has the glide of one velocity."""
+        return max(float(self._glide_errors_cents(zone)[zone.velocity - zone.velocities[0]]) for zone in self.zones)
 
     @property
     def channels(self) -> int:
@@ -169,6 +171,31 @@ class SampledPlan:
         silent = {"body": not body.name or body.mix == 0, "room": room.mix == 0}
         unheard = UNHEARD_FIELDS | {name for name, left_out in silent.items() if left_out}
         return self.patch.model_dump(mode="json", exclude=set(unheard))
+
+    def _zone(self, keys: tuple[int, int], velocities: tuple[int, int]) -> Zone:
+        """Of equally good velocities the hardest is rendered."""
+        hardest = Zone(keys[0] + (keys[1] - keys[0]) // 2, velocities[1], keys, velocities)
+        errors = self._glide_errors_cents(hardest)
+        return replace(hardest, velocity=velocities[1] - int(errors[::-1].argmin()))
+
+    def _glide_errors_cents(self, zone: Zone) -> NDArray[np.float64]:
+        """By velocity that the zone may be rendered at: the largest error of the glides of all its notes.
+
+        Zeros where the string of its key is impossible, as rendering it then reports.
+        """
+        (low, high), (softest, hardest) = zone.keys, zone.velocities
+        glides = self._glides_cents[:, softest : hardest + 1]
+        notes, rendered = glides[low : high + 1], glides[zone.key]
+        notes = notes[np.isfinite(notes)]
+        if not np.isfinite(rendered).all():
+            return np.zeros(len(rendered))
+        return np.maximum(notes.max() - rendered, rendered - notes.min())
+
+    @cached_property
+    def _glides_cents(self) -> NDArray[np.float64]:
+        from app.instrument.glide import glides_cents  # brings torch
+
+        return glides_cents(self.patch)
 
     def _key_spans(self) -> list[tuple[int, int]]:
         low, high = self.key_range

@@ -16,7 +16,7 @@ from typing import BinaryIO
 import numpy as np
 import soundfile
 
-from app.export.sampled.levels import by_key, velocity_levels
+from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
 from app.export.sound import Cancelled, ExportCancelled
@@ -99,7 +99,11 @@ def write_sf2(
     body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
     file.write(b"LIST" + struct.pack("<I", 4 + 8 + size) + b"sdta" + b"smpl" + struct.pack("<I", size))
-    levels_db = {zone: _raised_db(attenuations_cb[zone], zone) - stored.gain_db for zone, stored in samples.items()}
+    headrooms_db = headroom_db(plan.patch, samples)
+    levels_db = {
+        zone: _raised_db(attenuations_cb[zone], zone) + headrooms_db[zone] - stored.gain_db
+        for zone, stored in samples.items()
+    }
     gain_db = -max(levels_db.values())
     for zone in samples:
         if cancelled():
@@ -123,16 +127,17 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
     for layers, stored in by_key(samples):
         levels_db = velocity_levels(patch, layers, stored)
         for zone in layers:
+            hardest = zone.velocities[1]
             below = max(1, zone.velocities[0] - 1)  # the velocity of the layer before
-            step = (levels_db[zone.velocity] - levels_db[below]) / max(1, zone.velocity - below)
-            most = (levels_db[-1] - levels_db[zone.velocity] + MOST_RAISED_DB) / (128 - zone.velocity)
+            step = (levels_db[hardest] - levels_db[below]) / max(1, hardest - below)
+            most = (levels_db[-1] - levels_db[hardest] + MOST_RAISED_DB) / (128 - hardest)
             found[zone] = round(10 * 128 * max(0.0, min(step, most)))
     return found
 
 
 def _raised_db(attenuation_cb: int, zone: Zone) -> float:
-    """By how much a zone is raised to make up for the velocity's attenuation at the velocity it was rendered at."""
-    return attenuation_cb / 10 * (1 - zone.velocity / 128)
+    """By how much a zone is raised to make up for the velocity's attenuation at its hardest velocity."""
+    return attenuation_cb / 10 * (1 - zone.velocities[1] / 128)
 
 
 def release_timecents(patch: Patch) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from app.export.sampled.levels import Levels, by_key, velocity_levels
+from app.export.sampled.levels import Levels, by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
 from app.patches.patch import Patch
@@ -25,9 +25,10 @@ def sfz_text(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: st
     return "\n".join(_lines(plan, samples, folder)) + "\n"
 
 
-def sfz_gain_db(samples: Mapping[Zone, StoredSample]) -> float:
+def sfz_gain_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> float:
     """By how much the whole is raised: 0, or less where a note would clip, so that no volume is above 0 dB."""
-    return min(0.0, *(sample.gain_db for sample in samples.values()))
+    headrooms_db = headroom_db(patch, samples)
+    return min(0.0, *(sample.gain_db - headrooms_db[zone] for zone, sample in samples.items()))
 
 
 def release_s(patch: Patch) -> float:
@@ -36,7 +37,8 @@ def release_s(patch: Patch) -> float:
 
 
 def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str) -> Iterator[str]:
-    patch, gain_db = plan.patch, sfz_gain_db(samples)
+    patch, gain_db = plan.patch, sfz_gain_db(plan.patch, samples)
+    headrooms_db = headroom_db(patch, samples)
     yield f"// {one_line(patch.name)}, by {PROGRAM} {program_version()}"
     yield f"// {one_line(patch.description)}" if patch.description else "//"
     if plan.every > 1:
@@ -69,16 +71,16 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
             softest, hardest = zone.velocities
             yield (
                 f"<region> sample={plan.file_name(zone)} lovel={softest} hivel={hardest}"
-                f" volume={gain_db - sample.gain_db:.2f} {_velocity_curve(zone, levels_db)}"
+                f" volume={gain_db - sample.gain_db + headrooms_db[zone]:.2f} {_velocity_curve(zone, levels_db)}"
             )
 
 
 def _velocity_curve(zone: Zone, levels_db: Levels) -> str:
-    """Within a layer the level goes on as between layers: 1 at the velocity that was rendered.
+    """Within a layer the level goes on as between layers: 1 at its loudest velocity.
 
     Players draw straight lines between these points: with four, a layer of 10 dB is right to 0.1 dB.
     """
     low, high = zone.velocities
     points = sorted({low + (high - low) * part // 3 for part in range(4)})
-    gains = np.minimum(1, 10 ** ((levels_db - levels_db[zone.velocity]) / 20))
+    gains = np.minimum(1, 10 ** ((levels_db - levels_db[low : high + 1].max()) / 20))
     return " ".join(f"amp_velcurve_{velocity}={gains[velocity]:.5f}" for velocity in points)

@@ -46,6 +46,11 @@ def counted(plan: SampledPlan) -> str:
     return f"{number_of(len(zones), 'sample')} ({keys}{between}, {layers})"
 
 
+def pitch_words(error_cents: float) -> str:
+    """The largest pitch error of a note's start (`SampledPlan.pitch_error_cents`) in words."""
+    return f"note starts within {error_cents:.1f} cents of the patch"
+
+
 def megabytes(size: int) -> str:
     return f"{size / 1e6:,.0f} MB" if size >= 1e7 else f"{size / 1e6:.1f} MB"
 

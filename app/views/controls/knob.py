@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
+from app.shared.parameters import Parameter
 from app.views import theme
 from app.views.controls.plain import plain_tip
 
@@ -19,36 +19,6 @@ DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
 TIP_ABOVE = 44  # pixels: the value while dragging stands above the knob, out of the way of the hand
-
-
-@dataclass(frozen=True)
-class KnobRange:
-    """What a knob can hold. Logarithmic ranges move by ratio; `text` formats a value, with its unit."""
-
-    low: float
-    high: float
-    default: float
-    step: float  # of an arrow key or a wheel notch; a ratio above 1 where logarithmic
-    text: str = "{:.2f}"
-    logarithmic: bool = False
-
-    def share(self, value: float) -> float:
-        """0 … 1 along the sweep."""
-        if self.logarithmic:
-            return math.log(value / self.low) / math.log(self.high / self.low)
-        return (value - self.low) / (self.high - self.low)
-
-    def value(self, share: float) -> float:
-        """The inverse of `share`, which is limited to 0 … 1."""
-        share = min(max(share, 0.0), 1.0)
-        if self.logarithmic:
-            return self.low * (self.high / self.low) ** share
-        return self.low + share * (self.high - self.low)
-
-    def stepped(self, value: float, steps: float) -> float:
-        """`value` moved by so many steps, within the range."""
-        moved = value * self.step**steps if self.logarithmic else value + self.step * steps
-        return min(max(moved, self.low), self.high)
 
 
 class _Editor(QLineEdit):
@@ -75,11 +45,11 @@ class Knob(QWidget):
     drag_started = Signal()
     drag_ended = Signal()
 
-    def __init__(self, name: str, limits: KnobRange, tip: str = "", parent: QWidget | None = None) -> None:
+    def __init__(self, parameter: Parameter, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.limits = limits
-        self._name = name
-        self._value = limits.default
+        self.parameter, self.default = parameter, parameter.default  # to which a double-click resets
+        self._name = parameter.label
+        self._value = parameter.default
         self._dragged_at: QPointF | None = None
         self._dragged_share = 0.0  # may go past the ends, so that the way back is as long
         self._editor: QLineEdit | None = None
@@ -88,7 +58,7 @@ class Knob(QWidget):
         self._figure = self._why_barred = self._tip = ""
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.set_name(name, tip)
+        self.set_name(parameter.label, parameter.tip)
 
     def set_name(self, name: str, tip: str = "") -> None:
         """The label and the tooltip, shown as plain text: both may come from a file."""
@@ -108,7 +78,7 @@ class Knob(QWidget):
     @property
     def text(self) -> str:
         """The value in its unit."""
-        return self.limits.text.format(self._value)
+        return self.parameter.shown(self._value)
 
     def show_figure(self, figure: str) -> None:
         """Shows what the value amounts to, with its unit, in its place; "" shows the value again.
@@ -166,7 +136,7 @@ class Knob(QWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self._dragged_at = event.position()
-            self._dragged_share = self.limits.share(self._value)
+            self._dragged_share = self.parameter.share(self._value)
             self.drag_started.emit()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -175,7 +145,7 @@ class Knob(QWidget):
         fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
         self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
         self._dragged_at = event.position()
-        self.value_asked.emit(self.limits.value(self._dragged_share))
+        self.value_asked.emit(self.parameter.value(self._dragged_share))
         QToolTip.showText(self._tip_place(), self.accessibleDescription(), self)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -185,12 +155,12 @@ class Knob(QWidget):
             self.drag_ended.emit()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        self.value_asked.emit(self.limits.default)
+        self.value_asked.emit(self.default)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
         notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
-        self.value_asked.emit(self.limits.stepped(self._value, notches * fine))
+        self.value_asked.emit(self.parameter.stepped(self._value, notches * fine))
         event.accept()
 
     def event(self, event: QEvent) -> bool:
@@ -212,13 +182,13 @@ class Knob(QWidget):
             Qt.Key.Key_PageDown: -COARSE,
         }.get(Qt.Key(event.key()))
         if steps is not None:
-            self.value_asked.emit(self.limits.stepped(self._value, steps * fine))
+            self.value_asked.emit(self.parameter.stepped(self._value, steps * fine))
         elif event.key() == Qt.Key.Key_Home:
-            self.value_asked.emit(self.limits.low)
+            self.value_asked.emit(self.parameter.limits[0])
         elif event.key() == Qt.Key.Key_End:
-            self.value_asked.emit(self.limits.high)
+            self.value_asked.emit(self.parameter.limits[1])
         elif event.key() == Qt.Key.Key_Delete:
-            self.value_asked.emit(self.limits.default)
+            self.value_asked.emit(self.default)
         elif event.text() and event.text() in "0123456789.-":
             self._type(event.text())
         else:
@@ -246,11 +216,11 @@ class Knob(QWidget):
         if math.isfinite(value) and self._figure:
             self.figure_asked.emit(value)
         elif math.isfinite(value):
-            taken = min(max(value, self.limits.low), self.limits.high)
+            taken = self.parameter.clamped(value)
             self.value_asked.emit(taken)
             if taken != value:
                 end = "At most" if value > taken else "At least"
-                QToolTip.showText(self._tip_place(), f"{end} {self.limits.text.format(taken)}", self)
+                QToolTip.showText(self._tip_place(), f"{end} {self.parameter.shown(taken)}", self)
 
     def _tip_place(self) -> QPoint:
         return self.mapToGlobal(QPoint(0, -TIP_ABOVE))
@@ -271,7 +241,7 @@ class Knob(QWidget):
         middle, radius = (QPointF(self.width() / 2, 29), 13.0) if self._low else (QPointF(self.width() / 2, 38), 18.0)
         ring = QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
         start = 90 + SWEEP_DEGREES / 2
-        share = self.limits.share(self._value)
+        share = self.parameter.share(self._value)
         painter.setPen(QPen(QColor(theme.LINE), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawArc(ring, round(start * 16), -SWEEP_DEGREES * 16)
         painter.setPen(QPen(ink, 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))

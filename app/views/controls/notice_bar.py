@@ -1,12 +1,12 @@
-"""A line that shows the latest notice: what went wrong, and what to do. Earlier ones are in a list."""
+"""The latest notice, over the window: what went wrong, and what to do. Earlier ones are in a list."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QHideEvent, QPainter, QPainterPath, QPaintEvent, QPen, QShowEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 
 from app.views import theme
@@ -19,13 +19,14 @@ MOST_KEPT = 50
 
 
 class NoticeBar(QFrame):
-    """Hidden while there is no notice. A notice that is repeated raises its count instead of being listed twice."""
+    """Hidden while there is no notice. A notice that is repeated raises its count instead of being listed twice.
 
-    came_or_went = Signal()  # it takes height, or gives it back
+    It lies over its parent, of which it takes no room.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName("panel")
+        self.setObjectName("notice")
         self.setAccessibleName("Notice")
         self._notices: list[Notice] = []
         self._list: NoticeList | None = None
@@ -38,8 +39,10 @@ class NoticeBar(QFrame):
         self._details.clicked.connect(self.show_all)
         dismiss = tool_button("Dismiss", "Dismiss the notice", "Dismiss (kept in the list)")
         dismiss.clicked.connect(self.hide)
+        for button in (self._details, dismiss):
+            button.setObjectName("small")
         row = QHBoxLayout(self)
-        row.setContentsMargins(10, 4, 6, 4)
+        row.setContentsMargins(10, 3, 4, 3)
         row.addWidget(self._label, 1)
         row.addWidget(self._details)
         row.addWidget(dismiss)
@@ -77,13 +80,19 @@ class NoticeBar(QFrame):
         self._list.raise_()
         self.bell.set_unseen(0)
 
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self.came_or_went.emit()
+    def place(self, corner: QPoint, width: int) -> None:
+        """Sets its upper left corner and its width; it is as high as its text needs."""
+        self.move(corner)
+        self.setFixedWidth(width)
+        self._fit()
 
-    def hideEvent(self, event: QHideEvent) -> None:
-        super().hideEvent(event)
-        self.came_or_went.emit()
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.LayoutRequest:  # another text
+            self._fit()
+        return super().event(event)
+
+    def _fit(self) -> None:
+        self.resize(self.width(), self.heightForWidth(self.width()))
 
     def _take(self, notice: Notice) -> None:
         earlier = next((old for old in self._notices if old.message == notice.message), None)
@@ -96,7 +105,9 @@ class NoticeBar(QFrame):
         self._label.style().polish(self._label)
         self._label.setText(self._notices[-1].line)
         self._details.setVisible(notice.details not in notice.message)
+        self._fit()
         self.show()
+        self.raise_()
         self.bell.set_unseen(self.bell.unseen + (earlier is None))
         if self._list is not None:
             self._list.set_notices(self.notices)

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QPlainTextEdit,
     QPushButton,
+    QScrollArea,
     QSizePolicy,
     QToolButton,
     QVBoxLayout,
@@ -69,19 +70,50 @@ def keeps_own_keys(event: QEvent) -> bool:
     return False
 
 
-def lay_out_plot(view: QWidget, controls: Iterable[QWidget], readout: QWidget, plot: QWidget) -> None:
-    """A row of small controls, with a readout at its end, above a plot that takes all other room."""
+def lay_out_view(
+    view: QWidget,
+    before: Iterable[QWidget],
+    words: QWidget,
+    behind: Iterable[QWidget],
+    *below: QWidget,
+    top: int = 2,
+    gap: int = 4,
+) -> None:
+    """A row of small controls with words between them; beneath, the rest, of which the last takes all other room.
+
+    `top` and `gap`: pixels above the row, and below it.
+    """
     row = QHBoxLayout()
-    row.setContentsMargins(4, 2, 4, 0)
+    row.setContentsMargins(4, 0, 4, 0)
     row.setSpacing(8)
-    for control in controls:
+    for control in before:
         row.addWidget(control)
-    row.addWidget(readout, 1)
+    row.addWidget(words, 1)
+    for control in behind:
+        row.addWidget(control)
+    column = QVBoxLayout(view)
+    column.setContentsMargins(0, top, 0, 0)
+    column.setSpacing(gap)
+    column.addLayout(row)
+    for part in below:
+        column.addWidget(part, int(part is below[-1]))
+
+
+def lay_out_alone(view: QWidget, part: QWidget) -> None:
+    """One part that takes all room."""
     column = QVBoxLayout(view)
     column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(0)
-    column.addLayout(row)
-    column.addWidget(plot, 1)
+    column.addWidget(part)
+
+
+def scrolled(part: QWidget) -> QScrollArea:
+    """A part as wide as its place, which scrolls where it is higher."""
+    area = QScrollArea(widgetResizable=True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setWidget(part)
+    return area
 
 
 def read_only_text(name: str, text: str = "") -> QPlainTextEdit:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
 from app.playing.keyboard import KeyPress, place_of, semitone_of
+from app.views.controls.browser import open_browser
 
 LEAVE_MS = 20  # by which `released` is delayed: X11 repeats a key that is held by releases and presses
 REPEAT_MS = 5  # between such a release and its press, at most
@@ -21,6 +22,8 @@ _HELD = (
 
 class PlayingKeys(QObject):
     """Emits `pressed` for letters and digits, once for a key that is held down; not in text fields.
+
+    While a browser is open, keys that write go to its search instead.
 
     Keys that are notes are taken before the focused widget gets them; other keys only where it does not take them (a
     knob takes digits). Each `pressed` is followed by a `released`, at the latest when the window loses the focus.
@@ -68,6 +71,8 @@ class PlayingKeys(QObject):
             return False
         if event.type() == QEvent.Type.KeyRelease and not event.isAutoRepeat():
             return self._release(event)
+        if (browser := open_browser(self._window)) is not None:
+            return event.type() != QEvent.Type.KeyRelease and browser.take_typed(event)
         if event.type() != QEvent.Type.KeyPress or event.modifiers() & _HELD:
             return False
         press = KeyPress(_letter(event), event.nativeScanCode())

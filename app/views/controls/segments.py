@@ -16,6 +16,7 @@ class Segments(QWidget):
     """Choices are known by their keys; the first is checked at the start."""
 
     chosen = Signal(str)  # another key, by the user
+    clicked = Signal(str)  # a key, also the one that is checked already
 
     def __init__(self, name: str, choices: Iterable[tuple[str, str, str]], parent: QWidget | None = None) -> None:
         """`choices`: (key, text, tip) each."""
@@ -36,6 +37,7 @@ class Segments(QWidget):
             self._keys.append(key)
             row.addWidget(button)
         self._group.idToggled.connect(self._toggled)
+        self._group.idClicked.connect(lambda row: self.clicked.emit(self._keys[row]))
 
     @property
     def key(self) -> str:

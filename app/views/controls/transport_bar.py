@@ -12,59 +12,22 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB, Choices
+from app.session.choices import Choices
+from app.shared.parameters import OF_CHOICES
 from app.views.controls.drag_button import DragButton
-from app.views.controls.knob import Knob, KnobRange
+from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import tool_button, vertical_rule
 from app.views.controls.plain import Label
 from app.views.controls.shape_box import NO_WIDTH, shape_box
 from app.views.controls.slot_buttons import SlotButtons
 from engine.pluck import (
-    DEFAULT_LISTEN,
     FULL_SCALE_M,
     FULL_SCALE_M_S,
-    LARGEST_AMPLITUDE_MM,
-    POSITION_RANGE,
     SHAPES,
-    WIDTH_RANGE,
 )
 
-KNOBS = {  # field of `Choices` -> (label, range, tip)
-    "position": (
-        "position",
-        KnobRange(*POSITION_RANGE, 0.35, 0.01),
-        "Pluck position; 0 and 1 are the ends of the string",
-    ),
-    "amplitude_mm": (
-        "amplitude",
-        KnobRange(0, LARGEST_AMPLITUDE_MM, 4.0, 0.25, "{:.2f} mm"),
-        "Peak displacement of the pluck",
-    ),
-    "width": (
-        "width",
-        KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", logarithmic=True),
-        "Width of the pluck as a share of the string's length",
-    ),
-    "listen": ("listen", KnobRange(0, 1, DEFAULT_LISTEN, 0.01), "Listening point on the string"),
-    "listen_right": (
-        "right",
-        KnobRange(0, 1, 1 - DEFAULT_LISTEN, 0.01),
-        "Listening point of the right channel in stereo; the left is at “listen”",
-    ),
-    "seconds": ("duration", KnobRange(*SECONDS_RANGE, 4.0, 0.5, "{:.1f} s"), "Length of a rendered pluck"),
-    "speed": (
-        "slow-mo",
-        KnobRange(*SPEED_RANGE, 0.004, 1.25, "× {:.3f}", logarithmic=True),
-        "Slow motion of the string view, as under a stroboscope; the sound is not slowed",
-    ),
-    "volume_db": (
-        "volume",
-        KnobRange(*VOLUME_RANGE_DB, 0.0, 1.0, "{:+.0f} dB"),
-        "Playback volume; exported files are not affected",
-    ),
-}
-
+KNOBS = ("position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db")
 OF_THE_PATCH = "While keys play the patch, it is the patch's own and is saved with it"
 
 
@@ -78,7 +41,7 @@ class TransportBar(QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("panel")
-        self.knobs = {field: Knob(label, limits, tip) for field, (label, limits, tip) in KNOBS.items()}
+        self.knobs = {field: Knob(OF_CHOICES[field]) for field in KNOBS}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
         self.meter = Meter()

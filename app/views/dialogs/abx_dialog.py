@@ -1,4 +1,4 @@
-"""The listening test in a dialog: set up, trial by trial, the result, earlier records.
+"""The listening test in a dialog: set up, trial by trial, the result.
 
 While it is open nothing else plays, and the window must not show what it plays: level, limiter and source would
 give X away.
@@ -16,16 +16,13 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
 
-from app.analysis.abx.choices import AbxChoices
-from app.analysis.abx.record import AbxRecord, HeardSource, HeardThrough, default_folder, make_record, save_record
+from app.analysis.abx.record import AbxRecord, Subject, default_folder, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
-from app.analysis.abx.subject import Subject
-from app.analysis.abx.trials import Identity, Run, Sound, new_seed
+from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound, new_seed
 from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
 from app.shared.whole_file import WriteError
-from app.views.dialogs.abx_records import RecordsPage
 from app.views.dialogs.abx_result import ResultPage
 from app.views.dialogs.abx_setup import SetupPage
 from app.views.dialogs.abx_trial import TrialPage
@@ -45,7 +42,7 @@ CLOSED = "The window was closed during the test."
 
 
 class AbxDialog(QDialog):
-    """The pages, the sound and the record of the test.
+    """The pages, the sound and the result of the test.
 
     Args:
         render: starts to render model and truth of the pluck at a rate in Hz; gives the future of their samples,
@@ -74,13 +71,13 @@ class AbxDialog(QDialog):
         self._run: Run | None = None
         self._sounding: Sound | None = None
         self._trial_began_s = 0.0
-        self._heard_through: HeardThrough | None = None
+        self._through: dict[str, object] | None = None  # the device, and how it is played, during the test
         self._record: AbxRecord | None = None
         folder = Path(choices.folder) if choices.folder else default_folder()
         self._setup = SetupPage(subject.candidates, choices.trials, choices.restart, folder)
-        self._trial, self._result, self._records = TrialPage(), ResultPage(), RecordsPage()
+        self._trial, self._result = TrialPage(), ResultPage()
         self._pages = QStackedWidget()
-        for page in (self._setup, self._trial, self._result, self._records):
+        for page in (self._setup, self._trial, self._result):
             self._pages.addWidget(page)
         column = QVBoxLayout(self)
         column.setContentsMargins(22, 20, 22, 18)
@@ -110,21 +107,17 @@ class AbxDialog(QDialog):
         self._leave()
 
     def _connect(self) -> None:
-        setup, trial, result, records = self._setup, self._trial, self._result, self._records
-        setup.start_asked.connect(self._start)
+        setup, trial, result = self._setup, self._trial, self._result
+        setup.start.clicked.connect(self._start)
         setup.pair_changed.connect(self._prepare)
+        setup.audition_asked.connect(self._audition)
+        trial.audition_asked.connect(self._audition)
         trial.replay_asked.connect(lambda: self._audition(self._sounding or "X", again=True))
         trial.answered.connect(self._answer)
-        trial.stop_asked.connect(self.reject)
-        result.again_asked.connect(self._show_setup)
-        result.save_asked.connect(self._save_elsewhere)
-        records.back_asked.connect(lambda: self._pages.setCurrentWidget(result if self._record else setup))
-        for audition_asked in (setup.audition_asked, trial.audition_asked):
-            audition_asked.connect(self._audition)
-        for records_asked in (setup.records_asked, result.records_asked):
-            records_asked.connect(self._show_records)
-        for close_asked in (setup.close_asked, result.close_asked):
-            close_asked.connect(self.reject)
+        result.again.clicked.connect(self._show_setup)
+        result.save.clicked.connect(self._save_elsewhere)
+        for button in (setup.close_button, trial.stop, result.close_button):
+            button.clicked.connect(self.reject)
 
     # Sound
 
@@ -174,13 +167,10 @@ class AbxDialog(QDialog):
         status = self._output.status()
         if self._obstacle(status) or status.device is None:
             return
-        self._heard_through = HeardThrough(
-            device=status.device.name,
-            host_api=status.device.host_api,
-            rate_hz=status.rate_hz,
-            volume_db=self._subject.volume_db,
-            restart_at_switch=self._setup.restart,
-        )
+        self._through = _device_of(status) | {
+            "volume_db": self._subject.volume_db,
+            "restart_at_switch": self._setup.restart,
+        }
         self._run = Run(self._seed(), self._setup.trials)
         self._trial.show_pair(*self._setup.pair)
         self._pages.setCurrentWidget(self._trial)
@@ -203,25 +193,29 @@ class AbxDialog(QDialog):
             self._begin_trial()
 
     def _end(self, remark: str = "") -> None:
-        """Records the run, complete or not; one without an answer is not recorded."""
+        """Saves the result of the run, complete or not; of one without an answer there is none."""
         run, self._run = self._run, None
         self._hush()
         assert run is not None
-        assert self._heard_through is not None
+        assert self._through is not None
         assert self._stimuli is not None
         if not run.trials:
             self._show_setup()
             return
         a, b = (
-            HeardSource(
-                label=candidate.label,
-                preset=candidate.preset,
-                preset_sha256=candidate.preset_sha256,
-                gain_db=round(gain_db, 3),
-            )
+            candidate.model_copy(update={"gain_db": round(gain_db, 3)})
             for candidate, gain_db in zip(self._setup.pair, self._stimuli.gains_db, strict=True)
         )
-        self._record = make_record(run, a, b, self._subject.pluck, self._heard_through, remark)
+        self._record = AbxRecord(
+            a=a,
+            b=b,
+            pluck=self._subject.pluck,
+            through=self._through,
+            planned_trials=run.planned,
+            seed=run.seed,
+            trials=run.trials,
+            remark=remark,
+        )
         self._pages.setCurrentWidget(self._result)
         self._result.show_record(self._record)
         self._save(self._setup.folder)
@@ -236,7 +230,7 @@ class AbxDialog(QDialog):
             self._result.show_saved(f"Saved {path}", failed=False)
 
     def _save_elsewhere(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder of the record")
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of the result")
         if chosen:
             self._save(Path(chosen))
 
@@ -246,11 +240,6 @@ class AbxDialog(QDialog):
         self._record = None
         self._pages.setCurrentWidget(self._setup)
         self._prepare()
-
-    def _show_records(self) -> None:
-        self._hush()
-        self._records.show_folder(self._setup.folder)
-        self._pages.setCurrentWidget(self._records)
 
     def _obstacle(self, status: SoundStatus) -> str:
         """Why the test cannot start now, or nothing."""
@@ -266,7 +255,7 @@ class AbxDialog(QDialog):
 
     def _look_at_device(self) -> None:
         status = self._output.status()
-        if self._run is None or self._heard_through is None:
+        if self._run is None or self._through is None:
             if self._rate_hz != self._output.rate_hz:
                 self._ask_for_sound()
                 self._prepare()
@@ -275,8 +264,7 @@ class AbxDialog(QDialog):
             else:
                 self._show_state()
             return
-        now = status.device and (status.device.name, status.device.host_api, status.rate_hz)
-        if now != (self._heard_through.device, self._heard_through.host_api, self._heard_through.rate_hz):
+        if not _device_of(status).items() <= self._through.items():
             self._end(DEVICE_CHANGED)
 
     def reject(self) -> None:
@@ -294,3 +282,8 @@ class AbxDialog(QDialog):
         self._hush()
         self._watch.stop()
         super().reject()
+
+
+def _device_of(status: SoundStatus) -> dict[str, object]:
+    name, host_api = (status.device.name, status.device.host_api) if status.device else ("", "")
+    return {"device": name, "host_api": host_api, "rate_hz": status.rate_hz}

@@ -1,23 +1,17 @@
-"""The last page of the listening test: the score, what it means, and where the record is."""
+"""The last page of the listening test: the score, what it means, and where it is saved."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal, SignalInstance
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from app.analysis.abx.record import AbxRecord
-from app.analysis.abx.text import MEANING, p_text, verdict
+from app.analysis.abx.record import MEANING, AbxRecord, p_text
 from app.views.controls.parts import label
 from app.views.controls.plain import Label
 
 
 class ResultPage(QWidget):
-    """Shows one record, and whether it has been saved."""
-
-    again_asked = Signal()
-    records_asked = Signal()
-    save_asked = Signal()  # elsewhere, after a failure
-    close_asked = Signal()
+    """One result, and whether it has been saved; `save` is to save it elsewhere after a failure."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,14 +26,13 @@ class ResultPage(QWidget):
         self._marks.setToolTip("The trials in their order: filled where the answer was right")
         self._meaning = label("faint", MEANING)
         self._saved = label("faint", selectable=True)
-        self._save = self._build_button("Save elsewhere …", self.save_asked)
         buttons = QHBoxLayout()
-        buttons.addWidget(self._build_button("Earlier records …", self.records_asked))
         buttons.addStretch(1)
-        buttons.addWidget(self._save)
-        buttons.addWidget(self._build_button("New test", self.again_asked))
-        self._close = self._build_button("Close", self.close_asked)
-        buttons.addWidget(self._close)
+        self.save, self.again, self.close_button = (
+            QPushButton(text, autoDefault=False) for text in ("Save elsewhere …", "New test", "Close")
+        )
+        for button in (self.save, self.again, self.close_button):
+            buttons.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(12)
@@ -57,18 +50,13 @@ class ResultPage(QWidget):
         self._marks.setText(" ".join("●" if trial.correct else "○" for trial in record.trials))
         unfinished = f"{answered} of {record.planned_trials} trials answered"
         self._p.setText(unfinished if record.p_value is None else p_text(record.p_value))
-        self._verdict.setText(" ".join(filter(None, (record.remark, verdict(record)))))
+        self._verdict.setText(" ".join(filter(None, (record.remark, record.verdict))))
         self._meaning.setVisible(record.complete)
-        self._close.setFocus()
+        self.close_button.setFocus()
 
     def show_saved(self, text: str, failed: bool) -> None:
-        """Where the record was saved; or why it was not, with a button to save it elsewhere."""
+        """Where the result was saved; or why it was not, with a button to save it elsewhere."""
         self._saved.setObjectName("warning" if failed else "faint")
         self._saved.style().polish(self._saved)
         self._saved.setText(text)
-        self._save.setVisible(failed)
-
-    def _build_button(self, text: str, asked: SignalInstance) -> QPushButton:
-        button = QPushButton(text, autoDefault=False)
-        button.clicked.connect(asked)
-        return button
+        self.save.setVisible(failed)

@@ -21,8 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.analysis.abx.sound import Candidate
-from app.analysis.abx.text import MEANING
+from app.analysis.abx.record import MEANING, Candidate
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, USUAL_TRIALS, needed_correct
 from app.views.controls.parts import combo_box, label, tool_button
 from app.views.controls.plain import Label
@@ -33,11 +32,8 @@ ROW_HEIGHT = 30
 class SetupPage(QWidget):
     """Asks with signals; `show_state` says whether the test can start."""
 
-    start_asked = Signal()
     audition_asked = Signal(str)  # "A" or "B"
     pair_changed = Signal()
-    records_asked = Signal()
-    close_asked = Signal()
 
     def __init__(self, candidates: Sequence[Candidate], trials: int, restart: bool, folder: Path) -> None:
         super().__init__()
@@ -60,7 +56,6 @@ class SetupPage(QWidget):
         self._warning.hide()
         self.start = QPushButton("Start the test")
         self.start.setObjectName("play")
-        self.start.clicked.connect(self.start_asked)
         self._lay_out()
         self._show_trials(trials)
         self._show_folder()
@@ -118,24 +113,20 @@ class SetupPage(QWidget):
         form.addRow(_row_name("Trials"), self._build_trials())
         form.addRow("", self._needed)
         form.addRow(_row_name("Switch"), self._restart)
-        change = tool_button("Change …", "Folder of the records", "Choose where the record is saved")
+        change = tool_button("Change …", "Folder of the results", "Choose where the result is saved")
         change.clicked.connect(self._choose_folder)
         place = QHBoxLayout()
         place.addWidget(self._folder, 1)
         place.addWidget(change)
-        form.addRow(_row_name("Record"), place)
+        form.addRow(_row_name("Result"), place)
         what = label(
             text="In each trial X is A or B, chosen at random and hidden. Listen to A, B and X as often as you like, "
             "then answer which one X is. Both play at the same level."
         )
-        records = QPushButton("Earlier records …", autoDefault=False)
-        records.clicked.connect(self.records_asked)
-        close = QPushButton("Close", autoDefault=False)
-        close.clicked.connect(self.close_asked)
+        self.close_button = QPushButton("Close", autoDefault=False)
         buttons = QHBoxLayout()
-        buttons.addWidget(records)
         buttons.addStretch(1)
-        buttons.addWidget(close)
+        buttons.addWidget(self.close_button)
         buttons.addWidget(self.start)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -178,7 +169,7 @@ class SetupPage(QWidget):
         )
 
     def _choose_folder(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder of the records", str(self.folder))
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of the results", str(self.folder))
         if chosen:
             self.folder = Path(chosen)
             self._show_folder()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from app.analysis.abx.sound import Candidate
+from app.analysis.abx.record import Candidate
 from app.views.controls.parts import label
 from app.views.controls.plain import Label
 
@@ -23,7 +24,6 @@ class TrialPage(QWidget):
     audition_asked = Signal(str)  # "A", "B" or "X"
     replay_asked = Signal()
     answered = Signal(str)  # "A" or "B"
-    stop_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -47,13 +47,9 @@ class TrialPage(QWidget):
         self._lay_out()
         keys = Qt.Key
         self._acts: dict[int, Callable[[], None]] = {
-            keys.Key_A: lambda: self.audition_asked.emit("A"),
-            keys.Key_B: lambda: self.audition_asked.emit("B"),
-            keys.Key_X: lambda: self.audition_asked.emit("X"),
-            keys.Key_1: lambda: self._answer("A"),
-            keys.Key_Left: lambda: self._answer("A"),
-            keys.Key_2: lambda: self._answer("B"),
-            keys.Key_Right: lambda: self._answer("B"),
+            **{getattr(keys, f"Key_{name}"): partial(self.audition_asked.emit, name) for name in "ABX"},
+            **dict.fromkeys((keys.Key_1, keys.Key_Left), self._answers["A"].click),  # nothing while it is disabled
+            **dict.fromkeys((keys.Key_2, keys.Key_Right), self._answers["B"].click),
             keys.Key_Space: self.replay_asked.emit,
         }
 
@@ -87,9 +83,6 @@ class TrialPage(QWidget):
             button.setEnabled(x_heard)
         self._hint.setText(SAY if x_heard else HEAR)
 
-    def _answer(self, name: str) -> None:
-        self._answers[name].click()  # does nothing where the button is disabled
-
     def _build_sound(self, name: str) -> QPushButton:
         button = QPushButton(f"{name}\n?")
         button.setCheckable(True)
@@ -114,15 +107,14 @@ class TrialPage(QWidget):
             row.setSpacing(12)
             for button in buttons.values():
                 row.addWidget(button, 1)
-        stop = QPushButton("Stop the test")
-        stop.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        stop.setToolTip("An unfinished test is recorded as incomplete and gives no p-value (Esc)")
-        stop.clicked.connect(self.stop_asked)
+        self.stop = QPushButton("Stop the test")
+        self.stop.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.stop.setToolTip("An unfinished test is recorded as incomplete and gives no p-value (Esc)")
         keys = label("faint", "A  B  X  hear   ·   Space  replay   ·   1 or ←  X is A   ·   2 or →  X is B")
         keys.setAlignment(Qt.AlignmentFlag.AlignCenter)
         foot = QHBoxLayout()
         foot.addStretch(1)
-        foot.addWidget(stop)
+        foot.addWidget(self.stop)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(16)

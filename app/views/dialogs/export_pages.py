@@ -133,7 +133,10 @@ class SoundPage(QWidget):
 
 
 class BatchPage(QWidget):
-    """Positions × amplitudes × presets × sources to a folder."""
+    """Positions × amplitudes × presets × sources to a folder.
+
+    Lists of several are remembered; where there is one preset, position or amplitude, it is the present one.
+    """
 
     changed = Signal()
 
@@ -151,7 +154,7 @@ class BatchPage(QWidget):
         self.presets.setAccessibleName("Presets")
         self.presets.setToolTip("Space checks and unchecks")
         self.presets.setFixedHeight(128)
-        checked = set(batch.presets) or {choices.preset}
+        checked = set(batch.presets) if len(batch.presets) > 1 else {choices.preset}
         for entry in self._entries:
             item = QListWidgetItem(entry.title)
             item.setToolTip(plain_tip(entry.path.name))
@@ -160,8 +163,8 @@ class BatchPage(QWidget):
         self.presets.setCurrentRow(next((row for row, e in enumerate(self._entries) if e.name in checked), 0))
         self.what = faint(f"{_shape_text(choices)}, {_heard_text(choices)}{_dry_text(choices)}")
         self.what.setWordWrap(True)
-        self.positions = _line("Positions", batch.positions or f"{choices.position:g}", "0.1, 0.2, 0.35")
-        self.amplitudes = _line("Amplitudes in mm", batch.amplitudes or f"{choices.amplitude_mm:g}", "1, 2, 5")
+        self.positions = _line("Positions", _several_or(batch.positions, choices.position), "0.1, 0.2, 0.35")
+        self.amplitudes = _line("Amplitudes in mm", _several_or(batch.amplitudes, choices.amplitude_mm), "1, 2, 5")
         self.sources = {
             source: QCheckBox(source.capitalize()) for source in SOURCES if not (choices.stereo and source == "both")
         }
@@ -279,8 +282,17 @@ def _line(name: str, text: str, example: str) -> QLineEdit:
     return edit
 
 
+def _words(text: str) -> list[str]:
+    return [word for word in text.replace(";", ",").split(",") if word.strip()]
+
+
+def _several_or(text: str, present: float) -> str:
+    """A list of more than one as it was typed, else the present value."""
+    return text if len(_words(text)) > 1 else f"{present:g}"
+
+
 def _numbers(name: str, text: str) -> tuple[float, ...]:
     try:
-        return tuple(float(word) for word in text.replace(";", ",").split(",") if word.strip())
+        return tuple(float(word) for word in _words(text))
     except ValueError as error:
         raise ValueError(f"{name}: comma-separated numbers, not {text!r}") from error

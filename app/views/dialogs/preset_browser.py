@@ -1,8 +1,8 @@
 """The preset browser: a search, a list under two headings (studio, research) and a card. It stays open while in use.
 
-type              filters the list (words in any order)
-arrows            move in the list and load
-Space             plucks; while text is typed in the search it is a space
+type              filters the list (words in any order) and selects the best hit, which the card shows
+arrows            load what is selected, or move in the list and load
+Space             loads what is selected and plucks; while text is typed in the search it is a space
 Ctrl+D            adds to the favourites, or removes
 Enter, Escape     close
 """
@@ -13,14 +13,11 @@ from collections.abc import Collection, MutableSequence, Sequence
 from html import escape
 
 from PySide6.QtCore import QModelIndex, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QFrame,
     QGridLayout,
     QHBoxLayout,
     QHeaderView,
-    QScrollArea,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -30,14 +27,15 @@ from app.presets.filter import PresetFilter
 from app.presets.heard_words import HEARD_TIP, heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
-from app.views.controls.browser import KEYS, MOVES, Browser
-from app.views.controls.parts import combo_box, tool_button
+from app.views.controls.browser import SHORTEST_CHOICE, Browser
+from app.views.controls.parts import combo_box, scrolled, tool_button
 from app.views.controls.plain import Label
 from app.views.dialogs.preset_card import preset_card
 
 _STAR, _TITLE, _RATE, _ERROR, _HEARD = range(5)
 _HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}
 _HINT = "Type to search   ·   ↑ ↓ load   ·   Space plucks   ·   Ctrl+D favourite   ·   Enter closes"
+_NONE = "No matching preset: clear the search or filters."
 
 
 class PresetBrowser(Browser):
@@ -46,8 +44,6 @@ class PresetBrowser(Browser):
     list: QTreeWidget
 
     filter_changed = Signal(object)  # PresetFilter
-    preset_chosen = Signal(str)
-    favourite_asked = Signal(str)  # add or remove
     pluck_asked = Signal()
     folder_asked = Signal()
 
@@ -63,6 +59,7 @@ class PresetBrowser(Browser):
         self._rates = combo_box("Rate", [("All rates", 0)])
         for box in (self._strings, self._models, self._rates):
             box.setToolTip(f"Show only presets of this {box.accessibleName().lower()}")
+            box.setMinimumContentsLength(SHORTEST_CHOICE)
             box.currentIndexChanged.connect(self._tell_filter)
         self._order = combo_box(
             "Order", [("Truest first", "truest"), ("By name", "name"), ("Smallest error", "error")]
@@ -70,6 +67,7 @@ class PresetBrowser(Browser):
         self._order.setToolTip(
             "Sort by distance of the sound from the truth, by name or by error; favourites first in each group"
         )
+        self._order.setMinimumContentsLength(SHORTEST_CHOICE)
         self._order.currentIndexChanged.connect(self._tell_filter)
         self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
         self._starred.setCheckable(True)
@@ -105,7 +103,7 @@ class PresetBrowser(Browser):
         for column in (_STAR, _RATE, _ERROR, _HEARD):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(_TITLE, QHeaderView.ResizeMode.Stretch)
-        made.currentItemChanged.connect(self._row_changed)
+        made.currentItemChanged.connect(lambda item: self.load(_name_of(item)))
         made.itemClicked.connect(self._clicked)
         made.itemDoubleClicked.connect(lambda _item, column: self.dismiss() if column != _STAR else None)
         return made
@@ -122,13 +120,7 @@ class PresetBrowser(Browser):
         head.addWidget(self.search, 1)
         for widget in (self._strings, self._models, self._rates, self._order, self._starred, close):
             head.addWidget(widget)
-        card = QScrollArea(widgetResizable=True)
-        card.setObjectName("card")
-        card.setFrameShape(QFrame.Shape.NoFrame)
-        card.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        card.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._card.setContentsMargins(14, 4, 10, 10)
-        card.setWidget(self._card)
         hint = Label(_HINT)
         hint.setObjectName("faint")
         foot = QHBoxLayout()
@@ -139,7 +131,7 @@ class PresetBrowser(Browser):
         grid.setSpacing(10)
         grid.addLayout(head, 0, 0, 1, 2)
         grid.addWidget(self.list, 1, 0)
-        grid.addWidget(card, 1, 1)
+        grid.addWidget(scrolled(self._card), 1, 1)
         grid.addLayout(foot, 2, 0, 1, 2)
         grid.addWidget(hint, 3, 0, 1, 2)
         grid.setColumnStretch(0, 7)
@@ -187,7 +179,9 @@ class PresetBrowser(Browser):
             self.list.expandAll()
         found = f"{len(entries)} of {total} presets" if len(entries) < total else f"{total} presets"
         self._state.setText(f"{found}   ·   your own: {folder}" if total else f"No presets   ·   your own: {folder}")
-        self.set_chosen(chosen)
+        if chosen != self.loaded:
+            self.loaded = self.selected = chosen
+        self.select(self.selected)
 
     def _add_heading(self, studio: bool) -> QTreeWidgetItem:
         heading = QTreeWidgetItem(self.list, [_HEADINGS[studio]])
@@ -198,27 +192,23 @@ class PresetBrowser(Browser):
         heading.setFont(0, font)
         return heading
 
-    def set_chosen(self, name: str) -> None:
-        """Marks a preset in the list, if it is listed, and shows its card."""
-        row = self._row_of(name)
-        with QSignalBlocker(self.list):
-            self._mark(row)  # none where it was filtered out
-        self._card.setText(preset_card(self._entries[row]) if row >= 0 else _empty(bool(self._entries)))
+    @property
+    def listed(self) -> Sequence[str]:
+        return [entry.name for entry in self._entries]
 
-    def _row_of(self, name: str) -> int:
-        """Its place in the list without the headings; -1 where it is not listed."""
-        return next((row for row, entry in enumerate(self._entries) if entry.name == name), -1)
+    def title(self, name: str) -> str:
+        return self._entries[self.listed.index(name)].title
 
-    def _mark(self, row: int) -> None:
-        if row >= 0:
-            self.list.setCurrentItem(self._rows[row], _TITLE)
+    def mark(self, name: str) -> None:
+        if name:
+            self.list.setCurrentItem(self._rows[self.listed.index(name)], _TITLE)
         else:
             self.list.setCurrentIndex(QModelIndex())
 
-    # What is asked
+    def show_card(self, name: str) -> None:
+        self._card.setText(preset_card(self._entries[self.listed.index(name)]) if name else _NONE)
 
-    def lists_any(self) -> bool:
-        return bool(self._entries)
+    # What is asked
 
     def clear_filter(self) -> None:
         """Lists all presets again; emits `filter_changed` once."""
@@ -234,6 +224,7 @@ class PresetBrowser(Browser):
         self._tell_filter()
 
     def _tell_filter(self) -> None:
+        self.selected = ""  # the best hit is selected
         self.filter_changed.emit(
             PresetFilter(
                 self.search.text(),
@@ -245,48 +236,23 @@ class PresetBrowser(Browser):
             )
         )
 
-    def _row_changed(self, item: QTreeWidgetItem | None) -> None:
-        if name := _name_of(item):
-            self.preset_chosen.emit(name)
-
     def _clicked(self, item: QTreeWidgetItem, column: int) -> None:
-        if column == _STAR and (name := _name_of(item)):
+        if not (name := _name_of(item)):
+            self.select(self.selected)  # a heading took the mark
+        elif column == _STAR:
             self.favourite_asked.emit(name)
-
-    def _current_name(self) -> str:
-        return _name_of(self.list.currentItem())
-
-    # Keys and place
-
-    def press(self, event: QKeyEvent) -> None:
-        key = KEYS(event.key())
-        if key in MOVES:
-            self._move(key)
-        elif key == KEYS.Key_Space:
-            self.pluck_asked.emit()
-        elif key == KEYS.Key_D:
-            if name := self._current_name():
-                self.favourite_asked.emit(name)
         else:
-            if key != KEYS.Key_Escape and not self._current_name() and self._entries:
-                self.preset_chosen.emit(self._entries[0].name)
-            self.dismiss()
+            self.load(name)  # the best hit may be selected and not loaded
 
-    def _move(self, key: Qt.Key) -> None:
-        rows = len(self._rows)
-        if rows == 0:
-            return
-        self.list.setFocus()  # where Space plucks
-        step = self.step(key)
-        here = self._row_of(self._current_name())
-        row = here + step if here >= 0 else (0 if step > 0 else rows - 1)
-        self._mark(min(max(row, 0), rows - 1))
+    def play(self) -> None:
+        self.load(self.selected)
+        self.pluck_asked.emit()
 
     def place(self) -> None:
         """Under the preset bar; the transport bar stays visible where the window is high enough."""
         parent = self.parentWidget()
         if parent is not None:
-            top = 52
+            top = self.top
             width, height = min(1240, parent.width() - 28), min(560, parent.height() - top - 140)
             self.setGeometry(14, top, width, max(300, height))
 
@@ -299,9 +265,3 @@ def _name_of(item: QTreeWidgetItem | None) -> str:
 def _tip(*lines: str) -> str:
     """A tooltip of plain text, which may come from a file."""
     return f"<p>{'<br>'.join(map(escape, lines))}</p>"
-
-
-def _empty(any_listed: bool) -> str:
-    return (
-        "The chosen preset is not in this list." if any_listed else "No matching preset: clear the search or filters."
-    )

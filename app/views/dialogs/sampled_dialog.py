@@ -24,6 +24,7 @@ from app.export.sampled.words import (
     needed_bytes,
     notes,
     number_of,
+    pitch_words,
     size_words,
 )
 from app.instrument.bodies import body_digest
@@ -57,7 +58,7 @@ class SampledDialog(JobDialog):
         self.form = SampledForm(patch, choices)
         self.choices = self.form.choices
         self.size_text = label(selectable=True)
-        self.size_text.setMinimumHeight(18)
+        self.size_text.setMinimumHeight(36)  # of two lines
         self._lay_out((self.what, self.form, self.size_text), (self.form,), state_height=52)
         self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
         self._settled.timeout.connect(self._update)
@@ -105,7 +106,8 @@ class SampledDialog(JobDialog):
         there = out.is_file()
         soundfont = out.suffix.lower() == ".sf2"
         short = f"; {megabytes(free)} are free there" if needed_bytes(plan, soundfont) > free else ""
-        self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}")
+        pitch = pitch_words(plan.pitch_error_cents)
+        self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}; {pitch}")
         self.save.setText("Replace" if there else "Continue" if kept else "Export")
         self.save.setEnabled(True)
         self._say(f"{kept} of {len(plan.zones)} samples are there already, and are kept." if kept else RESUMES)
@@ -151,7 +153,7 @@ class SampledDialog(JobDialog):
         samples = f"{number_of(report.rendered, 'sample')} rendered, {kept} kept, {megabytes(report.size_bytes)}"
         alike = ", as loud as the patch" if abs(report.gain_db) < SMALLEST_TOLD_DB else ""
         level = f"peak {report.peak_db:.1f} dBFS{alike}"
-        lines = [f"Saved {report.path} ({samples}, {level})."]
+        lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
         for note in notes(plan, report, "Dry leaves"):
             lines.append(f"{note[0].upper()}{note[1:]}.")
         self._end("\n".join(lines), saved=True)

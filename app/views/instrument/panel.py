@@ -1,4 +1,7 @@
-"""The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play."""
+"""The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play.
+
+In a low window the string's knobs take the place of the keys, so that the strip is no higher with them.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QActionGroup, QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
-    QHBoxLayout,
+    QGridLayout,
     QMenu,
     QSizePolicy,
     QStackedWidget,
@@ -27,7 +30,8 @@ from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
-FOLD_TIP, NO_ROOM = "Show or hide the knobs of the string", "The window is too low for the knobs of the string"
+FOLD_TIP = "Show or hide the knobs of the string"
+LOW_TIP = "Show the knobs of the string in place of the keys, or the keys again: the window is too low for both"
 ROOMY = 1320  # pixels: in a narrower window the bar is compact
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
@@ -45,7 +49,6 @@ class InstrumentPanel(QFrame):
 
     pressed = Signal(int, int)  # key, velocity
     released = Signal(int)
-    surface_changed = Signal()  # of `surface` or `unfolded`
     keys_play_asked = Signal(str)  # of KEYS_PLAY
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -61,42 +64,38 @@ class InstrumentPanel(QFrame):
             played.released.connect(self.released)
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
+        self._choice.clicked.connect(self._uncover_surface)
         self._fold = tool_button("String knobs", tip=FOLD_TIP)
         self._fold.setObjectName("small")
         self._fold.setCheckable(True)
         self._fold.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._fold.toggled.connect(self.set_unfolded)
         self._build_plays()
-        self._low = (False, False)
-        self._hint = Label(HINTS["keys"], self)
+        self._low = False
+        self._stack = QStackedWidget()
+        self._hint = Label(HINTS["keys"], self._stack)
         self._hint.setObjectName("hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self._stack = QStackedWidget()
         self._stack.addWidget(self.keys)
         self._stack.addWidget(self.neck)
         self._stack.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._knobs_row = Sideways(self.knobs)
-        self._knobs_row.hide()
+        self._bar_row, self._knobs_row = Sideways(self.bar), Sideways(self.knobs)
         side = QVBoxLayout()
         side.setSpacing(4)
         side.addWidget(self._choice)
         side.addWidget(self._fold)
         side.addWidget(self.plays)
         side.addStretch(1)
-        below = QHBoxLayout()
-        below.setSpacing(8)
-        below.addLayout(side)
-        below.addWidget(self._stack, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(12, 8, 12, 10)
-        column.setSpacing(8)
-        self._bar_row = Sideways(self.bar)
-        column.addWidget(self._bar_row)
-        column.addWidget(self._knobs_row)
-        column.addLayout(below)
+        self._grid = QGridLayout(self)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setColumnStretch(1, 1)
+        self._grid.addWidget(self._bar_row, 0, 0, 1, 2)
+        self._grid.addLayout(side, 2, 0)
+        self._grid.addWidget(self._stack, 2, 1)
+        self._share_room()
         self._stack.installEventFilter(self)
         self._hint.installEventFilter(self)
         self.show_keys_play("pitch", possible=True)
@@ -132,7 +131,6 @@ class InstrumentPanel(QFrame):
         self._stack.setCurrentWidget(self.keys if surface == "keys" else self.neck)
         self._hint.setText(HINTS[surface])
         self._place_hint()
-        self.surface_changed.emit()
 
     @property
     def unfolded(self) -> bool:
@@ -142,33 +140,43 @@ class InstrumentPanel(QFrame):
     def set_unfolded(self, unfolded: bool) -> None:
         self._fold.setChecked(unfolded)
         self._share_room()
-        self.surface_changed.emit()
 
-    def set_low(self, low: bool, lowest: bool) -> None:
-        """For a window with little height: `low` hides the string's knobs, `lowest` the patch bar too."""
-        if (low, lowest) != self._low:
-            self._low = low, lowest
+    def set_low(self, low: bool) -> None:
+        """For a window with little height: the knobs of the string then take the place of the keys."""
+        if low != self._low:
+            self._low = low
             self._share_room()
+
+    def _uncover_surface(self) -> None:
+        if self._low:
+            self.set_unfolded(False)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.bar.set_compact(self.width() < ROOMY)
 
     def _share_room(self) -> None:
-        low, lowest = self._low
-        self._fold.setToolTip(NO_ROOM if low else FOLD_TIP)
-        self._knobs_row.setVisible(self.unfolded and not low)
-        self._fold.setEnabled(not low)
-        self._bar_row.setVisible(not lowest)
+        self._grid.removeWidget(self._knobs_row)
+        if self._low:
+            self._grid.addWidget(self._knobs_row, 2, 1)
+            self._grid.setContentsMargins(12, 4, 12, 6)
+            self._grid.setVerticalSpacing(6)
+        else:
+            self._grid.addWidget(self._knobs_row, 1, 0, 1, 2)
+            self._grid.setContentsMargins(12, 8, 12, 10)
+            self._grid.setVerticalSpacing(8)
+        self._fold.setToolTip(LOW_TIP if self._low else FOLD_TIP)
+        self._knobs_row.setVisible(self.unfolded)
+        self._stack.setVisible(not (self._low and self.unfolded))
 
     def set_range(self, low: int, high: int) -> None:
         """The lowest and the highest key that have a string."""
         self.keys.set_range(low, high)
         self.neck.set_range(low, high)
 
-    def set_octave(self, octave: int) -> None:
-        """The octave of the lowest of the computer's keys; C4 is middle C."""
-        self.bar.show_octave(octave)
+    def set_octave(self, octave: int, lowest: int, highest: int) -> None:
+        """The octave of the lowest of the computer's keys, and where it can go; C4 is middle C."""
+        self.bar.show_octave(octave, lowest, highest)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
         """What the computer's keys play, of KEYS_PLAY; `possible`: whether there is a patch for pitches."""
@@ -209,7 +217,7 @@ class InstrumentPanel(QFrame):
         self.pressed.emit(key, velocity)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show):
+        if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Show):
             self._place_hint()
         elif watched is self._hint and event.type() == QEvent.Type.StyleChange:
             QTimer.singleShot(0, self, self._place_hint)  # when the label has taken the style
@@ -217,6 +225,5 @@ class InstrumentPanel(QFrame):
 
     def _place_hint(self) -> None:
         self._hint.adjustSize()
-        place = self._stack.geometry()
-        self._hint.move(place.center().x() - self._hint.width() // 2, place.top() + 8)
+        self._hint.move((self._stack.width() - self._hint.width()) // 2, 8)
         self._hint.raise_()

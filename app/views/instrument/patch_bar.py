@@ -8,31 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QToolTip, QVBoxLayout, QWidget
 
-from app.patches.patch import LEVEL_RANGE_DB, MOST_MACROS, Macro, Patch, TuningChoice
-from app.session.step_words import PATCH
-from app.views.controls.knob import Knob, KnobRange
+from app.patches.patch import MOST_MACROS, Macro, Patch, TuningChoice
+from app.shared.parameters import MACRO, OF_PATCHES
+from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, plain_tip
 from engine.plain_text import one_line
 
 ROOMY_MACROS = 6  # more of them are drawn narrow
-NARROW_NAME, NARROWEST_NAME = 150, 120  # pixels
+NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
 LONGEST_SCALE_NAME = 120  # characters
+SAID_MS = 2_500  # a text that says why the octave stops or moves
+SAID_ABOVE = 44  # pixels
 COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
-SHARE = KnobRange(0, 1, 0.5, 0.02, "{:.0%}")
-_MIXES = {  # field of a patch -> (label, range, tip)
-    "body.mix": ("mix", SHARE, "Mix of the body: 0 % the strings alone, 100 % the body alone"),
-    "room.mix": (
-        "room",
-        KnobRange(0, 1, 0, 0.02, "{:.0%}"),
-        "Mix of the room: 0 % without it, 100 % its reverberation alone",
-    ),
-    "level_db": ("level", KnobRange(*LEVEL_RANGE_DB, 0, 0.5, "{:+.1f} dB"), "Level of the patch; saved with it"),
-}
+MIXES = ("body.mix", "room.mix", "level_db")
 
 
 class PatchBar(QFrame):
@@ -63,10 +56,10 @@ class PatchBar(QFrame):
         self._compact = False
         self._recorded_s: float | None = None
         self._unsaved = 0
-        self.knobs = {field: Knob(name, limits, tip) for field, (name, limits, tip) in _MIXES.items()}
+        self.knobs = {field: Knob(OF_PATCHES[field]) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
-        self.macros = [Knob(f"macro {number + 1}", SHARE) for number in range(MOST_MACROS)]
+        self.macros = [Knob(MACRO) for _ in range(MOST_MACROS)]
         for number, knob in enumerate(self.macros):
             knob.value_asked.connect(lambda value, number=number: self.macro_turned.emit(number, value))
             knob.hide()
@@ -175,7 +168,7 @@ class PatchBar(QFrame):
         row.addWidget(self.note, 1)
         for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)
-        self.show_octave(3)
+        self.show_octave(3, 3, 3)
         self.show_velocity(90)
         self.show_recording(None)
         self.show_note("")
@@ -210,9 +203,10 @@ class PatchBar(QFrame):
             self._share_width()
 
     def _share_width(self) -> None:
-        close = self._compact or len(self._macros) > ROOMY_MACROS
+        many = len(self._macros) > ROOMY_MACROS
+        close = self._compact or many
         self.category.setVisible(not close and bool(self.category.text()))
-        self.name.setMinimumWidth(NARROWEST_NAME if close else NARROW_NAME)
+        self.name.setMinimumWidth(NARROWEST_NAME if many else NARROW_NAME)
         for knob in self.macros:
             knob.set_narrow(close)
 
@@ -284,9 +278,17 @@ class PatchBar(QFrame):
         of = f" of {most}" if most is not None else ""
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 
-    def show_octave(self, octave: int) -> None:
-        """The octave of the lowest of the computer's keys."""
+    def show_octave(self, octave: int, lowest: int, highest: int) -> None:
+        """The octave of the lowest of the computer's keys, of those at which a key sounds."""
         self.octave.setText(f"from C{octave}")
+        self._lower.setEnabled(octave > lowest)
+        self._higher.setEnabled(octave < highest)
+
+    def say_octave(self, text: str) -> None:
+        """Shows above the octave, for SAID_MS, why it is what it is."""
+        if self.octave.isVisible():
+            place = self.octave.mapToGlobal(QPoint(0, -SAID_ABOVE))
+            QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)
 
     def show_velocity(self, velocity: int) -> None:
         """With which the computer's keys strike."""
@@ -345,10 +347,4 @@ def _scale_name(scale: str) -> str:
 
 def _named(macro: Macro) -> tuple[str, list[str]]:
     """Its name, and its targets in words."""
-    return macro.name, [_words(target.field) for target in macro.targets]
-
-
-def _words(field: str) -> str:
-    """The words for a field of a patch; the same for all pick-up points."""
-    inside, _, last = field.rpartition(".")
-    return PATCH.get(field) or PATCH.get(inside) or last.replace("_", " ")
+    return macro.name, [OF_PATCHES[target.field].name for target in macro.targets]

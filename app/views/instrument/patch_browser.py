@@ -1,7 +1,7 @@
 """The patch browser: a search, a list under the categories and a card. It stays open while in use.
 
-type              filters the list (words in any order)
-arrows            move in the list, load and play a note
+type              filters the list (words in any order) and selects the best hit, which the card shows
+arrows            load what is selected, or move in the list and load; and play a note
 Space             plays a note; while text is typed in the search it is a space
 Ctrl+D            adds to the favourites, or removes
 Enter, Escape     close
@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeyEvent
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal, SignalInstance
+from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QGridLayout,
@@ -27,8 +27,8 @@ from PySide6.QtWidgets import (
 
 from app.shared.key_names import note_name
 from app.views import theme
-from app.views.controls.browser import KEYS, MOVES, Browser
-from app.views.controls.parts import combo_box, label, tool_button
+from app.views.controls.browser import SHORTEST_CHOICE, Browser
+from app.views.controls.parts import combo_box, label, scrolled, tool_button
 from app.views.controls.plain import Label, plain_tip
 
 if TYPE_CHECKING:
@@ -45,9 +45,7 @@ class PatchBrowser(Browser):
 
     list: QListWidget
 
-    chosen = Signal(str)  # the name of an entry: to be loaded
-    audition_asked = Signal(str)  # to be heard
-    favourite_asked = Signal(str)  # add or remove
+    audition_asked = Signal(str)  # to be loaded and heard
     rename_asked = Signal(str)
     delete_asked = Signal(str)  # and confirmed
     folder_asked = Signal()
@@ -59,27 +57,27 @@ class PatchBrowser(Browser):
         self.setAcceptDrops(True)
         self._entries: dict[str, PatchEntry] = {}
         self._favourites: Collection[str] = ()
-        self._chosen = ""
         self._rest = QTimer(self, interval=REST_MS, singleShot=True)
-        self._rest.timeout.connect(self._audition)
-        self.search.textChanged.connect(self._filter)
+        self._rest.timeout.connect(self.play)
+        self.search.textChanged.connect(self._filter_changed)
         self._category = combo_box("Category", [("All categories", "")])
         self._category.setToolTip("Show only patches of this category")
         self._whose = combo_box("Whose", [("Shipped and own", ""), ("Shipped", "shipped"), ("Own", "own")])
         self._whose.setToolTip("Show only patches that came with the program, or only your own")
         for box in (self._category, self._whose):
-            box.currentIndexChanged.connect(self._filter)
+            box.setMinimumContentsLength(SHORTEST_CHOICE)
+            box.currentIndexChanged.connect(self._filter_changed)
         self._starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
         self._starred.setCheckable(True)
-        self._starred.toggled.connect(self._filter)
+        self._starred.toggled.connect(self._filter_changed)
         self.list = QListWidget()
         self.list.setAccessibleName("Patches")
         self.list.setToolTip("Arrows load and play, Space plays, Enter closes")
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.setTextElideMode(Qt.TextElideMode.ElideRight)
-        self.list.currentItemChanged.connect(self._row_changed)
-        self.list.itemClicked.connect(lambda item: self._rest.start() if _name_of(item) else None)
+        self.list.currentItemChanged.connect(lambda item: self.load(_name_of(item)))
+        self.list.itemClicked.connect(self._clicked)
         self.list.itemDoubleClicked.connect(lambda item: self.dismiss() if _name_of(item) else None)
         self._lay_out()
         self.watch_keys()
@@ -124,10 +122,10 @@ class PatchBrowser(Browser):
         )
         self._play = QPushButton("▶  Play a note")
         self._play.setToolTip("Play a note of this patch (Space)")
-        self._play.clicked.connect(self._audition)
+        self._play.clicked.connect(self.play)
         self._star = QPushButton("☆  Favourite")
         self._star.setToolTip("Add to the favourites, or remove (Ctrl+D)")
-        self._star.clicked.connect(lambda: self._tell(self.favourite_asked))
+        self._star.clicked.connect(self.ask_favourite)
         self._rename = QPushButton("Rename …")
         self._rename.setToolTip("Give your own patch another name")
         self._rename.clicked.connect(lambda: self._tell(self.rename_asked))
@@ -139,12 +137,19 @@ class PatchBrowser(Browser):
             for button in buttons:
                 row.addWidget(button)
             row.addStretch(1)
+        told = QWidget()
+        lines = QVBoxLayout(told)
+        lines.setContentsMargins(0, 0, 0, 0)
+        lines.setSpacing(8)
+        lines.addWidget(self._words)
+        lines.addWidget(self._facts)
+        lines.addStretch(1)
         column = QVBoxLayout()
         column.setContentsMargins(8, 4, 4, 4)
         column.setSpacing(8)
-        for widget in (self._title, self._kind, self._words, self._facts):
+        for widget in (self._title, self._kind):
             column.addWidget(widget)
-        column.addStretch(1)
+        column.addWidget(scrolled(told), 1)
         column.addLayout(hearing)
         column.addLayout(own)
         return column
@@ -155,7 +160,8 @@ class PatchBrowser(Browser):
         """All patches there are, in their order; which are favourites; which one is loaded."""
         self._entries = {entry.name: entry for entry in entries}
         self._favourites = frozenset(favourites)
-        self._chosen = chosen
+        if chosen != self.loaded:
+            self.loaded = self.selected = chosen
         with QSignalBlocker(self._category):
             kept = self._category.currentData()
             self._category.clear()
@@ -163,16 +169,7 @@ class PatchBrowser(Browser):
             for category in dict.fromkeys(entry.patch.category for entry in entries):
                 self._category.addItem(category.capitalize(), category)
             self._category.setCurrentIndex(max(0, self._category.findData(kept)))
-        self._filter()
-
-    def set_chosen(self, name: str) -> None:
-        """Which one is loaded."""
-        if name == self._chosen:
-            return
-        self._chosen = name
-        with QSignalBlocker(self.list):
-            self._mark(name)
-        self._show_card(name)
+        self._fill()
 
     @property
     def listed(self) -> tuple[str, ...]:
@@ -190,19 +187,23 @@ class PatchBrowser(Browser):
         self._starred.setChecked(False)
         for widget in parts:
             widget.blockSignals(False)
-        self._filter()
+        self._filter_changed()
+
+    def _filter_changed(self) -> None:
+        self.selected = ""  # the best hit is selected
+        self._fill()
 
     def _passes(self, entry: PatchEntry) -> bool:
         patch, whose = entry.patch, self._whose.currentData()
         text = f"{patch.name} {patch.category} {patch.description} {patch.author}".casefold()
         return (
-            all(word in text for word in self.search.text().casefold().replace(",", " ").split())
+            all(word in text for word in self.words)
             and self._category.currentData() in ("", patch.category)
             and (not whose or (whose == "own") == entry.own)
             and (not self._starred.isChecked() or entry.name in self._favourites)
         )
 
-    def _filter(self) -> None:
+    def _fill(self) -> None:
         listed = [entry for entry in self._entries.values() if self._passes(entry)]
         with QSignalBlocker(self.list):
             self.list.clear()
@@ -215,11 +216,10 @@ class PatchBrowser(Browser):
                 item = QListWidgetItem(f"{star}   {entry.patch.name}{'   (own)' if entry.own else ''}", self.list)
                 item.setData(_NAME, entry.name)
                 item.setToolTip(plain_tip(f"{entry.patch.name}\n{entry.patch.description}".strip()))
-            self._mark(self._chosen)
         total = len(self._entries)
         found = f"{len(listed)} of {total} patches" if len(listed) < total else f"{total} patches"
         self._state.setText(found if listed else f"{found}: clear the search or the filters")
-        self._show_card(self._chosen)
+        self.select(self.selected)
         self.listed_changed.emit()
 
     def _add_heading(self, category: str) -> None:
@@ -230,14 +230,14 @@ class PatchBrowser(Browser):
         font.setBold(True)
         item.setFont(font)
 
-    def _mark(self, name: str) -> None:
-        for row in range(self.list.count()):
-            if (item := self.list.item(row)) is not None and _name_of(item) == name:
-                self.list.setCurrentItem(item)
-                return
-        self.list.setCurrentRow(-1)  # filtered out
+    def title(self, name: str) -> str:
+        return self._entries[name].patch.name
 
-    def _show_card(self, name: str) -> None:
+    def mark(self, name: str) -> None:
+        names = [_name_of(self.list.item(row)) for row in range(self.list.count())]
+        self.list.setCurrentRow(names.index(name) if name else -1)
+
+    def show_card(self, name: str) -> None:
         entry = self._entries.get(name)
         self._delete.setText(DELETE)
         for button in (self._play, self._star):
@@ -245,7 +245,7 @@ class PatchBrowser(Browser):
         for button in (self._rename, self._delete):
             button.setVisible(entry is not None and entry.own)
         if entry is None:
-            self._title.setText("No patch is loaded")
+            self._title.setText("No matching patch")
             for shown in (self._kind, self._words, self._facts):
                 shown.clear()
             return
@@ -263,22 +263,20 @@ class PatchBrowser(Browser):
         self._rest.stop()
         super().dismiss()
 
-    def lists_any(self) -> bool:
-        return bool(self.listed)
-
-    def _row_changed(self, item: QListWidgetItem | None) -> None:
+    def _clicked(self, item: QListWidgetItem) -> None:
         if name := _name_of(item):
-            self._chosen = name
-            self._show_card(name)
-            self.chosen.emit(name)
+            self.load(name)  # the best hit may be selected and not loaded
+            self._rest.start()
+        else:
+            self.select(self.selected)  # a heading took the mark
 
-    def _audition(self) -> None:
+    def play(self) -> None:
         self._rest.stop()
         self._tell(self.audition_asked)
 
-    def _tell(self, signal: object) -> None:
-        if self._chosen in self._entries:
-            signal.emit(self._chosen)  # type: ignore[attr-defined]
+    def _tell(self, signal: SignalInstance) -> None:
+        if self.selected:
+            signal.emit(self.selected)
 
     def _ask_delete(self) -> None:
         if self._delete.text() == DELETE:
@@ -287,30 +285,10 @@ class PatchBrowser(Browser):
             self._delete.setText(DELETE)
             self._tell(self.delete_asked)
 
-    # Keys, drops and place
+    # Moves, drops and place
 
-    def press(self, event: QKeyEvent) -> None:
-        key = KEYS(event.key())
-        if key in MOVES:
-            self._move(key)
-        elif key == KEYS.Key_Space:
-            self._audition()
-        elif key == KEYS.Key_D:
-            self._tell(self.favourite_asked)
-        else:
-            listed = self.listed
-            if key != KEYS.Key_Escape and listed and self._chosen not in listed:
-                self._mark(listed[0])
-            self.dismiss()
-
-    def _move(self, key: Qt.Key) -> None:
-        listed = self.listed
-        if not listed:
-            return
-        self.list.setFocus()  # where Space plays
-        step = self.step(key)
-        here = listed.index(self._chosen) + step if self._chosen in listed else (0 if step > 0 else len(listed) - 1)
-        self._mark(listed[min(max(here, 0), len(listed) - 1)])
+    def move_selection(self, key: Qt.Key) -> None:
+        super().move_selection(key)
         self._rest.start()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
@@ -328,7 +306,7 @@ class PatchBrowser(Browser):
         """Above the instrument, whose keys stay visible and can be played."""
         parent = self.parentWidget()
         if parent is not None:
-            top = 52
+            top = self.top
             width, height = min(1000, parent.width() - 28), min(520, parent.height() - top - 240)
             self.setGeometry(14, top, width, max(300, height))
 

@@ -3,34 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.patches.patch import (
-    A4_RANGE_HZ,
-    AMPLITUDE_RANGE_MM,
-    CURVE_RANGE,
-    GAUGE_RANGE,
-    LENGTH_RANGE,
-    MULTIPLIER_RANGE,
-    RELEASE_RANGE_S,
-    TENSION_RANGE,
-    TRANSPOSE_RANGE,
-    Patch,
-)
+from app.patches.patch import Patch
+from app.shared.parameters import DECAY, OF_PATCHES, PICKUP, PITCH, PLUCK, STRING, in_group
 from app.views import theme
-from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob, KnobRange
+from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import faint, vertical_rule
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.shape_box import NO_WIDTH, shape_box
-from engine.pluck import POSITION_RANGE, SHAPES, WIDTH_RANGE
+from engine.pluck import SHAPES
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
-TIMES = "× {:.2f}"
-WHOLE = "tuning.transpose"  # an integer
 WIDTHS = {  # in pixels, by the longest name or value
     "tuning.transpose": 62,
     "knobs.gauge": 58,
@@ -44,149 +31,7 @@ MONO = "The patch is heard at one point, in mono"
 LETS_RING = "The patch lets its strings ring: no key damps them"
 
 
-@dataclass(frozen=True)
-class _Turned:
-    """A field of a patch as a knob."""
-
-    field: str
-    name: str
-    limits: KnobRange
-    tip: str
-
-
-def _times(limits: tuple[float, float] = MULTIPLIER_RANGE) -> KnobRange:
-    return KnobRange(*limits, 1.0, 1.03, TIMES, logarithmic=True)
-
-
-_PLACE = "0 and 1 are the ends of the string, 0.5 its middle"
-GROUPS: tuple[tuple[str, tuple[_Turned, ...]], ...] = (
-    (
-        "PITCH",
-        (
-            _Turned(
-                "tuning.a4_hz", "A4", KnobRange(*A4_RANGE_HZ, 440, 2 ** (1 / 1200), "{:.1f} Hz", True), "Pitch of A4"
-            ),
-            _Turned(WHOLE, "transpose", KnobRange(*TRANSPOSE_RANGE, 0, 1, "{:+.0f}"), "Transposition, in keys"),
-        ),
-    ),
-    (
-        "STRING",
-        (
-            _Turned(
-                "knobs.tension",
-                "tension",
-                _times(TENSION_RANGE),
-                "Tension; the pitch stays, so that the length follows. Tight strings glide less when plucked hard",
-            ),
-            _Turned(
-                "knobs.length",
-                "length",
-                _times(LENGTH_RANGE),
-                "Length of the string; the pitch stays, so that the tension follows: longer is tighter",
-            ),
-            _Turned(
-                "knobs.gauge",
-                "gauge",
-                _times(GAUGE_RANGE),
-                "Thickness (diameter) at the same length: thick strings are heavier, tighter and stiffer",
-            ),
-            _Turned(
-                "knobs.density",
-                "density",
-                _times(),
-                "Mass of the material at the same length: gut is light and slack, steel heavy and tight",
-            ),
-            _Turned(
-                "knobs.modulus",
-                "modulus",
-                _times(),
-                "Stiffness of the material (Young's modulus): how much a hard pluck glides in pitch",
-            ),
-            _Turned(
-                "knobs.stiffness",
-                "stiffness",
-                _times(),
-                "Bending stiffness alone: how far partials are spread. The figure is the inharmonicity B: "
-                "partial n of f lies at n f √(1 + B n²)",
-            ),
-        ),
-    ),
-    (
-        "DECAY",
-        (
-            _Turned(
-                "knobs.decay",
-                "decay",
-                _times(),
-                "Damping of all partials alike: more is shorter. The figure is how long the first takes to "
-                "fall by 60 dB",
-            ),
-            _Turned(
-                "knobs.brightness_decay",
-                "dulling",
-                _times(),
-                "Damping that grows with frequency: more darkens sooner. The figure is how long the partial near "
-                "3 kHz takes to fall by 60 dB",
-            ),
-            _Turned(
-                "damping.release_t60_s",
-                "release",
-                KnobRange(*RELEASE_RANGE_S, 0.3, 1.1, "{:.2f} s", True),
-                "How long a key that is let go takes to fall by 60 dB",
-            ),
-        ),
-    ),
-    (
-        "PLUCK",
-        (
-            _Turned(
-                "pluck.position", "position", KnobRange(*POSITION_RANGE, 0.2, 0.01), f"Where it is plucked; {_PLACE}"
-            ),
-            _Turned(
-                "pluck.width",
-                "soft width",
-                KnobRange(*WIDTH_RANGE, 0.12, 1.05, "{:.3f}", True),
-                "Width of the softest pluck, in lengths of the string: wide is mellow",
-            ),
-            _Turned(
-                "pluck.width_hard",
-                "hard width",
-                KnobRange(*WIDTH_RANGE, 0.06, 1.05, "{:.3f}", True),
-                "Width of the hardest pluck, in lengths of the string: narrow is bright",
-            ),
-            _Turned(
-                "pluck.softest_mm",
-                "softest",
-                KnobRange(*AMPLITUDE_RANGE_MM, 0.1, 1.1, "{:.2f} mm", True),
-                "How far the softest key pulls the string",
-            ),
-            _Turned(
-                "pluck.hardest_mm",
-                "hardest",
-                KnobRange(*AMPLITUDE_RANGE_MM, 3.0, 1.1, "{:.2f} mm", True),
-                "How far the hardest key pulls the string",
-            ),
-            _Turned(
-                "pluck.curve",
-                "curve",
-                KnobRange(*CURVE_RANGE, 0, 0.05, "{:+.2f}"),
-                "Velocity curve: above 0 middle velocities are louder, below 0 softer",
-            ),
-        ),
-    ),
-    (
-        "PICK-UP",
-        (
-            _Turned("pickup.points.0", "place", KnobRange(0, 1, 0.37, 0.01), f"Where the string is heard; {_PLACE}"),
-            _Turned(
-                "pickup.points.1",
-                "right",
-                KnobRange(0, 1, 0.63, 0.01),
-                "Where the right channel hears the string; a patch in mono has none",
-            ),
-        ),
-    ),
-)
+GROUPS = (PITCH, STRING, DECAY, PLUCK, PICKUP)  # in the order of the strip
 SHAPED = ("pluck.width", "pluck.width_hard")
 
 
@@ -239,11 +84,11 @@ class StringKnobs(QWidget):
         self.facts = Facts()
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        for number, (title, turned) in enumerate(GROUPS):
+        row.setSpacing(5)
+        for number, group in enumerate(GROUPS):
             if number:
                 row.addWidget(vertical_rule())
-            row.addLayout(self._group(title, turned))
+            row.addLayout(self._group(group))
         row.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -252,23 +97,23 @@ class StringKnobs(QWidget):
         column.addWidget(self.facts)
         self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # or a low window would squeeze it
 
-    def _group(self, title: str, turned: tuple[_Turned, ...]) -> QVBoxLayout:
-        head = faint(title)
+    def _group(self, group: str) -> QVBoxLayout:
+        head = faint(group)
         head.setObjectName("group")
         head.setFixedHeight(HEAD_HEIGHT)
         row = QHBoxLayout()
         row.setSpacing(0)
-        if turned[0].field == "pluck.position":
+        if group == PLUCK:
             row.addLayout(self._shape_column())
-        for each in turned:
-            knob = Knob(each.name, each.limits, each.tip)
+        for each in in_group(group):
+            knob = Knob(each)
             knob.set_low(True)
-            knob.set_width(WIDTHS.get(each.field, NARROW_WIDTH))
-            knob.figure_asked.connect(lambda value, field=each.field: self.figure_asked.emit(field, value))
-            knob.value_asked.connect(lambda value, field=each.field: self._ask(field, value))
+            knob.set_width(WIDTHS.get(each.id, NARROW_WIDTH))
+            knob.figure_asked.connect(lambda value, field=each.id: self.figure_asked.emit(field, value))
+            knob.value_asked.connect(lambda value, field=each.id: self._ask(field, value))
             knob.drag_started.connect(self.drag_started)
             knob.drag_ended.connect(self.drag_ended)
-            self.knobs[each.field] = knob
+            self.knobs[each.id] = knob
             row.addWidget(knob)
         column = QVBoxLayout()
         column.setSpacing(0)
@@ -289,7 +134,7 @@ class StringKnobs(QWidget):
         return column
 
     def _ask(self, field: str, value: float) -> None:
-        self.changed.emit(field, round(value) if field == WHOLE else value)
+        self.changed.emit(field, round(value) if OF_PATCHES[field].whole else value)
 
     def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
         """`saved`: the values that a double-click resets to."""
@@ -300,7 +145,7 @@ class StringKnobs(QWidget):
                 knob.set_value(value)
             before = None if saved is None else _value(saved, field)
             if before is not None:
-                knob.limits = replace(knob.limits, default=before)
+                knob.default = before
         with QSignalBlocker(self.shape):
             self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
 

@@ -1,7 +1,8 @@
-"""Labels and numbers of axes that fit: the longest wording that there is room for, and numbers that do not touch."""
+"""Axes: the longest label that there is room for, numbers that do not touch, the numbers of frequencies."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import pyqtgraph as pg
@@ -13,6 +14,9 @@ LABELLED_HEIGHT = 170  # pixels: a lower plot shows no label beneath it
 LETTER_PIXELS = 12
 AIR = 8  # of a label, at its ends together
 TICK_PIXELS = 14  # the least distance of numbers on a vertical axis
+LOWEST_HZ = 50.0  # of a logarithmic axis of frequencies
+RANGES_DB = (60, 90, 130)  # of levels, below full scale
+_LABELLED_HZ = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 
 
 class UprightLabel:
@@ -78,3 +82,14 @@ def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float,
         if all(abs(tick[0] - other) >= room for other, _ in kept):
             kept.append(tick)
     return sorted(kept)
+
+
+def frequency_ticks() -> list[tuple[float, str]]:
+    """The log₁₀ of frequencies in Hz, and their texts: (2.0, "100"), (3.0, "1k")."""
+    return [(math.log10(hz), f"{hz:g}" if hz < 1000 else f"{hz / 1000:g}k") for hz in _LABELLED_HZ]
+
+
+def keep_axes(plot: pg.PlotItem) -> None:
+    """Paints axes again only when they change: they are most of a painting, and a key that is played waits for it."""
+    for side in ("left", "bottom"):
+        plot.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)

@@ -18,17 +18,15 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QHeaderView,
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableView,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, keeps_own_keys, tool_button
+from app.views.controls.parts import ENTER_KEYS, keeps_own_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
 from app.views.controls.segments import SMALL
 
@@ -250,22 +248,9 @@ def lay_out_table(
     progress: QWidget,
     table: FiguresTable,
 ) -> None:
-    """A row of small controls with words between them and a button that copies the table; beneath, the table."""
+    """As `lay_out_view`, with a button that copies the table."""
     copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
     copy.clicked.connect(table.copy)
     for control in (*before, *behind, copy):
         control.setStyleSheet(SMALL)
-    head = QHBoxLayout()
-    head.setContentsMargins(4, 0, 4, 0)
-    head.setSpacing(8)
-    for control in before:
-        head.addWidget(control)
-    head.addWidget(words, 1)
-    for control in (*behind, copy):
-        head.addWidget(control)
-    column = QVBoxLayout(view)
-    column.setContentsMargins(0, 2, 0, 0)
-    column.setSpacing(4)
-    column.addLayout(head)
-    column.addWidget(progress)
-    column.addWidget(table, 1)
+    lay_out_view(view, before, words, (*behind, copy), progress, table)

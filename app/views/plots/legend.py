@@ -1,4 +1,4 @@
-"""The legend: the sources that are drawn, by slot and title, the heard one in its full colour."""
+"""The sources that are drawn: a curve for each, and the legend; the heard one is in its full colour."""
 
 from __future__ import annotations
 
@@ -108,3 +108,19 @@ def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -
 def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
     """The width of all texts in a row, with their samples of colour, in pixels."""
     return sum(STROKE + _GAP + metrics.horizontalAdvance(text) for text in texts) + _BETWEEN * (len(texts) - 1)
+
+
+def set_curves(
+    plot: pg.PlotItem, curves: dict[str, pg.PlotDataItem], sources: Sequence[ShownSource], faint_alpha: int
+) -> None:
+    """Adds curves that `curves` lacks, removes those of other sources, and sets the pen and the order of all."""
+    shown = {source.source for source in sources}
+    for gone in [name for name in curves if name not in shown]:
+        plot.removeItem(curves.pop(gone))
+    for source in sources:
+        if source.source not in curves:
+            curves[source.source] = plot.plot()
+        hue = theme.SOURCE_COLOURS[theme.source_kind(source.source)]
+        curve = curves[source.source]
+        curve.setPen(pg.mkPen(theme.translucent(hue, 255 if source.heard else faint_alpha), width=1))
+        curve.setZValue(2 if source.heard else 1)

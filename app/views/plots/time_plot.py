@@ -12,8 +12,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 from app.views import theme
-from app.views.plots.axis_label import fit_foot
-from app.views.plots.kept_axes import keep_axes
+from app.views.plots.axis_label import fit_foot, keep_axes
 from app.views.plots.kept_plot import KeptPlot
 
 SEEK_STEP_S = 0.1
@@ -51,7 +50,7 @@ class TimePlot(KeptPlot):
         self._untrained = pg.LinearRegionItem(
             (1, 1), movable=False, brush=pg.mkBrush(theme.translucent(theme.WARNING, 18)), pen=pg.mkPen(None)
         )
-        self._horizon = pg.InfiniteLine(
+        self.horizon = pg.InfiniteLine(
             1,
             pen=pg.mkPen(theme.WARNING, width=1, style=Qt.PenStyle.DashLine),
             label="end of training",
@@ -63,7 +62,7 @@ class TimePlot(KeptPlot):
             },
         )
         self._edge = pg.InfiniteLine(1, pen=pg.mkPen(theme.translucent(theme.PANEL, 235), width=3))
-        for thing, depth in ((self._untrained, -10), (self._edge, 19), (self._horizon, 20)):
+        for thing, depth in ((self._untrained, -10), (self._edge, 19), (self.horizon, 20)):
             thing.setZValue(depth)
             item.addItem(thing, ignoreBounds=True)
         item.setXRange(0, self._seconds, padding=0)
@@ -80,10 +79,10 @@ class TimePlot(KeptPlot):
             self.show_all()
         inside = horizon_s < seconds
         self._untrained.setRegion((horizon_s, max(seconds, horizon_s)))
-        self._horizon.setValue(horizon_s)
+        self.horizon.setValue(horizon_s)
         self._edge.setValue(horizon_s)
         self._edge.setVisible(inside and not self._shaded)  # sets the line off from an image
-        self._horizon.setVisible(inside)
+        self.horizon.setVisible(inside)
         self._untrained.setVisible(inside and self._shaded)
 
     def show_playhead(self, position_s: float) -> None:

@@ -1,23 +1,34 @@
-"""A panel: a view, and what decides what it shows.
+"""A panel: a view and what decides what it shows.
 
-A view (`app/views/`) draws what it is given and emits signals for gestures. Its panel is called when choices change,
-when another motion is rendered, and for each frame; it computes what is to be drawn, and turns gestures into changes
-of the session or into the signals here. Everything runs in the window's thread; what takes longer than a few
-milliseconds belongs in a thread of the panel's own, ended in `close`.
+It is called when choices change, when another motion is rendered, and for each frame; it computes what is to be
+drawn, and turns gestures into changes of the session or into the signals here. Everything runs in the window's
+thread; what takes longer than a few milliseconds is a job of its `background`. Jobs give way to playing and drawing:
+they compute on one core at a low priority, and rest while a pluck is rendered and while the panel is hidden.
 """
 
 from __future__ import annotations
 
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
-from PySide6.QtCore import QObject, Signal
+import torch
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Choices, Session
+from app.shared.worker import Job, Work
+from app.views.background import Background
 from engine.metrics import ErrorSums
+
+LEAST_HEIGHT = 84  # pixels
+GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
+UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
 
 
 @dataclass(frozen=True)
@@ -41,13 +52,12 @@ class Moment:
         return self.take, self.take.progress if self.take is not None else (), self.position_s, choices
 
 
-class Panel(QObject):
-    """Subclasses set `key`, `title`, `help` and `view`, and override the methods that they need."""
+class Panel(QWidget):
+    """Subclasses set `key`, `title` and `help`, and override the methods that they need."""
 
     key: ClassVar[str]  # in `Choices.left_view` or `right_view`
     title: ClassVar[str]  # on its tab
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
-    view: QWidget
     on_the_left = False  # in which deck
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -58,12 +68,19 @@ class Panel(QObject):
         super().__init__()
         self.session = session
         self.library = library
+        self.background = Background(self.key, self, rests=self._rests)
+        self.background.failed.connect(self.told)
+        self._cores = torch.get_num_threads()
+        self._seen_s = time.monotonic()
+        self._growing: Take | None = None  # jobs rest while it is rendered
+        self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Called with the fields of `Choices` that have new values; at the start with all of them."""
 
     def take_started(self, take: Take) -> None:
         """Called with another motion, of which nothing is rendered yet; it grows from now on."""
+        self._growing, self._grown = take, (-1, time.monotonic())
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         """Called when all of it is rendered, with the sums of its errors."""
@@ -71,5 +88,58 @@ class Panel(QObject):
     def show_moment(self, moment: Moment) -> None:
         """Called while the panel is visible: for the string 60 times a second, for the others 30, less at rest."""
 
-    def close(self) -> None:
-        """Called when the window closes: ends the panel's threads."""
+    def end(self) -> None:
+        """Called when the window closes: ends the panel's thread."""
+        self.background.close()
+
+    def compute(self, work: Work) -> None:
+        """Starts a long job in place of the one under way; `background` has its signals."""
+
+        def on_one_core(job: Job) -> object:
+            with _one_core(self._cores):
+                return work(job)
+
+        self.look()
+        self.background.start(on_one_core)
+
+    def look(self) -> None:
+        """To be called while the panel is visible; UNSEEN_S after the last call jobs rest."""
+        self._seen_s = time.monotonic()
+
+    def solo(self, mode: int) -> None:
+        """Solos a mode; all modes where it is soloed already, or 0."""
+        self.session.update(solo=0 if mode == self.session.choices.solo else mode)
+
+    def _rests(self) -> bool:
+        """Whether jobs rest; called in their thread."""
+        now_s, take = time.monotonic(), self._growing
+        if now_s - self._seen_s > UNSEEN_S:
+            return True
+        if take is None or take.complete:
+            return False
+        if take.ready_frames != self._grown[0]:
+            self._grown = (take.ready_frames, now_s)
+        return now_s - self._grown[1] <= GIVEN_UP_S  # else its rendering was abandoned, or failed
+
+
+_lock = threading.Lock()
+_holders: list[None] = []
+
+
+@contextmanager
+def _one_core(usual: int) -> Iterator[None]:
+    """While any job is under way, torch computes on one core; then on the usual number again.
+
+    PyTorch's number of threads belongs partly to the calling thread and partly to the process, so the last job to end
+    restores it.
+    """
+    with _lock:
+        _holders.append(None)
+        torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        with _lock:
+            _holders.pop()
+            if not _holders:
+                torch.set_num_threads(usual)

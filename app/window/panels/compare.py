@@ -1,52 +1,111 @@
 """Several presets on the present pluck, computed one after the other while the table is visible.
 
-The chosen preset comes first, then those in the slots, then the others.
+The chosen preset comes first, then those in the slots, then the others. Presets are known by their names.
 """
 
 from __future__ import annotations
 
+import math
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QMenu, QToolButton
+
 from app.analysis.comparison import ComparedRow, Trial, compare, same_string
 from app.presets.library import Library, PresetEntry
-from app.rendering import Take
 from app.session.choices import Session
 from app.session.slots import other_preset
-from app.views.plots.compare_view import CompareView
-from app.window.panels._background import Background
-from app.window.panels.base import Moment, Panel
+from app.views.controls.parts import tool_button, words_label
+from app.views.controls.progress_strip import ProgressStrip
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
+from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 SETTLED_S = 0.5  # a pluck that is still being moved is not computed
 
 
+def percent(value: float) -> str:
+    """A relative error; ∞: the model ran away."""
+    if math.isinf(value):
+        return "ran away"
+    return f"{100 * value:.3g} %" if value < 10 else "> 1000 %"
+
+
+def scientific(value: float) -> str:
+    return "ran away" if math.isinf(value) else f"{value:.2e}"
+
+
+def decibels(value: float) -> str:
+    """A null depth in dB."""
+    return "+∞" if math.isinf(value) else f"{value:.1f}".replace("-", "−")
+
+
+def times(value: float) -> str:
+    """A speed, as a multiple of real time."""
+    return f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×"
+
+
+COLUMNS = (
+    Column("Preset", "Double-click or Enter loads the preset"),
+    Column("MAE", "Relative mean absolute error over the trained time and the whole string", percent),
+    Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
+    Column(
+        "Null, dB",
+        "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck",
+        decibels,
+    ),
+    Column(
+        "Speed", "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time", times
+    ),
+    Column("Parameters", "Trainable parameters", lambda n: f"{n:,}"),
+    Column("MSE", "Relative mean squared error over the trained time and the whole string", scientific),
+    Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
+    Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
+    Column("Model", "Model architecture"),
+    Column("Note", "Why there are no figures"),
+)
+
+
 class ComparePanel(Panel):
+    """The table, and a menu of the presets in it."""
+
     key = "compare"
     title = "Compare"
     help = (
         "Several presets on the present pluck: errors, null depth and speed. Enter or a double-click loads the "
         "preset of a row."
     )
-    view: CompareView
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
-        self.view = view = CompareView()
+        self.setAccessibleName("Compare")
+        self.setMinimumHeight(LEAST_HEIGHT)
         self._names: list[str] | None = None  # chosen by the user; None: those of the present string
         self._rows: dict[str, tuple[Trial | None, ComparedRow]] = {}  # None: of an earlier pluck
         self._tried: tuple[object, ...] = ()  # what the latest job was started for
         self._unchanged_s = 0.0
         self._stopped = False
         self._stale = False  # the table is of choices that have changed since
-        view.set_presets(library.entries)
+        self._menu = QMenu(self)
+        self._actions: dict[str, QAction] = {}
+        presets = tool_button("Presets ▾", "Presets to compare", "Select the presets to compare")
+        presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        presets.setMenu(self._menu)
+        self._words = words_label()
+        self._stop = tool_button("Stop")
+        self._stop.clicked.connect(self._stop_or_go_on)
+        self.table = FiguresTable("Presets compared on this pluck", COLUMNS)
+        self.table.setToolTip("Double-click or Enter loads a preset; Delete removes it. Ctrl+C copies the table")
+        self.table.row_double_clicked.connect(lambda name: session.update(preset=name))
+        self.table.row_entered.connect(lambda name: session.update(preset=name))
+        self.table.row_deleted.connect(lambda name: self._toggle(name, False))
+        self.progress = ProgressStrip("Progress of the comparison")
+        self.background.progressed.connect(self._progressed)
+        self.background.finished.connect(lambda: self._set_computing(None))
+        self.background.failed.connect(lambda: self._set_computing(None))
         library.changed.connect(self._library_changed)
-        view.set_computing(None)
-        view.preset_toggled.connect(self._toggle)
-        view.same_string_asked.connect(lambda: self._choose(None))
-        view.all_asked.connect(lambda: self._choose(library.names))
-        view.stop_asked.connect(self._stop_or_go_on)
-        view.preset_opened.connect(lambda name: session.update(preset=name))
-        self._background = Background("compare", self)
-        self._background.progressed.connect(self._progressed)
-        self._background.finished.connect(lambda _: self._ended())
-        self._background.failed.connect(self._failed)
+        self._fill_menu()
+        self._set_computing(None)
+        lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & {"position", "amplitude_mm", "shape", "width", "seconds", "listen", "preset", "string"}:
@@ -55,15 +114,8 @@ class ComparePanel(Panel):
                 self._abandon()
             self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
 
-    def _library_changed(self) -> None:
-        self.view.set_presets(self.library.entries)
-        self._show()
-
-    def take_started(self, take: Take) -> None:
-        self._background.give_way_to(take)
-
     def show_moment(self, moment: Moment) -> None:
-        self._background.look()
+        self.look()
         self._unchanged_s += moment.elapsed_s
         if self._stale:
             self._show()
@@ -71,8 +123,23 @@ class ComparePanel(Panel):
             return
         self._compute()
 
-    def close(self) -> None:
-        self._background.close()
+    def _library_changed(self) -> None:
+        self._fill_menu()
+        self._show()
+
+    def _fill_menu(self) -> None:
+        """All presets, each to be put in or taken out."""
+        menu = self._menu
+        menu.clear()
+        menu.addAction("Presets of this string").triggered.connect(lambda: self._choose(None))
+        menu.addAction("All presets").triggered.connect(lambda: self._choose(self.library.names))
+        menu.addSeparator()
+        self._actions = {}
+        for entry in self.library.entries:
+            action = menu.addAction(entry.title)
+            action.setCheckable(True)
+            action.toggled.connect(lambda on, name=entry.name: self._toggle(name, on))
+            self._actions[entry.name] = action
 
     @property
     def _trial(self) -> Trial:
@@ -98,8 +165,8 @@ class ComparePanel(Panel):
         missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != trial]
         missing.sort(key=lambda entry: self._urgency(entry.name))
         if missing:
-            self.view.set_computing(0.0)
-            self._background.start(lambda job: compare(missing, trial, job))
+            self._set_computing(0.0)
+            self.compute(lambda job: compare(missing, trial, job))
         self._show()
 
     def _urgency(self, name: str) -> int:
@@ -107,24 +174,27 @@ class ComparePanel(Panel):
         heard = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
         return heard.index(name) if name in heard else len(heard)
 
-    def _progressed(self, share: float, row: ComparedRow | None) -> None:
-        self.view.set_computing(share)
+    def _progressed(self, share: float, _: str, row: ComparedRow | None) -> None:
+        self._set_computing(share)
         if row is not None:
             self._rows[row.name] = (self._trial, row)
             self._show()
 
-    def _ended(self) -> None:
-        self.view.set_computing(None)
-
-    def _failed(self, message: str, details: str) -> None:
-        self._ended()
-        self.told.emit(message, details)
+    def _set_computing(self, share: float | None) -> None:
+        """The share of the table that is done, 0 … 1; None: nothing is being computed."""
+        self.progress.show_share(share)
+        stops = share is not None
+        self._stop.setText("Stop" if stops else "Compute again")
+        self._stop.setAccessibleName("Stop comparing" if stops else "Compare again")
+        self._stop.setToolTip(
+            "Stop computing" if stops else "Compute the missing rows; where none is missing, all rows"
+        )
 
     def _stop_or_go_on(self) -> None:
-        self._stopped = self._background.busy
+        self._stopped = self.background.busy
         if self._stopped:
-            self._background.cancel()
-            self._ended()
+            self.background.cancel()
+            self._set_computing(None)
         else:
             done = {name for name, (trial, row) in self._rows.items() if trial == self._trial and row.mae is not None}
             if all(entry.name in done for entry in self._entries):
@@ -143,24 +213,46 @@ class ComparePanel(Panel):
         self._show()
 
     def _abandon(self) -> None:
-        """Ends what is computed for other choices than the present ones; where they come back, it is begun anew."""
-        self._background.cancel()
+        """Ends what is computed for other choices than the present ones; where they come back, it is begun again."""
+        self.background.cancel()
         self._tried, self._stopped = (), False
-        self._ended()
+        self._set_computing(None)
 
     def _show(self) -> None:
         self._stale = False
-        entries, trial = self._entries, self._trial
-        self.view.set_chosen([entry.name for entry in entries])
+        entries, trial, present = self._entries, self._trial, self.session.choices.preset
+        chosen = {entry.name for entry in entries}
+        for name, action in self._actions.items():
+            with QSignalBlocker(action):
+                action.setChecked(name in chosen)
         shown = []
         for entry in entries:
             computed, row = self._rows.get(entry.name, (None, ComparedRow.of(entry)))
             shown.append((row, computed == trial))
-        self.view.show_rows(shown, self.session.choices.preset)
+        self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in shown])
         count, fresh = len(entries), sum(of_this for _, of_this in shown)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
         former = any(row.mae is not None and not of_this for row, of_this in shown)
-        self.view.set_words(
+        self._words.setText(
             f"{done} preset{'s' if count != 1 else ''} on this pluck, {trial.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
         )
+
+
+def _row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
+    """`fresh`: of the present pluck; `present`: of the chosen preset."""
+    values = (
+        row.title,
+        row.mae,
+        row.past_mae,
+        row.null_db,
+        row.real_time,
+        row.parameters,
+        row.mse,
+        row.past_mse,
+        row.rate_hz,
+        row.model,
+        row.note,
+    )
+    tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
+    return TableRow(row.name, values, grey=not fresh, bold=present, tip=tip)

@@ -1,103 +1,146 @@
-"""The error map: the error of the chosen preset over position and amplitude, for plucks of the chosen shape."""
+"""The error map: the error of the chosen preset over position and amplitude, for plucks of the chosen shape.
+
+The mouse or the arrow keys move a cursor; a click or Enter plucks there.
+"""
 
 from __future__ import annotations
 
-from app.analysis.error_plane import ErrorPlane, PlanePicture
-from app.analysis.job import Job
+import math
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent
+
+from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
 from app.playing.chosen import subject_of
 from app.presets.library import Library
-from app.rendering import Take
 from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
-from app.views.plots.error_plane_view import ErrorPlaneView
-from app.window.panels._background import Background
-from app.window.panels.base import Moment, Panel
+from app.shared.worker import Job
+from app.views import theme
+from app.views.controls.parts import ENTER_KEYS, lay_out_view, words_label
+from app.views.controls.progress_strip import ProgressStrip
+from app.views.plots.axis_label import UprightTicks
+from app.views.plots.colour_maps import share_map
+from app.views.plots.pointed_plot import PointedPlot
+from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 from engine.pluck import Pluck
 from engine.presets import preset_digest
 
 MM = 1000.0
 SETTLED_S = 0.3  # a width that is still being turned is not computed
 MOST_KEPT = 64  # planes of some 13 KB
+SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
+SMOOTHER = 4  # pixels of the picture to a step of the finest grid
+_LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
+_LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+_STEP_X = POSITIONS[1] - POSITIONS[0]
+_STEP_Y = math.log10(AMPLITUDES_MM[1] / AMPLITUDES_MM[0])
+
+Range = tuple[float, float]
 
 
 class ErrorPlanePanel(Panel):
+    """The map with a line of words above it. Positions are shares of the string's length, amplitudes in mm."""
+
     key = "error_plane"
     title = "Error map"
     help = (
         "The model's error as trained, the first figure in the header, over pluck position and amplitude, computed "
         "in the background. A click plucks there."
     )
-    view: ErrorPlaneView
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
-        self.view = ErrorPlaneView()
-        self.view.pluck_chosen.connect(self._audition)
+        self.setAccessibleName("Error map")
+        self.setMinimumHeight(LEAST_HEIGHT)
+        self._words = words_label()
+        self.progress = ProgressStrip("Progress of the error map")
+        self.map = _Map()
+        self.map.pointed.connect(self._tell)
+        self.map.taken.connect(self._audition)
+        self._picture: PlanePicture | None = None
+        self._resting = ""
         self._asked: tuple[object, ...] = ()
         self._unchanged_s = 0.0
         self._moved = False  # the pluck's mark is of choices that have changed since
         self._planes = _Planes()
-        self._background = Background("error-map", self)
-        self._background.progressed.connect(self._progressed)
-        self._background.finished.connect(self._finished)
-        self._background.failed.connect(self._failed)
+        self.background.progressed.connect(self._progressed)
+        self.background.finished.connect(self._finished)
+        self.background.failed.connect(lambda: self._say("The error map of this preset could not be computed"))
+        lay_out_view(self, (), self._words, (), self.progress, self.map, top=4)
+
+    @property
+    def words(self) -> str:
+        return self._words.text()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         entry = self.library.find(self.session.choices.preset)
         self._moved |= bool(names & {"position", "amplitude_mm"})
         if "preset" in names and entry is not None:
             trained = entry.info.trained_range
-            self.view.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
+            self.map.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
         if names & {"preset", "string", "shape", "width"} and self._wanted() != self._asked:
-            self._background.cancel()
+            self.background.cancel()
             self._asked = ()
             self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
-            self.view.show_picture(None)
-            self.view.progress.show_share(None)
-            self.view.set_words("")
-
-    def take_started(self, take: Take) -> None:
-        self._background.give_way_to(take)
+            self._show(None)
+            self._say("")
 
     def show_moment(self, moment: Moment) -> None:
-        self._background.look()
+        self.look()
         self._unchanged_s += moment.elapsed_s
+        choices = self.session.choices
         if self._moved:
-            self.view.set_pluck(self.session.choices.position, self.session.choices.amplitude_mm)
+            self.map.set_pluck(choices.position, choices.amplitude_mm)
             self._moved = False
-        entry = self.library.find(self.session.choices.preset)
+        entry = self.library.find(choices.preset)
         if entry is None or self._asked == self._wanted() or self._unchanged_s < SETTLED_S:
             return
         self._asked = self._wanted()
-        subject, pluck = subject_of(self.session.choices, entry.path), self.session.choices.pluck
-        self.view.progress.show_share(0.0)
-        self.view.set_words("Computing the model's error for plucks of this shape …")
-        self._background.start(lambda job: self._planes.compute(subject, pluck, job))
-
-    def close(self) -> None:
-        self._background.close()
+        subject, pluck = subject_of(choices, entry.path), choices.pluck
+        self._say("Computing the model's error for plucks of this shape …", 0.0)
+        self.compute(lambda job: self._planes.compute(subject, pluck, job))
 
     def _wanted(self) -> tuple[object, ...]:
         return (self.session.choices.preset, self.session.choices.string, *_form(self.session.choices.pluck))
 
-    def _progressed(self, share: float, picture: PlanePicture | None) -> None:
-        self.view.progress.show_share(share)
+    def _progressed(self, share: float, _: str, picture: PlanePicture | None) -> None:
+        self.progress.show_share(share)
         if picture is not None:
-            self.view.show_picture(picture)
+            self._show(picture)
 
     def _finished(self, picture: PlanePicture) -> None:
-        self.view.progress.show_share(None)
-        self.view.show_picture(picture)
-        self.view.set_words("Error as trained, for plucks of this shape; a click plucks there")
-
-    def _failed(self, message: str, details: str) -> None:
-        self.view.progress.show_share(None)
-        self.view.set_words("The error map of this preset could not be computed")
-        self.told.emit(message, details)
+        self._show(picture)
+        self._say("Error as trained, for plucks of this shape; a click plucks there")
 
     def _audition(self, position: float, amplitude_mm: float) -> None:
         self.session.move_pluck(round(position, 3), round(amplitude_mm, 2))
         self.pluck_asked.emit()
+
+    def _show(self, picture: PlanePicture | None) -> None:
+        """The errors computed so far; None: none."""
+        self._picture = picture
+        self.map.show_picture(picture)
+        self._tell(*(self.map.cursor or (math.nan, math.nan)))
+
+    def _say(self, words: str, share: float | None = None) -> None:
+        """The line above the map while nothing is pointed at, and the share that is computed."""
+        self._resting = words
+        self.progress.show_share(share)
+        self._tell(*(self.map.cursor or (math.nan, math.nan)))
+
+    def _tell(self, position: float, amplitude_mm: float) -> None:
+        if self._picture is None or math.isnan(position):
+            self._words.setText(self._resting)
+            return
+        error = self._picture.at(position, amplitude_mm)
+        text = "runs away" if math.isinf(error) else f"error as trained about {100 * error:.2g} %"
+        if self._picture.spacing > 1:
+            text += ", still coarse"
+        trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the training range"
+        self._words.setText(f"Pluck at {position:.2f},  {amplitude_mm:.2g} mm:  {text}{trained}")
 
 
 class _Planes:
@@ -119,3 +162,139 @@ class _Planes:
 def _form(pluck: Pluck) -> tuple[object, ...]:
     """What a plane belongs to beside its preset: shape and width, where there is one."""
     return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)
+
+
+class _Map(PointedPlot):
+    """The picture with its colour bar, the trained range, the present pluck and a cursor."""
+
+    pointed = Signal(float, float)  # position, amplitude in mm; NaN: nowhere
+    taken = Signal(float, float)
+
+    def __init__(self) -> None:
+        super().__init__(
+            "Map of errors",
+            "The model's error as trained (the first figure in the header) for each pluck position and amplitude.\n"
+            "Click, or arrow keys and Enter: pluck there. Ring: the present pluck; dashed: the training range",
+        )
+        self.setCursor(Qt.CursorShape.CrossCursor)
+        item = self.getPlotItem()
+        item.setContentsMargins(0, 6, 0, 0)  # room for half of the topmost number
+        item.setMouseEnabled(False, False)
+        item.setLabel("bottom", "pluck position")
+        self._label.set("amplitude (mm)", "mm")
+        self._area = QRectF(
+            POSITIONS[0] - _STEP_X / 2,
+            math.log10(AMPLITUDES_MM[0]) - _STEP_Y / 2,
+            POSITIONS[-1] - POSITIONS[0] + _STEP_X,
+            math.log10(AMPLITUDES_MM[-1] / AMPLITUDES_MM[0]) + _STEP_Y,
+        )
+        item.setRange(self._area, padding=0)
+        self._ticks.set((math.log10(mm), f"{mm:g}") for mm in _LABELLED_MM)
+        self._image = pg.ImageItem()
+        self._image.setLevels([math.log10(end) for end in SCALE])
+        item.addItem(self._image)
+        self._bar = pg.ColorBarItem(
+            values=tuple(math.log10(end) for end in SCALE), colorMap=share_map(), interactive=False, width=14
+        )
+        self._bar_ticks = UprightTicks(self._bar.axis, self._bar.vb)
+        self._bar_ticks.set((math.log10(e), f"{100 * e:g} %") for e in _LABELLED_ERRORS)
+        self._bar.setImageItem(self._image, insert_in=item)
+        theme.changes.theme_changed.connect(self._take_theme)
+        dashed = pg.mkPen(theme.TEXT, width=1, style=Qt.PenStyle.DashLine)
+        self._outline = item.plot(pen=dashed)
+        self._pluck = pg.ScatterPlotItem(symbol="o", size=13, pen=pg.mkPen(theme.TEXT, width=2), brush=None)
+        self._cursor = pg.ScatterPlotItem(symbol="+", size=15, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
+        for thing in (self._pluck, self._cursor):
+            item.addItem(thing)
+        self._trained: tuple[Range, Range] | None = None
+        self._present = (0.35, 4.0)
+        self.cursor: tuple[float, float] | None = None
+
+    def _take_theme(self) -> None:
+        self._bar.setColorMap(share_map())
+
+    def show_picture(self, picture: PlanePicture | None) -> None:
+        if picture is None:
+            self._image.clear()
+            return
+        errors_log = np.log10(np.clip(picture.error, SCALE[0] / 10, 10 * SCALE[1]))
+        # the levels are those of the colour bar and must not follow the picture
+        self._image.setImage(refine(errors_log, SMOOTHER), autoLevels=False)
+        self._image.setRect(self._area)
+
+    def set_pluck(self, position: float, amplitude_mm: float) -> None:
+        self._present = (position, amplitude_mm)
+        held_mm = min(max(amplitude_mm, AMPLITUDES_MM[0]), AMPLITUDES_MM[-1])
+        self._pluck.setData([position], [math.log10(held_mm)])
+
+    def set_trained(self, position: Range | None, amplitude_mm: Range | None) -> None:
+        if amplitude_mm is None:
+            self._trained = None
+            self._outline.setData([], [])
+            return
+        left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
+        low, high = (math.log10(min(max(mm, AMPLITUDES_MM[0] / 10), 10 * AMPLITUDES_MM[-1])) for mm in amplitude_mm)
+        self._trained = ((left, right), amplitude_mm)
+        self._outline.setData([left, right, right, left, left], [low, low, high, high, low])
+
+    def is_trained(self, position: float, amplitude_mm: float) -> bool:
+        if self._trained is None:
+            return True
+        return all(
+            low - 1e-9 <= value <= high + 1e-9
+            for value, (low, high) in zip((position, amplitude_mm), self._trained, strict=True)
+        )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        at = self._at(event.position())
+        if event.button() == Qt.MouseButton.LeftButton and at is not None:
+            self._point_at(at)
+            self.taken.emit(*at)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        self._point_at(self._at(event.position()))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        event.accept()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        self._point_at(None)
+        super().leaveEvent(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        step = {
+            Qt.Key.Key_Left: (-1, 0),
+            Qt.Key.Key_Right: (1, 0),
+            Qt.Key.Key_Down: (0, -1),
+            Qt.Key.Key_Up: (0, 1),
+        }.get(Qt.Key(event.key()))
+        if step is not None:
+            x, y = nearest_cell(*(self.cursor or self._present))
+            x = min(max(x + step[0], 0), len(POSITIONS) - 1)
+            y = min(max(y + step[1], 0), len(AMPLITUDES_MM) - 1)
+            self._point_at((float(POSITIONS[x]), float(AMPLITUDES_MM[y])))
+        elif event.key() in ENTER_KEYS:
+            if self.cursor is not None:
+                self.taken.emit(*self.cursor)
+        elif event.key() == Qt.Key.Key_Escape:
+            self._point_at(None)
+        else:
+            super().keyPressEvent(event)
+
+    def _at(self, place: QPointF) -> tuple[float, float] | None:
+        """The pluck that a place of the widget stands for, None beside the map."""
+        at = self._place_at(place)
+        if not self._area.contains(at):
+            return None
+        position = min(max(at.x(), float(POSITIONS[0])), float(POSITIONS[-1]))
+        amplitude_mm = min(max(10 ** at.y(), float(AMPLITUDES_MM[0])), float(AMPLITUDES_MM[-1]))
+        return position, amplitude_mm
+
+    def _point_at(self, at: tuple[float, float] | None) -> None:
+        self.cursor = at
+        if at is None:
+            self._cursor.setData([], [])
+            self.pointed.emit(math.nan, math.nan)
+        else:
+            self._cursor.setData([at[0]], [math.log10(at[1])])
+            self.pointed.emit(*at)

@@ -1,83 +1,180 @@
-"""The error of this pluck over time, as it is rendered."""
+"""The error of this pluck over time, as it is rendered: relative on a log axis, or in level."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
 
 from app.analysis.error_course import ErrorCourse
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.views.plots.error_time_view import LONG_S, ErrorTimeView, percent
-from app.window.panels.base import Moment, Panel
-from app.window.panels.follower import Follower
+from app.views import theme
+from app.views.controls.parts import tool_button
+from app.views.controls.segments import SMALL, Segments
+from app.views.plots.axis_label import UprightLabel, UprightTicks
+from app.views.plots.time_plot import TimePlot
+from app.window.panels.time_panel import TimePanel
 
-EVERY = 3  # moments
+LONG_S = 10.0
+QUANTITIES = (
+    ("relative", "MAE and RMSE", "Relative to the truth, over all of the string, in windows of two periods"),
+    ("level", "Level", "Level of the model relative to the truth, in dB"),
+)
+LOWEST_DECADE, HIGHEST_DECADE = -9, 4  # motions are kept in single precision, about 1e-7
+LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
-class ErrorTimePanel(Panel):
+class ErrorTimePanel(TimePanel[ErrorCourse]):
+    """The axis grows with the curves by decades."""
+
     key = "error_time"
     title = "Error over time"
     help = (
         "The model's error relative to the truth in windows of two periods, within the trained time and past it. "
         "One button renders ten seconds."
     )
-    view: ErrorTimeView
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.view = ErrorTimeView()
-        self.view.plot.seek_asked.connect(self.seek_asked)
-        self.view.plot.hovered.connect(self._tell)
-        self.view.longer_asked.connect(lambda: session.update(seconds=LONG_S))
-        self._follower = Follower("error-course", self.told.emit)
-        self._course: ErrorCourse | None = None
-        self._shown: tuple[object, ...] = ()
-        self._moments = 0
+        tip = (
+            "Click moves the playhead; the wheel zooms in time, the right button pans; double-click shows all.\n"
+            "Arrow keys move the playhead, + and − zoom"
+        )
+        super().__init__(session, library, TimePlot("Error over time", tip))
+        self.quantities = Segments("Error", QUANTITIES)
+        self.longer = tool_button(
+            f"to {LONG_S:g} s", f"Render {LONG_S:g} s", f"Render this pluck for {LONG_S:g} s, far past training"
+        )
+        self.longer.setStyleSheet(f"QToolButton {{{SMALL}}} QToolButton:disabled {{color: {theme.FAINT};}}")
+        self.longer.clicked.connect(lambda: session.update(seconds=LONG_S))
+        item = self.plot.getPlotItem()
+        item.getAxis("left").enableAutoSIPrefix(False)
+        self._label = UprightLabel(item)
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        item.showGrid(x=True, y=True, alpha=0.18)
+        colours = {"rmse": theme.MODEL, "mae": theme.DIFFERENCE, "level_db": theme.MODEL}
+        self._curves = {name: item.plot(pen=pg.mkPen(colour, width=1)) for name, colour in colours.items()}
+        dotted = {name: pg.mkPen(colours[name], width=1, style=Qt.PenStyle.DotLine) for name in ("rmse", "mae")}
+        self._stored = {name: item.plot(pen=pen) for name, pen in dotted.items()}
+        self.readout.setTextFormat(Qt.TextFormat.AutoText)  # a legend in colours
+        self._stored_errors: dict[str, float] = {}
+        self._range: tuple[float, float] | None = None
+        theme.changes.theme_changed.connect(self._show_legend)
+        self.quantities.chosen.connect(self._choose)
+        self._lay_out(self.quantities, self.longer)
+        self._choose()
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "seconds" in names:
-            self.view.set_seconds(self.session.choices.seconds)
+            self.longer.setEnabled(self.session.choices.seconds < LONG_S)
 
     def take_started(self, take: Take) -> None:
-        self._follower.follow(None)
-        self._course = None  # begun when the panel is visible
-        self._shown = ()  # which would hold the last take
-        stored = {
-            "rmse": None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse),
-            "mae": take.info.rel_mae,
-        }
-        known = {name: error for name, error in stored.items() if error is not None}
-        self.view.set_take(take.seconds, take.info.horizon_s, known)
+        super().take_started(take)
+        rmse = None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse)
+        stored = {"rmse": rmse, "mae": take.info.rel_mae}
+        self._stored_errors = {name: error for name, error in stored.items() if error is not None}
+        for curve in self._curves.values():
+            curve.setData([], [])
+        for name, line in self._stored.items():
+            value = self._stored_errors.get(name, 0.0)
+            level = math.log10(value) if value > 0 else math.nan
+            line.setData([0, min(take.info.horizon_s, take.seconds)], [level, level])
+        self._range = None
+        self._fit([])
+        self._show_legend()
 
-    def show_moment(self, moment: Moment) -> None:
-        self.view.plot.show_playhead(moment.position_s)
-        self._moments += 1
-        if moment.take is None or self._moments % EVERY:
-            return
-        if self._course is None:
-            self._course = ErrorCourse(moment.take)
-            self._follower.follow(self._course)
-        course = self._course
-        ready = course.ready
-        shown = (course, ready, self.view.quantity)
+    def _begin(self, take: Take) -> ErrorCourse:
+        return ErrorCourse(take)
+
+    def _draw(self, made: ErrorCourse) -> None:
+        ready = made.ready
+        shown = (made, ready, self.quantities.key)
         if ready and shown != self._shown:
             self._shown = shown
-            curves = {name: values[:ready] for name, values in course.curves.items()}
-            self.view.show_curves(course.middle_s[:ready], curves)
+            self.show_curves(made.middle_s[:ready], {name: values[:ready] for name, values in made.curves.items()})
 
-    def close(self) -> None:
-        self._follower.close()
+    def show_curves(self, time_s: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> None:
+        """Relative errors "rmse" and "mae", and "level_db", (windows,) each at `time_s`."""
+        if self._level:
+            drawn = {"level_db": curves["level_db"]}
+        else:
+            with np.errstate(divide="ignore"):  # no error at all lies below the axis
+                drawn = {name: np.log10(curves[name]) for name in ("rmse", "mae")}
+        for name, values in drawn.items():
+            self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
+        self._fit(list(drawn.values()))
 
-    def _tell(self, time_s: float, _: float) -> None:
-        text, course = "", self._course
-        if course is not None and math.isfinite(time_s):
-            window = int(time_s / course.window_s)
-            if 0 <= window < course.ready:
-                here = {name: values[window] for name, values in course.curves.items()}
-                text = f"{course.middle_s[window]:.3f} s   "
-                if self.view.quantity == "level":
-                    text += f"{here['level_db']:+.2f} dB" if math.isfinite(here["level_db"]) else "silent"
-                else:
-                    text += f"RMSE {percent(here['rmse'])}   MAE {percent(here['mae'])}"
-        self.view.readout.tell(text)
+    def _words(self, made: ErrorCourse, time_s: float, place: float) -> Iterable[str]:
+        window = int(time_s / made.window_s)
+        if not 0 <= window < made.ready:
+            return []
+        here = {name: values[window] for name, values in made.curves.items()}
+        what = f"RMSE {percent(here['rmse'])}   MAE {percent(here['mae'])}"
+        if self._level:
+            what = f"{here['level_db']:+.2f} dB" if math.isfinite(here["level_db"]) else "silent"
+        return [f"{made.middle_s[window]:.3f} s   {what}"]
+
+    @property
+    def _level(self) -> bool:
+        return self.quantities.key == "level"
+
+    def _choose(self) -> None:
+        for name, curve in self._curves.items():
+            curve.setVisible((name == "level_db") == self._level)
+        for line in self._stored.values():
+            line.setVisible(not self._level)
+        self._label.set(*(("level error (dB)", "dB") if self._level else ("relative error", "error")))
+        self._range = None
+        self._fit([])
+        self._show_legend()
+
+    def _fit(self, shown: list[NDArray[np.float64]]) -> None:
+        """Widens the axis to whole decades, or a span in dB, around what is shown."""
+        finite = [values[np.isfinite(values)] for values in shown]
+        values = np.concatenate([*finite, self._always_in_view()])
+        if self._level:
+            largest_db = 1.1 * float(np.abs(values).max())
+            span = next((span for span in LEVEL_SPANS_DB if span >= largest_db), LEVEL_SPANS_DB[-1])
+            wanted = (-span, span)
+        else:
+            low = float(np.floor(values.min()).clip(LOWEST_DECADE, -1))
+            wanted = (low, float(np.ceil(values.max() - 0.25).clip(0, HIGHEST_DECADE)) + 0.25)
+        if self._range is not None:
+            wanted = min(wanted[0], self._range[0]), max(wanted[1], self._range[1])
+        if wanted != self._range:
+            self._range = wanted
+            self.plot.getPlotItem().setYRange(*wanted, padding=0)
+            self._ticks.set(None if self._level else _decades(*wanted), _between_decades(*wanted))
+
+    def _always_in_view(self) -> NDArray[np.float64]:
+        if self._level:
+            return np.zeros(1)
+        stored = [math.log10(value) for value in self._stored_errors.values() if value > 0]
+        return np.array([-2.0, 0.0, *stored])
+
+    def _show_legend(self) -> None:
+        if self._level:
+            self.readout.rest("")
+            return
+        drawn = (("rmse", theme.MODEL), ("mae", theme.DIFFERENCE))
+        text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
+        stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
+        self.readout.rest(f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}" if stored else text)
+
+
+def percent(error: float) -> str:
+    """A relative error with three digits."""
+    return f"{100 * error:.3g} %"
+
+
+def _decades(low: float, high: float) -> list[tuple[float, str]]:
+    return [(d, f"{100 * 10.0**d:g} %") for d in range(math.ceil(low), math.floor(high) + 1)]
+
+
+def _between_decades(low: float, high: float) -> list[float]:
+    return [d + math.log10(n) for d in range(math.floor(low), math.ceil(high)) for n in range(2, 10)]

@@ -2,84 +2,144 @@
 
 from __future__ import annotations
 
+import math
+
 from app.analysis.take_partials import WINDOWS, PartialRow, take_partials
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.views.plots.partials_view import PartialsView
-from app.window.panels._background import Background
-from app.window.panels.base import Moment, Panel
+from app.views.controls.parts import combo_box, words_label
+from app.views.controls.progress_strip import ProgressStrip
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
+from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 from engine.metrics import ErrorSums
+from engine.partials import LEAST_DECAY_DB
+
+
+def hertz(value: float) -> str:
+    return f"{value:.1f}"
+
+
+def seconds(value: float) -> str:
+    """A T60 in s; ∞: the partial grows."""
+    return "grows" if math.isinf(value) else f"{value:.3g}"
+
+
+def signed(value: float, digits: int = 1) -> str:
+    """With its sign, and so many digits after the point."""
+    if math.isinf(value):
+        return "+∞" if value > 0 else "−∞"
+    rounded = round(value, digits) or 0.0  # no minus before a zero
+    return f"{rounded:+.{digits}f}".replace("-", "−")
+
+
+def hundredths(value: float) -> str:
+    return signed(value, 2)
+
+
+_NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
+COLUMNS = (
+    Column("Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
+    Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
+    Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
+    Column("Cents", "Frequency of the model relative to the truth, in cents (hundredths of a semitone)", hundredths),
+    Column("Level, dB", "Level of the model relative to the truth, in dB", hundredths),
+    Column("T60, %", "Error of the model's decay time T60, in %", signed),
+    Column("Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
+    Column("Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
+    Column("Note", "Why a row is grey"),
+)
 
 
 class PartialsPanel(Panel):
+    """Rows are known by their mode numbers."""
+
     key = "partials"
     title = "Partials"
     help = (
         "Every mode of the string: frequency, decay and level, model against truth. A click on a row solos its mode, "
         "Esc plays all modes."
     )
-    view: PartialsView
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
-        self.view = PartialsView()
-        self.view.window_chosen.connect(lambda _: self._show())
-        self.view.mode_chosen.connect(self._choose)
-        self.view.solo_ended.connect(lambda: session.update(solo=0))
+        self.setAccessibleName("Partials")
+        self.setMinimumHeight(LEAST_HEIGHT)
+        self._window = combo_box("Window of time", [(text.capitalize(), key) for key, text in WINDOWS.items()])
+        self._window.setToolTip("The part of the pluck that is measured")
+        self._window.activated.connect(self._show)
+        self._words = words_label()
+        self.table = FiguresTable("Partials of this pluck", COLUMNS)
+        self.table.setToolTip("Click or Enter: hear this mode alone, again for all. Ctrl+C copies the table")
+        self.table.row_clicked.connect(self._choose)
+        self.table.row_entered.connect(self._choose)
+        self.table.escaped.connect(lambda: self.solo(0))
+        self.progress = ProgressStrip("Progress of the partials")
         self._waiting: Take | None = None  # complete, and not yet measured
         self._rows: dict[str, list[PartialRow]] | None = None
-        self._background = Background("partials", self)
-        self._background.progressed.connect(lambda share, _: self.view.progress.show_share(share))
-        self._background.finished.connect(self._measured)
-        self._background.failed.connect(self._failed)
+        self.background.progressed.connect(self.progress.show_share)
+        self.background.finished.connect(self._measured)
+        self.background.failed.connect(lambda: self._say("The partials of this pluck could not be measured"))
+        lay_out_table(self, (self._window,), self._words, (), self.progress, self.table)
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "solo" in names:
-            self.view.show_solo(self.session.choices.solo)
+            self._show_solo()
 
     def take_started(self, take: Take) -> None:
         self._waiting = self._rows = None
-        self._background.cancel()
-        self.view.dim()
-        self.view.progress.show_share(None)
-        self.view.set_words("The partials of the new pluck follow when it is rendered")
+        self.background.cancel()
+        self.table.set_dimmed(True)
+        self._say("The partials of the new pluck follow when it is rendered")
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self._waiting = take
 
     def show_moment(self, moment: Moment) -> None:
-        self._background.look()
+        self.look()
         if self._waiting is not None:  # measured only while the panel is visible
             take, self._waiting = self._waiting, None
-            self.view.progress.show_share(0.0)
-            self.view.set_words("Measuring the partials of this pluck …")
-            self._background.start(lambda job: take_partials(take, job))
-
-    def close(self) -> None:
-        self._background.close()
+            self._say("Measuring the partials of this pluck …", 0.0)
+            self.compute(lambda job: take_partials(take, job))
 
     def _choose(self, mode: int) -> None:
-        self.session.update(solo=0 if mode == self.session.choices.solo else mode)
-        self.view.show_solo(self.session.choices.solo)
+        self.solo(mode)
+        self._show_solo()
 
     def _measured(self, rows: dict[str, list[PartialRow]]) -> None:
-        self.view.progress.show_share(None)
+        self.progress.show_share(None)
         self._rows = rows
         self._show()
 
-    def _failed(self, message: str, details: str) -> None:
-        self.view.progress.show_share(None)
-        self.view.set_words("The partials of this pluck could not be measured")
-        self.told.emit(message, details)
+    def _say(self, words: str, share: float | None = None) -> None:
+        self._words.setText(words)
+        self.progress.show_share(share)
 
     def _show(self) -> None:
         if self._rows is None:
             return
-        window = self.view.window_key
+        window = str(self._window.currentData())
         rows = self._rows.get(window, [])
-        self.view.show_partials(rows)
-        self.view.show_solo(self.session.choices.solo)
-        self.view.set_words(
-            "" if rows else f"{WINDOWS[window].capitalize()}: too short to measure; increase the duration"
-        )
+        self.table.set_dimmed(False)
+        self.table.show_rows([_row(row) for row in rows])
+        self._show_solo()
+        short = f"{WINDOWS[window].capitalize()}: too short to measure; increase the duration"
+        self._words.setText("" if rows else short)
+
+    def _show_solo(self) -> None:
+        self.table.choose(self.session.choices.solo or None)
+
+
+def _row(row: PartialRow) -> TableRow:
+    values = (
+        row.mode,
+        row.truth_hz,
+        row.model_hz,
+        row.cents,
+        row.level_db,
+        row.t60_error_percent,
+        row.truth_t60_s,
+        row.model_t60_s,
+        row.note,
+    )
+    return TableRow(row.mode, values, grey=bool(row.note), tip=row.note)

@@ -1,4 +1,4 @@
-"""Makes every panel and puts it in its place in the window."""
+"""The list of all views; makes each panel and puts it in its place in the window."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel,
 def fill(window: MainWindow, session: Session, library: Library) -> list[Panel]:
     """The panels: the string's first, then those of the left and the right deck. Connects decks and session."""
     string = StringPanel(session, library)
-    window.show_string(string.view)
+    window.show_string(string)
+    string.view.setFocus()
     panels: list[Panel] = [string]
     for choice, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
         for panel in (kind(session, library) for kind in kinds):
-            deck.add(panel.key, panel.title, panel.view)
+            deck.add(panel.key, panel.title, panel)
             panel.on_the_left = deck is window.left
             panels.append(panel)
         deck.chosen.connect(lambda key, choice=choice: session.update(**{choice: key}))

@@ -1,89 +1,180 @@
-"""The whole string over time, as colours: the motion of a source, or the error."""
+"""The whole string over time, as colour over time and position: displacement of a source, or the error."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pyqtgraph as pg
+from PySide6.QtCore import QRectF
 
 from app.analysis.space_time import Envelopes, Picture, picture
 from app.presets.library import Library
 from app.rendering import SOURCES, Take
 from app.session.choices import Session
-from app.views.plots.space_time_view import SpaceTimeView
-from app.window.panels.base import Moment, Panel
-from app.window.panels.follower import Follower
+from app.session.shown import readable_unit
+from app.views import theme
+from app.views.controls.parts import combo_box
+from app.views.controls.segments import SMALL, Segments
+from app.views.plots.axis_label import UprightLabel, UprightTicks
+from app.views.plots.colour_maps import displacement_map, error_map, magnitudes_of
+from app.views.plots.time_plot import TimePlot
+from app.window.panels.time_panel import TimePanel
 
 MM = 1000.0
-EVERY = 3  # moments
+GAINS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)
+AUTO = 0  # the largest of them that keeps the typical displacement within the scale
+QUANTITIES = (
+    ("model", "Model", "Displacement of the model"),
+    ("truth", "Truth", "Displacement of the truth"),
+    ("error", "Error", "Model − truth"),
+)
+PLACES = (0, 0.25, 0.5, 0.75, 1)
 
 
-class SpaceTimePanel(Panel):
+class SpaceTimePanel(TimePanel[Envelopes]):
+    """Displacement and error keep a gain of their own. Positions are shares of the string's length.
+
+    Colours show displacement with its sign, or its magnitude; colour bar and readout agree with them.
+    """
+
     key = "space_time"
     title = "Space–time"
     help = (
         "Displacement of model or truth, or the error between them, over time (across) and position on the string "
         "(up). A click moves the playhead, with Shift the listening point too."
     )
-    view: SpaceTimeView
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.view = SpaceTimeView()
-        self.view.plot.seek_asked.connect(self.seek_asked)
-        self.view.plot.hovered.connect(self._tell)
-        self.view.listening_point_moved.connect(session.move_listening_point)
-        self._follower = Follower("space-time", self.told.emit)
-        self._envelopes: Envelopes | None = None
-        self._moments = 0
-        self._shown: tuple[object, ...] = ()
+        tip = (
+            "Click moves the playhead here; with Shift also the listening point.\n"
+            "The wheel zooms in time, down to single frames; the right button pans; double-click shows all.\n"
+            "Arrow keys move the playhead, + and − zoom"
+        )
+        super().__init__(session, library, TimePlot("Space–time", tip, shaded=False))
+        self.quantities = Segments("Shown", QUANTITIES)
+        self.gains = combo_box(
+            "Gain of the colours", [("auto gain", AUTO), *((f"gain {_times(gain)}", gain) for gain in GAINS)], AUTO
+        )
+        self.gains.setMinimumContentsLength(12)
+        self.gains.setToolTip(
+            "Gain of the colour scale; the colour bar shows the displacement.\n"
+            "Auto fits most of the visible part; model and truth always have the same scale"
+        )
+        self.gains.setStyleSheet(f"{SMALL} padding-right: 0;")
+        self._gain = {"displacement": AUTO, "error": AUTO}
+        self._typical_mm = 1.0
+        self._full_scale_mm = 1.0
         self._picture: Picture | None = None
+        item = self.plot.getPlotItem()
+        item.setYRange(0, 1, padding=0)
+        self._label = UprightLabel(item, ("position",))
+        self._ticks = UprightTicks(item.getAxis("left"), item.vb)
+        self._ticks.set((place, f"{place:g}") for place in PLACES)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        item.addItem(self._image, ignoreBounds=True)
+        self._listening = pg.InfiniteLine(0, angle=0, pen=pg.mkPen(theme.translucent(theme.TEXT, 90), width=1))
+        self._listening.setZValue(15)
+        item.addItem(self._listening, ignoreBounds=True)
+        self._bar = pg.ColorBarItem(values=(-1, 1), width=10, colorMap=displacement_map(), interactive=False)
+        self._bar.axis.enableAutoSIPrefix(False)
+        self._bar.axis.setLabel("mm")
+        self._bar.setImageItem(self._image, insert_in=item)
+        self._signed = True
+        self._map_shown = ("displacement", True)
+        theme.changes.theme_changed.connect(self._take_theme)
+        self.quantities.chosen.connect(self._choose_quantity)
+        self.gains.activated.connect(self._choose_gain)
+        self.plot.pointed.connect(lambda _, place: session.move_listening_point(min(max(place, 0.0), 1.0)))
+        self._lay_out(self.quantities, self.gains)
+        self.setTabOrder(self.gains, self.plot)
+
+    @property
+    def scale_mm(self) -> float:
+        """The displacement at the end of the colour scale."""
+        return self._full_scale_mm / (self._gain[self._kind] or self._fitting_gain)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if "listen" in names:
-            self.view.set_listening_point(self.session.choices.listen)
+        if "listen" in names and self.session.choices.listen != self._listening.value():
+            self._listening.setValue(self.session.choices.listen)
 
     def take_started(self, take: Take) -> None:
-        self._follower.follow(None)
-        self._envelopes = None  # begun when the panel is visible
-        self._shown, self._picture = (), None  # which would hold the last take
-        self.view.set_take(take.seconds, take.info.horizon_s, take.pluck.amplitude_mm)
+        super().take_started(take)
+        self._picture = None
+        self._full_scale_mm = max(take.pluck.amplitude_mm, 1e-3)  # at a gain of 1
+        self._image.clear()
+        self._show_scale()
 
-    def show_moment(self, moment: Moment) -> None:
-        self.view.plot.show_playhead(moment.position_s)
-        self._moments += 1
-        if moment.take is None or self._moments % EVERY:
-            return
-        if self._envelopes is None:
-            self._envelopes = Envelopes(moment.take)
-            self._follower.follow(self._envelopes)
-        self._show(self._envelopes)
+    def _begin(self, take: Take) -> Envelopes:
+        return Envelopes(take)
 
-    def close(self) -> None:
-        self._follower.close()
-
-    def _show(self, envelopes: Envelopes) -> None:
-        view = self.view
-        times_s, columns = view.plot.times_s, view.plot.columns
-        shown = (envelopes, envelopes.take.ready_frames, envelopes.ready, view.quantity, times_s, columns)
+    def _draw(self, made: Envelopes) -> None:
+        quantity, times_s, columns = self.quantities.key, self.plot.times_s, self.plot.columns
+        shown = (made, made.take.ready_frames, made.ready, quantity, times_s, columns)
         if shown == self._shown:
             return
         self._shown = shown
-        self._picture = made = picture(envelopes, view.quantity, times_s, columns)
-        if made is None:
-            view.show_nothing()
+        self._picture = seen = picture(made, quantity, times_s, columns)
+        if seen is None:  # nothing is computed yet of the times in view
+            self._image.clear()
             return
-        typical_mm = self._typical_mm(envelopes, times_s)
-        view.show_picture(made.displacement_m * MM, made.start_s, made.stop_s, typical_mm, made.signed)
-        view.readout.rest(_caption(made))
+        names = ("error",) if quantity == "error" else SOURCES  # the same scale for model and truth
+        self._typical_mm = max(made.typical_m(name, times_s) for name in names) * MM
+        self._signed = seen.signed
+        self._show_scale()
+        half = 0.5 / (len(seen.displacement_m) - 1)  # the grid's points are the middles of their rows
+        self._image.setImage(seen.displacement_m * MM, autoLevels=False)
+        self._image.setRect(QRectF(seen.start_s, -half, seen.stop_s - seen.start_s, 1 + 2 * half))
+        self.readout.rest(_caption(seen))
 
-    def _typical_mm(self, envelopes: Envelopes, times_s: tuple[float, float]) -> float:
-        """The typical displacement in view, the same for model and truth, or the typical error."""
-        names = ("error",) if self.view.quantity == "error" else SOURCES
-        return max(envelopes.typical_m(name, times_s) for name in names) * MM
-
-    def _tell(self, time_s: float, place: float) -> None:
+    def _words(self, made: Envelopes, time_s: float, place: float) -> Iterable[str]:
         here_m = self._picture.at(time_s, place) if self._picture is not None else None
-        if here_m is None:
-            self.view.readout.tell("")
-        else:
-            self.view.tell(time_s, place, here_m * MM)
+        return [] if here_m is None else self._wordings(time_s, place, here_m)
+
+    def _wordings(self, time_s: float, place: float, here_m: float) -> list[str]:
+        """What is drawn there, in the unit of the colour bar."""
+        factor, unit = readable_unit(self.scale_mm / MM, "displacement")
+        what = f"{factor * here_m:+.4g} {unit}" if self._signed else f"peak {factor * here_m:.4g} {unit}"
+        return [f"{time_s:.4f} s   position {place:.2f}   {what}", what]
+
+    @property
+    def _fitting_gain(self) -> int:
+        return max((gain for gain in GAINS if gain * self._typical_mm <= self._full_scale_mm), default=GAINS[0])
+
+    @property
+    def _kind(self) -> str:
+        return "error" if self.quantities.key == "error" else "displacement"
+
+    def _take_theme(self) -> None:
+        self._bar.setColorMap(_colour_map(*self._map_shown))
+
+    def _choose_quantity(self) -> None:
+        self.gains.setCurrentIndex(self.gains.findData(self._gain[self._kind]))
+        self._show_scale()
+
+    def _choose_gain(self) -> None:
+        self._gain[self._kind] = self.gains.currentData()
+        self._show_scale()
+
+    def _show_scale(self) -> None:
+        if self._map_shown != (self._kind, self._signed):
+            self._map_shown = (self._kind, self._signed)
+            self._take_theme()
+        limits = (-self.scale_mm if self._signed else 0.0, self.scale_mm)
+        if limits != self._bar.levels():
+            factor, unit = readable_unit(self.scale_mm / MM, "displacement")
+            self._bar.axis.setScale(factor / MM)
+            self._bar.axis.setLabel(unit if self._signed else f"{unit}, peak")
+            self._bar.setLevels(limits)
+            self.gains.setItemText(0, f"auto gain {_times(self._fitting_gain)}")
+
+
+def _times(gain: int) -> str:
+    return f"× {gain}" if gain < 1000 else f"× {gain // 1000}k"
+
+
+def _colour_map(kind: str, signed: bool) -> pg.ColorMap:
+    made = error_map() if kind == "error" else displacement_map()
+    return made if signed else magnitudes_of(made)
 
 
 def _caption(made: Picture) -> str:

@@ -1,93 +1,174 @@
-"""The spectrogram at the listening point, computed in a thread of its own as the take grows."""
+"""The spectrogram at the listening point: level over time and frequency, one source at a time, on one scale."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QRectF
 
 from app.analysis.spectrogram import FrequencyRows, Spectrogram
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
 from app.session.shown import full_scale_words
-from app.views.plots.spectrogram_view import SpectrogramView
-from app.window.panels.base import Moment, Panel
-from app.window.panels.follower import Follower
+from app.views import theme
+from app.views.controls.parts import combo_box
+from app.views.controls.segments import SMALL, Segments
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, UprightTicks, frequency_ticks
+from app.views.plots.colour_maps import level_map
+from app.views.plots.time_plot import TimePlot
+from app.window.panels.time_panel import TimePanel
 
-EVERY = 3  # moments
 ROWS = 320
 MOST_COLUMNS = 600  # drawn in one call, so that a panel that is opened late catches up in short steps
+QUANTITIES = (
+    ("model", "Model", "Sound of the model"),
+    ("truth", "Truth", "Sound of the truth"),
+    ("error", "Error", "Model − truth, on the same scale"),
+)
+SCALES = (("log", "Log", "Octaves of equal height"), ("linear", "Linear", "Partials at equal distances"))
 
 
-class SpectrogramPanel(Panel):
+class SpectrogramPanel(TimePanel[Spectrogram]):
+    """0 dB is a sine of full scale; levels below the chosen range have the colour of the background."""
+
     key = "spectrogram"
     title = "Spectrogram"
     help = (
         "Level over time and frequency of the pick-up's signal at the listening point: model, truth or their "
         "difference, all on one scale."
     )
-    view: SpectrogramView
 
     def __init__(self, session: Session, library: Library) -> None:
-        super().__init__(session, library)
-        self.view = SpectrogramView()
-        self.view.plot.seek_asked.connect(self.seek_asked)
-        self.view.plot.hovered.connect(self._tell)
-        self._follower = Follower("spectrogram", self.told.emit)
-        self._spectrogram: Spectrogram | None = None
+        tip = (
+            "The sound at the listening point over time. Click moves the playhead; the wheel zooms in time,\n"
+            "the right button pans; double-click shows all. Arrow keys move the playhead, + and − zoom"
+        )
+        super().__init__(session, library, TimePlot("Spectrogram", tip, shaded=False))
+        self.quantities = Segments("Shown", QUANTITIES)
+        self.scales = Segments("Frequency axis", SCALES)
+        self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), 90)
+        self.ranges.setToolTip("Range of levels below full scale, the same for every source")
+        self.ranges.setStyleSheet(SMALL)
         self._rows: FrequencyRows | None = None
+        self._levels_db = np.zeros((0, ROWS), np.float32)  # of the columns drawn so far
+        self._pixels = np.zeros((0, ROWS), np.uint8)
         self._drawn = 0  # columns
-        self._drawn_of: tuple[object, ...] = ()
-        self._moments = 0
+        self._hop_s = 1.0
+        self._highest_hz = 8000.0
+        item = self.plot.getPlotItem()
+        axis = item.getAxis("left")
+        axis.enableAutoSIPrefix(False)
+        self._label = UprightLabel(item, ("frequency (Hz)", "Hz"))
+        self._ticks = UprightTicks(axis, item.vb)
+        self._image = pg.ImageItem(axisOrder="col-major", autoDownsample=False)
+        item.addItem(self._image, ignoreBounds=True)
+        self._bar = pg.ColorBarItem(values=(-self.range_db, 0), width=10, colorMap=level_map(), interactive=False)
+        self._bar.setImageItem([], insert_in=item)
+        self._bar_label = UprightLabel(self._bar, ("dB",))
+        self._take_theme()
+        theme.changes.theme_changed.connect(self._take_theme)
+        self.scales.chosen.connect(self._label_frequencies)
+        self.ranges.activated.connect(self._choose_range)
+        self._label_frequencies()
+        self._lay_out(self.quantities, self.scales, self.ranges)
+
+    @property
+    def logarithmic(self) -> bool:
+        return self.scales.key == "log"
+
+    @property
+    def range_db(self) -> int:
+        return int(self.ranges.currentData())
+
+    def frequency_hz(self, height: float) -> float:
+        """The frequency at a place on the vertical axis."""
+        return 10**height if self.logarithmic else height
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if "pickup" in names:
-            self.view.set_full_scale(full_scale_words(self.session.choices))
+            self._bar_label.set(f"dB re {full_scale_words(self.session.choices)}", "dB")
 
     def take_started(self, take: Take) -> None:
-        self._follower.follow(None)
-        self._spectrogram = None  # begun when the panel is visible
-        self._drawn_of = ()  # which would hold the last take
-        self.view.set_take(take.seconds, take.info.horizon_s, take.info.rate_hz)
+        super().take_started(take)
+        if take.info.rate_hz / 2 != self._highest_hz:
+            self._highest_hz = take.info.rate_hz / 2
+            self._label_frequencies()
 
-    def show_moment(self, moment: Moment) -> None:
-        self.view.plot.show_playhead(moment.position_s)
-        self._moments += 1
-        if moment.take is None or self._moments % EVERY:
-            return
-        listened = moment.take.listened
-        if self._spectrogram is None or self._spectrogram.listened is not listened:
-            self._spectrogram = Spectrogram(moment.take, listened)
-            self._follower.follow(self._spectrogram)
-        self._draw(self._spectrogram)
+    def _begin(self, take: Take) -> Spectrogram:
+        return Spectrogram(take, take.listened)
 
-    def close(self) -> None:
-        self._follower.close()
+    def _is_of(self, made: Spectrogram, take: Take) -> bool:
+        return made.listened is take.listened
 
-    def _draw(self, spectrogram: Spectrogram) -> None:
-        view = self.view
-        drawn_of = (spectrogram, view.quantity, view.logarithmic)
-        if drawn_of != self._drawn_of:
-            if spectrogram.ready == 0:
+    def _draw(self, made: Spectrogram) -> None:
+        shown = (made, self.quantities.key, self.logarithmic)
+        if shown != self._shown:
+            if made.ready == 0:
                 return  # the picture before stays until there is something new
-            self._drawn_of, self._drawn = drawn_of, 0
-            bins = spectrogram.window_frames // 2 + 1
-            self._rows = FrequencyRows(bins, spectrogram.bin_hz, ROWS, view.lowest_hz, view.logarithmic)
-            view.begin_picture(spectrogram.columns, ROWS, spectrogram.hop_s)
-        last = min(spectrogram.ready, self._drawn + MOST_COLUMNS)
+            self._shown = shown
+            bins = made.window_frames // 2 + 1
+            lowest_hz = LOWEST_HZ if self.logarithmic else 0.0
+            self._rows = FrequencyRows(bins, made.bin_hz, ROWS, lowest_hz, self.logarithmic)
+            self.begin_picture(made.columns, ROWS, made.hop_s)
+        last = min(made.ready, self._drawn + MOST_COLUMNS)
         if last > self._drawn:
             assert self._rows is not None
-            levels_db = spectrogram.levels_db[view.quantity][self._drawn : last]
-            view.show_columns(self._drawn, self._rows.of(levels_db))
-            self._drawn = last
+            self.show_columns(self._rows.of(made.levels_db[self.quantities.key][self._drawn : last]))
 
-    def _tell(self, time_s: float, height: float) -> None:
-        wordings, spectrogram = [""], self._spectrogram
-        if math.isfinite(time_s) and spectrogram is not None:
-            column = round(time_s / spectrogram.hop_s)
-            frequency_hz = self.view.frequency_hz(height)
-            row = round(frequency_hz / spectrogram.bin_hz)
-            levels_db = spectrogram.levels_db[self.view.quantity][: spectrogram.ready]
-            if 0 <= column < len(levels_db) and 0 <= row < levels_db.shape[1]:
-                level, frequency = f"{levels_db[column, row]:.1f} dB", f"{frequency_hz:.0f} Hz"
-                wordings = [f"{time_s:.3f} s   {frequency}   {level}", f"{frequency}   {level}", level]
-        self.view.readout.tell(*wordings)
+    def begin_picture(self, columns: int, rows: int, hop_s: float) -> None:
+        """Clears the picture; the columns to come are `rows` high, the k-th at the time k·hop_s."""
+        self._levels_db = np.zeros((columns, rows), np.float32)
+        self._pixels = np.zeros((columns, rows), np.uint8)
+        self._hop_s = hop_s
+        self._drawn = 0
+        self._image.clear()
+
+    def show_columns(self, levels_db: NDArray[np.float32]) -> None:
+        """Draws the next levels (columns, rows)."""
+        first, self._drawn = self._drawn, self._drawn + len(levels_db)
+        self._levels_db[first : self._drawn] = levels_db
+        self._colour(first)
+
+    def _colour(self, first: int) -> None:
+        """Colours the levels from a column on; a line says so where all are below the range, and nothing is seen."""
+        share = self._levels_db[first : self._drawn] / self.range_db + 1
+        self._pixels[first : self._drawn] = np.clip(share, 0, 1) * 255
+        if self._drawn:
+            words = f"below −{self.range_db} dB"
+            below = float(self._levels_db[: self._drawn].max()) < -self.range_db
+            self.readout.rest(*((f"all levels are {words}", words) if below else ("",)))
+            self._image.setImage(self._pixels[: self._drawn], autoLevels=False, levels=(0, 255))
+            low, high = self._heights()
+            half = self._hop_s / 2
+            self._image.setRect(QRectF(-half, low, self._drawn * self._hop_s, high - low))
+
+    def _words(self, made: Spectrogram, time_s: float, place: float) -> Iterable[str]:
+        frequency_hz = self.frequency_hz(place)
+        column, row = round(time_s / made.hop_s), round(frequency_hz / made.bin_hz)
+        levels_db = made.levels_db[self.quantities.key][: made.ready]
+        if not (0 <= column < len(levels_db) and 0 <= row < levels_db.shape[1]):
+            return []
+        level, frequency = f"{levels_db[column, row]:.1f} dB", f"{frequency_hz:.0f} Hz"
+        return [f"{time_s:.3f} s   {frequency}   {level}", f"{frequency}   {level}", level]
+
+    def _take_theme(self) -> None:
+        self._image.setLookupTable(level_map().getLookupTable(nPts=256))
+        self._bar.setColorMap(level_map())
+
+    def _choose_range(self) -> None:
+        self._bar.setLevels((-self.range_db, 0))
+        self._colour(0)
+
+    def _heights(self) -> tuple[float, float]:
+        if self.logarithmic:
+            return math.log10(LOWEST_HZ), math.log10(self._highest_hz)
+        return 0.0, self._highest_hz
+
+    def _label_frequencies(self) -> None:
+        self.plot.getPlotItem().setYRange(*self._heights(), padding=0)
+        self._ticks.set(frequency_ticks() if self.logarithmic else None)

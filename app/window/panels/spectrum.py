@@ -1,23 +1,103 @@
-"""The spectrum of what the slots hold, as it is heard at the playhead."""
+"""The spectrum of what the slots hold, as it is heard at the playhead: level over the logarithm of frequency."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt
+from PySide6.QtGui import QResizeEvent
 
 from app.analysis.heard import HeardSignal
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.session.shown import LEGEND_FIELDS, full_scale_words, part_words, shown_sources
-from app.views.plots.spectrum_view import SpectrumView, analyser_at
-from app.window.panels.base import Moment, Panel
+from app.session.shown import (
+    DEFAULT_SOURCES,
+    LEGEND_FIELDS,
+    ShownSource,
+    full_scale_words,
+    part_words,
+    shown_sources,
+)
+from app.views import theme
+from app.views.controls.parts import combo_box, faint, lay_out_view
+from app.views.controls.readout import Readout
+from app.views.controls.segments import SMALL
+from app.views.plots.axis_label import LOWEST_HZ, RANGES_DB, UprightLabel, fit_foot, frequency_ticks, keep_axes
+from app.views.plots.legend import Legend, set_curves
+from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 EVERY = 2  # moments
+FLOOR_DB, CEILING_DB = -130.0, 0.0
+WINDOW_S = 0.18
+COLUMNS = 480
+PADDING = 4  # length of the transform, in windows
+AREA_STEP = 3  # columns to a point of the filled area
+
+
+@dataclass(frozen=True)
+class Analyser:
+    """A Hann-windowed magnitude spectrum on `COLUMNS` logarithmic columns, 0 dB for a full-scale sine."""
+
+    rate_hz: int
+
+    @property
+    def window_frames(self) -> int:
+        """The power of two nearest to `WINDOW_S`."""
+        return 2 ** round(math.log2(WINDOW_S * self.rate_hz))
+
+    @cached_property
+    def column_hz(self) -> NDArray[np.float64]:
+        """(COLUMNS,), from LOWEST_HZ to half the rate."""
+        return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
+
+    @cached_property
+    def _window(self) -> NDArray[np.float32]:
+        window = np.hanning(self.window_frames)
+        return (window * 2 / window.sum()).astype(np.float32)
+
+    @cached_property
+    def _bins(self) -> NDArray[np.float64]:
+        """The columns' places in the padded spectrum, in bins."""
+        return self.column_hz * PADDING * self.window_frames / self.rate_hz
+
+    @cached_property
+    def _first_bins(self) -> NDArray[np.intp]:
+        """The first bin of each column, where columns are wider than bins."""
+        return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
+
+    @cached_property
+    def _wide(self) -> NDArray[np.bool_]:
+        last = PADDING * self.window_frames // 2 + 1
+        return np.diff(self._first_bins, append=last) > 1
+
+    def level_db(self, signal: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Levels (COLUMNS,) of the first `window_frames` of a signal in units of full scale."""
+        frames = self.window_frames
+        block = np.zeros(frames, np.float32)
+        block[: min(frames, len(signal))] = signal[:frames]
+        magnitude = np.abs(np.fft.rfft((block - block.mean()) * self._window, PADDING * frames))
+        columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
+        # the loudest bin of a wide column, so that no partial falls between two
+        loudest = np.maximum.reduceat(magnitude, self._first_bins)
+        columns = np.maximum(columns, np.where(self._wide, loudest, 0))
+        return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
+
+
+@lru_cache(maxsize=4)
+def analyser_at(rate_hz: int) -> Analyser:
+    """The analyser of a rate; it is kept, with its window and columns."""
+    return Analyser(rate_hz)
 
 
 class SpectrumPanel(Panel):
+    """The heard source is on top. The mouse reads a frequency."""
+
     key = "spectrum"
     title = "Spectrum"
     help = (
@@ -25,25 +105,60 @@ class SpectrumPanel(Panel):
         "axes; 0 dB is a sine of the amplitude that the axis names. Here a partial that is out of tune or decays "
         "wrongly is seen first."
     )
-    view: SpectrumView
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
-        self.view = SpectrumView()
+        self.setMinimumHeight(LEAST_HEIGHT)
+        self.plot = pg.PlotWidget()
+        self.plot.setAccessibleName("Spectrum")
+        self.plot.setToolTip(
+            "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
+        )
+        self.ranges = combo_box("Dynamic range", ((f"{db} dB", db) for db in RANGES_DB), RANGES_DB[-1])
+        self.ranges.setToolTip("How far below full scale the axis reaches, the same for every source")
+        self.ranges.setStyleSheet(SMALL)
+        self.ranges.activated.connect(self._fit)
+        self.readout = Readout()
+        item = self.plot.getPlotItem()
+        item.setLogMode(x=True)
+        item.setLabel("bottom", "frequency (Hz)")
+        self._label = UprightLabel(item, ("dB re 10 mm", "dB"))
+        item.showGrid(x=True, y=True, alpha=0.18)
+        keep_axes(item)
+        item.setMenuEnabled(False)
+        item.hideButtons()
+        item.setMouseEnabled(False, False)
+        item.getAxis("bottom").setTicks([frequency_ticks()])
+        item.getAxis("bottom").enableAutoSIPrefix(False)
+        self._curves: dict[str, pg.PlotDataItem] = {}
+        # slot B's, of a third of the points and not smoothed: to fill the curve itself takes longer than all else
+        self._area = pg.PlotCurveItem(pen=None, fillLevel=FLOOR_DB, antialias=False)
+        self._area_of: str | None = None
+        item.addItem(self._area)
+        self.legend = Legend(self.plot)
+        self._partial = pg.InfiniteLine(0, pen=pg.mkPen(theme.FAINT, width=1, style=Qt.PenStyle.DotLine))
+        self._partial.hide()
+        item.addItem(self._partial, ignoreBounds=True)
+        self._partials_hz = np.zeros(0)
+        self._levels_db: dict[str, NDArray[np.float64]] = {}
+        self._analysers: dict[str, Analyser] = {}  # by source, for they have rates of their own
+        self._rate_hz = 16_000  # the highest of what is drawn
         self._moments = 0
         self._standing: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
-        self._partials_hz = np.zeros(0)
         self._hovered_hz = math.nan
-        self.view.hovered.connect(self._hover)
+        self.set_sources(DEFAULT_SOURCES)
+        self._fit()
+        self.plot.viewport().installEventFilter(self)
+        lay_out_view(self, (faint("range"), self.ranges), self.readout, (), self.plot, gap=0)
 
     def choices_changed(self, names: frozenset[str]) -> None:
         choices = self.session.choices
         if names & LEGEND_FIELDS:
-            self.view.set_sources(shown_sources(choices, self.library), part_words(choices))
+            self.set_sources(shown_sources(choices, self.library), part_words(choices))
             self._shown = ()
         if "pickup" in names:
-            self.view.set_full_scale(full_scale_words(choices))
+            self._label.set(f"dB re {full_scale_words(choices)}", "dB")
 
     def take_started(self, take: Take) -> None:
         self._shown = self._standing = ()  # which would hold the last take
@@ -65,39 +180,111 @@ class SpectrumPanel(Panel):
         if shown == self._shown:
             return
         self._shown = shown
-        self.view.set_rate(max((signal.rate_hz for signal in there), default=take.info.rate_hz))
+        self.set_rate(max((signal.rate_hz for signal in there), default=take.info.rate_hz))
         for signal in signals:
             if signal in there:
                 self._draw(signal, moment.position_s)
             else:
-                self.view.clear_signal(signal.source)
-        if math.isfinite(self._hovered_hz):
-            self._tell()
+                self._clear(signal.source)
+        self._show_readout()
 
     def _draw(self, heard: HeardSignal, position_s: float) -> None:
         analyser = analyser_at(heard.rate_hz)
         last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / heard.listened.ear.full_scale
-        self.view.show_signal(heard.source, signal, analyser)
+        signal = heard.read(first, first + analyser.window_frames) / heard.of.ear.full_scale
+        self.show_signal(heard.source, signal, analyser)
 
-    def _hover(self, frequency_hz: float) -> None:
+    def set_rate(self, rate_hz: int) -> None:
+        """Fits the frequency axis to a rate."""
+        if rate_hz != self._rate_hz:
+            self._rate_hz = rate_hz
+            self._fit()
+
+    def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
+        """As `WaveformPanel.set_sources`; slot B's curve is filled."""
+        set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=150)
+        self._area_of = next((s.source for s in sources if "B" in s.slots and len(sources) > 1), None)
+        if self._area_of:
+            hue = theme.SOURCE_COLOURS[theme.source_kind(self._area_of)]
+            self._area.setBrush(pg.mkBrush(theme.translucent(hue, 28)))
+        self._levels_db = {name: levels for name, levels in self._levels_db.items() if name in self._curves}
+        self.legend.show_sources(sources, part)
+
+    def show_signal(self, source: str, signal: NDArray[np.float32], analyser: Analyser) -> None:
+        """Draws the spectrum of a window of signal, (frames,), in units of full scale."""
+        levels = analyser.level_db(signal)
+        self._levels_db[source], self._analysers[source] = levels, analyser
+        self._curves[source].setData(analyser.column_hz, levels)
+        if source == self._area_of:
+            tops_db = levels.reshape(-1, AREA_STEP).max(axis=1)
+            middles = np.log10(analyser.column_hz[AREA_STEP // 2 :: AREA_STEP])
+            self._area.setData(middles, tops_db, skipFiniteCheck=True)
+
+    def _clear(self, source: str) -> None:
+        self._levels_db.pop(source, None)
+        self._curves[source].setData([], [])
+        if source == self._area_of:
+            self._area.setData([], [])
+
+    def levels_db(self, frequency_hz: float) -> dict[str, float]:
+        """The levels drawn at a frequency, by source, without sources whose rate does not reach it."""
+        levels_db = {}
+        for source, levels in self._levels_db.items():
+            analyser = self._analysers[source]
+            if frequency_hz <= analyser.rate_hz / 2:
+                column = int(np.abs(np.log(analyser.column_hz / frequency_hz)).argmin())
+                levels_db[source] = float(levels[column])
+        return levels_db
+
+    def hover(self, frequency_hz: float) -> None:
+        """The mouse points at a frequency; NaN: at none."""
         self._hovered_hz = frequency_hz
-        if math.isfinite(frequency_hz):
-            self._tell()
-        else:
-            self.view.show_readout("")
+        self._show_readout()
 
-    def _tell(self) -> None:
+    def _show_readout(self) -> None:
         """Writes the frequency under the mouse, its levels, and the nearest partial of a quiet pluck."""
-        frequency_hz, partial_hz = self._hovered_hz, None
-        levels_db = self.view.levels_db(frequency_hz)
-        told = [s for s in shown_sources(self.session.choices, self.library) if s.source in levels_db]
-        levels = "   ".join(f"{source.slots} {levels_db[source.source]:.1f} dB" for source in told)
-        text = f"{frequency_hz:.1f} Hz   {levels}"
-        if len(self._partials_hz):
-            nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
-            partial_hz = float(self._partials_hz[nearest])
-            cents = 1200 * math.log2(frequency_hz / partial_hz)
-            text += f"   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+.0f} cents)"
-        self.view.show_readout(text, partial_hz)
+        frequency_hz, text = self._hovered_hz, ""
+        nearest = None
+        if math.isfinite(frequency_hz):
+            levels_db = self.levels_db(frequency_hz)
+            seen = [s for s in shown_sources(self.session.choices, self.library) if s.source in levels_db]
+            levels = "   ".join(f"{source.slots} {levels_db[source.source]:.1f} dB" for source in seen)
+            text = f"{frequency_hz:.1f} Hz   {levels}"
+            if len(self._partials_hz):
+                nearest = int(np.abs(np.log(self._partials_hz / frequency_hz)).argmin())
+                partial_hz = float(self._partials_hz[nearest])
+                cents = 1200 * math.log2(frequency_hz / partial_hz)
+                text += f"   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+.0f} cents)"
+                self._partial.setValue(math.log10(partial_hz))
+        self.readout.tell(text)
+        self._partial.setVisible(nearest is not None)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        fit_foot(self.plot)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.MouseMove:
+            place = event.position()  # type: ignore[attr-defined]
+            self.hover(self._frequency_at(place))
+        elif event.type() == QEvent.Type.Leave:
+            self.hover(math.nan)
+        return super().eventFilter(watched, event)
+
+    def _frequency_at(self, place: QPointF) -> float:
+        box = self.plot.getPlotItem().vb
+        scene = self.plot.mapToScene(place.toPoint())
+        inside = box.sceneBoundingRect().contains(scene)
+        return float(10 ** box.mapSceneToView(scene).x()) if inside else math.nan
+
+    def _fit(self) -> None:
+        self.plot.getPlotItem().setRange(
+            xRange=(math.log10(LOWEST_HZ), math.log10(self._rate_hz / 2)),
+            yRange=(CEILING_DB - self.range_db, CEILING_DB),
+            padding=0,
+        )
+
+    @property
+    def range_db(self) -> int:
+        return int(self.ranges.currentData())

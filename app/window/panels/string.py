@@ -15,6 +15,7 @@ from app.session.shown import LEGEND_FIELDS, shown_sources
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
+from app.views.controls.parts import lay_out_alone
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
@@ -39,11 +40,11 @@ class StringPanel(Panel):
         "pluck while it is drawn. Drag on it to pluck; drag the green marker to listen elsewhere. Hatched parts lie "
         "outside the training range."
     )
-    view: StringView
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
         self.view = StringView()
+        lay_out_alone(self, self.view)
         self.view.pluck_drawn.connect(session.move_pluck)
         self.view.pluck_released.connect(self.pluck_asked)
         self.view.pluck_reset.connect(self._reset_pluck)

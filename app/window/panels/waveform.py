@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
+import pyqtgraph as pg
 from numpy.typing import NDArray
 
 from app.analysis.heard import HeardSignal
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
-from app.session.shown import LEGEND_FIELDS, part_words, readable_unit, shown_sources
-from app.views.plots.waveform_view import WaveformView
+from app.session.shown import (
+    DEFAULT_SOURCES,
+    LEGEND_FIELDS,
+    ShownSource,
+    part_words,
+    readable_unit,
+    shown_sources,
+)
+from app.views.controls.parts import lay_out_alone
+from app.views.plots.axis_label import UprightLabel
+from app.views.plots.legend import Legend, set_curves
+from app.views.plots.time_plot import TimePlot
 from app.window.panels.base import Moment, Panel
 
 EVERY = 2  # moments
 MOST_FRAMES = 262_144  # read in one call, which takes a millisecond
 AIR = 1.25  # how much higher the axis is than the peak
 FLAT = 2e-7  # m or m/s: the axis of silence, so that rounding is not magnified to a sound
+FEW_PIXELS = 4
 
 
 @dataclass
@@ -43,6 +56,8 @@ class _Drawn:
 
 
 class WaveformPanel(Panel):
+    """One curve a source; the heard source is on top."""
+
     key = "waveform"
     title = "Waveform"
     help = (
@@ -50,32 +65,49 @@ class WaveformPanel(Panel):
         "velocity, all modes or one. A click moves the playhead; the wheel zooms. After the red line, the end of the "
         "trained time, the model extrapolates."
     )
-    view: WaveformView
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
-        self.view = WaveformView()
-        self.view.seek_asked.connect(self.seek_asked)
+        self.plot = TimePlot(
+            "Waveform",
+            "Signal of the pick-up. Click moves the playhead; the wheel zooms in time, the right button pans;\n"
+            "double-click shows all. Arrow keys move the playhead, + and − zoom",
+        )
+        self.plot.seek_asked.connect(self.seek_asked)
+        item = self.plot.getPlotItem()
+        item.showGrid(x=True, y=True, alpha=0.18)
+        item.getAxis("left").enableAutoSIPrefix(False)
+        self.plot.horizon.label.setPosition(0.1)  # the legend has the upper edge
+        self._label = UprightLabel(item)
+        self._curves: dict[str, pg.PlotDataItem] = {}
+        self.legend = Legend(self.plot)
         self._take: Take | None = None
+        self._period_s = 0.0  # of its string; 0: not known
         self._drawn: dict[str, _Drawn] = {}
         self._full = 0.0  # of the axis, in m or m/s
         self._caught_up: tuple[object, ...] = ()  # progress of the take and choices when all was read
         self._moments = 0
         self._shown: tuple[object, ...] = ()
+        self.set_sources(DEFAULT_SOURCES)
+        self.set_scale(5.0, "displacement", "mm")
+        lay_out_alone(self, self.plot)
 
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & LEGEND_FIELDS:
             choices = self.session.choices
-            self.view.set_sources(shown_sources(choices, self.library), part_words(choices))
+            self.set_sources(shown_sources(choices, self.library), part_words(choices))
             self._shown = ()
 
     def take_started(self, take: Take) -> None:
         self._take, self._drawn, self._full = take, {}, 0.0
         self._shown = self._caught_up = ()  # which would hold the last take
-        self.view.set_take(take.seconds, take.info.horizon_s, 1 / take.fundamental_hz)
+        self._period_s = 1 / take.fundamental_hz
+        self.plot.set_times(take.seconds, take.info.horizon_s)
+        for curve in self._curves.values():
+            curve.setData([], [])
 
     def show_moment(self, moment: Moment) -> None:
-        self.view.show_playhead(moment.position_s)
+        self.plot.show_playhead(moment.position_s)
         self._moments += 1
         take = self._take
         if take is None or self._moments % EVERY:
@@ -85,10 +117,10 @@ class WaveformPanel(Panel):
         if there != self._caught_up:
             self._caught_up = () if self._follow(take) else there
         ready = {name: drawn.ready for name, drawn in self._drawn.items()}
-        shown = (take.listened, ready, self.view.times_s, self.view.columns)
+        shown = (take.listened, ready, self.plot.times_s, self.plot.columns)
         if shown != self._shown:
             self._shown = shown
-            self._draw()
+            self._draw(take)
 
     def _follow(self, take: Take) -> bool:
         """Reads on what the slots hold; a signal that is new from its start.
@@ -108,18 +140,74 @@ class WaveformPanel(Panel):
             self._full = 0.0  # something else is drawn: its own scale
         return moved
 
-    def _draw(self) -> None:
-        choices, view = self.session.choices, self.view
-        assert self._take is not None
-        pickup = self._take.listened.ear.pickup
+    def _draw(self, take: Take) -> None:
+        pickup = take.listened.ear.pickup
         peak = max((drawn.peak for drawn in self._drawn.values()), default=0.0)
         if peak > self._full or self._full == 0.0:
             self._full = max(AIR * peak, FLAT)
         factor, unit = readable_unit(self._full, pickup)
-        view.set_scale(factor * self._full, pickup, unit)
-        for source in shown_sources(choices, self.library):
-            if source.source in self._drawn:
-                drawn = self._drawn[source.source]
-                view.show_signal(source.source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.rate_hz)
+        self.set_scale(factor * self._full, pickup, unit)
+        for source, curve in self._curves.items():
+            if source in self._drawn:
+                drawn = self._drawn[source]
+                self.show_signal(source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.rate_hz)
             else:
-                view.clear_signal(source.source)
+                curve.setData([], [])
+
+    def set_scale(self, full: float, quantity: str, unit: str) -> None:
+        """The vertical axis, from −full to full in `unit`."""
+        self.plot.getPlotItem().setYRange(-full, full, padding=0.02)
+        self._label.set(f"{quantity} ({unit})", unit)
+
+    def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
+        """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""
+        set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=130)
+        self.legend.show_sources(sources, part)
+
+    def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
+        """The samples so far, (frames,) from time 0, in the unit of the axis; draws those in view, none left out."""
+        (low_s, high_s), columns = self.plot.times_s, self.plot.columns
+        # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and a key
+        # that is played waits for the painting.
+        if (high_s - low_s) * rate_hz > columns:
+            borders_s = np.linspace(low_s, high_s, columns + 1)
+            edges = np.ceil(borders_s * rate_hz).astype(np.int64).clip(0, len(signal))
+            there = np.flatnonzero(edges[1:] > edges[:-1])
+            middles_s = (borders_s[there] + borders_s[there + 1]) / 2
+            # Where a period is a few pixels wide, each stroke has the extremes of a whole one, or they would beat.
+            pixels = self._period_s * columns / (high_s - low_s)
+            around = math.ceil(pixels) if 0 < pixels < FEW_PIXELS else 1
+            values = extremes(signal, edges[there[0] : there[-1] + 2], around) if len(there) else signal[:0]
+            self._curves[source].setData(np.repeat(middles_s, 2), values, connect="pairs", antialias=False)
+        else:
+            first = min(max(int(low_s * rate_hz), 0), len(signal))
+            last = min(max(int(high_s * rate_hz) + 2, first), len(signal))
+            self._curves[source].setData(
+                np.arange(first, last) / rate_hz, signal[first:last], connect="all", antialias=True
+            )
+
+
+def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64], around: int = 1) -> NDArray[np.float32]:
+    """A vertical stroke for each column of frames, from its lowest to its highest value: ends (2 · columns,).
+
+    Each reaches as far as the next one's first sample, so that a steep flank has no gaps.
+
+    Args:
+        signal: (frames,).
+        edges: (columns + 1,), rising: the frames at which each column begins, and where the last ends.
+        around: a stroke has the extremes of so many columns, centred on its own.
+    """
+    starts, meets = edges[:-1], signal[np.minimum(edges[1:], len(signal) - 1)]
+    values = np.empty(2 * len(starts), np.float32)
+    lowest = np.minimum(np.minimum.reduceat(signal[: edges[-1]], starts), meets)
+    highest = np.maximum(np.maximum.reduceat(signal[: edges[-1]], starts), meets)
+    values[0::2] = _neighbours(lowest, around).min(axis=-1)
+    values[1::2] = _neighbours(highest, around).max(axis=-1)
+    return values
+
+
+def _neighbours(values: NDArray[np.float32], around: int) -> NDArray[np.float32]:
+    """(values, around): each value with its neighbours."""
+    before = (around - 1) // 2
+    padded = np.pad(values, (before, around - 1 - before), mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(padded, around)

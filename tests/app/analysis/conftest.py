@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.analysis.job import Cancelled
 from app.rendering import Take
+from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import read_info
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 MakeTake = Callable[..., Take]
 
@@ -26,7 +27,7 @@ def make_take(small_preset: Path) -> MakeTake:
         info = read_info(small_preset)
         seconds = (len(truth_m) - 1) / info.rate_hz
         take = Take("small", info, Pluck(0.35, 4.0, "gaussian", 0.06), seconds, Ear((0.5,)))
-        take.append(model_m[:ready], truth_m[:ready])
+        append_to(take, model_m[:ready], truth_m[:ready])
         return take
 
     return make
@@ -44,7 +45,7 @@ class RecordingJob:
         if self.cancel_after is not None and len(self.shares) >= self.cancel_after:
             raise Cancelled
 
-    def report(self, share: float, so_far: object = None) -> None:
+    def report(self, share: float, text: str = "", so_far: object = None) -> None:
         self.check()
         self.shares.append(share)
         if so_far is not None:

@@ -11,8 +11,8 @@ import torch
 
 from app.analysis import comparison
 from app.analysis.comparison import ComparedRow, Trial, compare, same_string
-from app.analysis.job import Cancelled
 from app.presets.library import PresetEntry, list_presets
+from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights

@@ -11,6 +11,7 @@ import torch
 from app.analysis.error_course import ErrorCourse
 from app.rendering import Take
 from engine.metrics import ErrorSums
+from tests.app.takes import append_to
 
 random = np.random.default_rng(3)
 TRUTH = random.standard_normal((1501, 101)).astype(np.float32)
@@ -22,7 +23,7 @@ def test_windows_are_the_engines_however_the_take_grows(make_take: Callable[...,
     course = ErrorCourse(take)
     assert not course.advance()
     for stop in (7, 33, 34, 900, 1501):
-        take.append(MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
+        append_to(take, MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
         while course.advance():
             pass
     assert course.complete

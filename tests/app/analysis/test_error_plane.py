@@ -20,7 +20,7 @@ from app.analysis.error_plane import (
     nearest_cell,
     refine,
 )
-from app.analysis.job import Cancelled
+from app.shared.worker import Cancelled
 from engine.metrics import relative_error
 from engine.pluck import Pluck
 from engine.presets import load_preset

@@ -15,6 +15,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.string import StringParameters
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,
                   TrainedRange(None, None, (1e-3, 1e-2)), "paper", 0)  # fmt: skip
@@ -28,7 +29,7 @@ def take(hear: Callable[[Take, Ear], None]) -> Take:
     time_s = np.arange(made.frames)[:, None] / INFO.rate_hz
     first = 1e-3 * np.cos(2 * np.pi * 200 * time_s) * np.sin(np.pi * PLACES)
     second = 1e-4 * np.cos(2 * np.pi * 440 * time_s) * np.sin(2 * np.pi * PLACES)
-    made.append((first + 1.1 * second).astype(np.float32), (first + second).astype(np.float32))
+    append_to(made, (first + 1.1 * second).astype(np.float32), (first + second).astype(np.float32))
     hear(made, Ear((0.37, 0.6)))
     return made
 
@@ -38,7 +39,7 @@ def test_a_signal_is_the_takes_own_at_the_first_point(take: Take) -> None:
     assert heard.there
     assert (heard.ready, heard.frames, heard.rate_hz) == (2_001, 2_001, 4_000)
     assert heard.read(100, 300) == pytest.approx(take.motion_m("truth")[100:300, 37], abs=1e-9)
-    assert heard.read_points(100, 300)[:, 1] == pytest.approx(take.motion_m("truth")[100:300, 60], abs=1e-9)
+    assert heard.read_all(100, 300)[:, 1] == pytest.approx(take.motion_m("truth")[100:300, 60], abs=1e-9)
     assert len(heard.read(take.frames - 3, take.frames + 50)) == 3
     assert len(heard.read(take.frames + 1, take.frames + 2)) == 0
 
@@ -56,11 +57,11 @@ def test_another_preset_has_its_own_rate_and_is_there_when_it_has_begun(take: Ta
     motion, signal = HeardMotion(take, "preset:other"), HeardSignal(take.listened, "preset:other")
     assert not motion.there
     assert not signal.there
-    take.others["preset:other"] = Motion(1_000, 11, 0.5)
+    take.motions["preset:other"] = Motion(1_000, 11, 0.5)
     take.listened.signals["preset:other"] = Signal(16_000, 1, 0.5)
     assert not motion.there
     assert not signal.there
-    take.others["preset:other"].append(np.ones((40, 11), np.float32))
+    take.motions["preset:other"].append(np.ones((40, 11), np.float32))
     take.listened.signals["preset:other"].append(np.ones((50, 1), np.float32))
     assert motion.there
     assert signal.there

@@ -13,6 +13,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.string import StringParameters
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,
                   TrainedRange(None, None, (1e-3, 1e-2)), "paper", 0)  # fmt: skip
@@ -24,7 +25,7 @@ def sine_take(seconds: float = 1.0) -> Take:
     time_s = np.arange(take.frames) / INFO.rate_hz
     shape = np.sin(np.pi * np.linspace(0, 1, 101))
     truth = (1e-3 * np.cos(2 * np.pi * take.fundamental_hz * time_s)[:, None] * shape).astype(np.float32)
-    take.append(truth / 2, truth)
+    append_to(take, truth / 2, truth)
     return take
 
 
@@ -46,10 +47,10 @@ def test_a_picture_has_the_shape_in_mm_and_the_blur_around_it() -> None:
 def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None:
     take = Take("t", INFO, Pluck(), 3.0, Ear((0.5,)))
     loud, soft = np.full((4_000, 101), 1e-3, np.float32), np.full((8_001, 101), -1e-4, np.float32)
-    take.append(loud, loud)
+    append_to(take, loud, loud)
     envelope, motions = Envelope(), both(take)
     assert envelope.before(0.0, motions) == {}
-    take.append(soft, soft / 2)
+    append_to(take, soft, soft / 2)
     for position_s, lowest, highest in ((0.5, 1.0, 1.0), (1.5, -0.1, 1.0), (2.5, -0.1, -0.1), (9.0, -0.1, -0.1)):
         low, high = envelope.before(position_s, motions)["model"]
         assert (low[50], high[50]) == (pytest.approx(lowest), pytest.approx(highest))
@@ -61,10 +62,10 @@ def test_an_envelope_holds_the_last_second_and_forgets_what_was_before() -> None
 def test_the_difference_and_another_preset_move_too() -> None:
     """The difference with its gain; the other at its own rate and on its own grid, once there is something of it."""
     take = sine_take()
-    take.others["preset:other"] = Motion(1_000, 11, 1.0)
+    take.motions["preset:other"] = Motion(1_000, 11, 1.0)
     motions = [HeardMotion(take, DIFFERENCE, 10.0), HeardMotion(take, "preset:other")]
     assert set(frame_at(take, motions, 0.5, 1.0).shapes) == {DIFFERENCE}
-    take.others["preset:other"].append(
+    take.motions["preset:other"].append(
         np.linspace(0, 1e-3, 1_001, dtype=np.float32)[:, None] * np.ones(11, np.float32)
     )
     envelope = Envelope()
@@ -79,5 +80,5 @@ def test_the_difference_and_another_preset_move_too() -> None:
 
 def test_an_empty_take_has_a_picture() -> None:
     take = Take("t", INFO, Pluck(), 1.0, Ear((0.5,)))
-    take.append(np.zeros((1, 101), np.float32), np.zeros((1, 101), np.float32))
+    append_to(take, np.zeros((1, 101), np.float32), np.zeros((1, 101), np.float32))
     assert torch.tensor(frame_at(take, both(take), 0.0, 1.0).shapes["model"]).eq(0).all()

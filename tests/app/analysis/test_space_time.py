@@ -9,6 +9,7 @@ import pytest
 
 from app.analysis.space_time import Envelopes, detail_for, picture
 from app.rendering import Take
+from tests.app.takes import append_to
 
 FRAMES, RATE_HZ = 4001, 4000
 random = np.random.default_rng(1)
@@ -28,7 +29,7 @@ def test_envelopes_are_the_same_however_the_take_grows(make_take: Callable[..., 
     piecewise = Envelopes(take)
     assert not piecewise.advance()
     for stop in (3, 4, 1000, FRAMES):
-        take.append(MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
+        append_to(take, MODEL[take.ready_frames : stop], TRUTH[take.ready_frames : stop])
         while piecewise.advance():
             pass
     assert whole.complete

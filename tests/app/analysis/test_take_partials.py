@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from app.analysis.job import Cancelled, Job
 from app.analysis.take_partials import take_partials
 from app.rendering import Take
+from app.shared.worker import Cancelled, Job
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import ModelSource, TruthSource, project
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def take_of(
         frames, _ = source.advance(source.start(initial), take.frames - 1)
         motions.append(torch.cat([initial, frames[0]]))
     changed = to_modes(motions[0], info.modes) * torch.tensor(gains, dtype=torch.float64)
-    take.append(to_grid(changed, info.grid_points).float().numpy(), motions[1].float().numpy())
+    append_to(take, to_grid(changed, info.grid_points).float().numpy(), motions[1].float().numpy())
     return take
 
 
@@ -101,9 +102,9 @@ def test_a_take_of_pictures_has_the_partials_of_every_sample(job: Job) -> None:
     following, _ = source.advance(source.start(initial), frames)
     every = torch.cat([initial[:, None], following], dim=1)[0].float().numpy()
     whole = Take("whole", info, pluck, 0.2, Ear((0.5,)))
-    whole.append(every, every)
+    append_to(whole, every, every)
     pictures = Take("pictures", info, pluck, 0.2, Ear((0.5,)), stride=8, model=source)
-    pictures.append(every[::8], every[::8])
+    append_to(pictures, every[::8], every[::8])
     expected, found = take_partials(whole, job), take_partials(pictures, job)
     assert set(found) == set(expected) == {"trained", "all"}
     for one, other in zip(found["all"][:20], expected["all"][:20], strict=True):

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from app.commands.sampled import _keys
+from app.export.sampled.plan import SampledPlan
+from app.export.sampled.words import pitch_words
 from app.patches.library import find_patch
 
 PATCH = "Classical guitar"
@@ -38,10 +40,10 @@ def test_an_sfz_with_its_samples(run, notes: list[tuple], folder: Path) -> None:
     assert found.out.startswith(f"{folder / 'a.sfz'}: 6 samples rendered, 0 kept, ")
     assert "6 samples (3 keys, 2 velocity layers), at most 0.3 MB" in found.err
     preset = find_patch(PATCH).patch.preset
-    wanted = [
-        (PATCH, preset, key, velocity, 0.2, 0.2, 44_100, "truth") for key in (60, 61, 62) for velocity in (63, 127)
-    ]
-    assert notes == wanted
+    plan = SampledPlan(find_patch(PATCH).patch, (60, 62), layers=2)
+    assert notes == [(PATCH, preset, zone.key, zone.velocity, 0.2, 0.2, 44_100, "truth") for zone in plan.zones]
+    pitch = f"; note starts within {plan.pitch_error_cents:.1f} cents of the patch\n"
+    assert found.out.endswith(pitch) and pitch in found.err
     assert len(list((folder / "a_samples").glob("*.flac"))) == 6
     assert (
         "0 samples rendered, 6 kept"
@@ -83,10 +85,9 @@ def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatc
 def test_the_size_alone(run, notes: list[tuple], folder: Path) -> None:
     found = run("sampled", PATCH, folder / "a.sfz", *SMALL, "--size-only")
     assert (found.status, found.err) == (0, "")
-    assert (
-        found.out
-        == f"{folder / 'a.sfz'}: 6 samples (3 keys, 2 velocity layers), at most 0.3 MB, before FLAC compression\n"
-    )
+    size = "6 samples (3 keys, 2 velocity layers), at most 0.3 MB, before FLAC compression"
+    pitch = pitch_words(SampledPlan(find_patch(PATCH).patch, (60, 62), layers=2).pitch_error_cents)
+    assert found.out == f"{folder / 'a.sfz'}: {size}; {pitch}\n"
     assert notes == [] and list(folder.iterdir()) == []
 
 

@@ -9,10 +9,10 @@ import pytest
 from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, t60_s, told
 from app.instrument.strings import Strings
 from app.patches.patch import Fretted, Knobs, Patch, PhysicalString
+from app.shared.parameters import OF_PATCHES
 from engine.resonators.string import StringParameters
 
 KEY = 57
-LIMITS = (0.25, 4.0)
 
 
 def string_of(patch: Patch) -> StringParameters:
@@ -56,9 +56,12 @@ def test_a_figure_leads_back_to_its_knob(patch: Patch, field: str) -> None:
     turned = patch.with_value(field, 1.7)
     wanted = figure.of(string_of(turned))
     assert (wanted > figure.of(string_of(patch))) != figure.falls
-    assert knob_for(patch, (KEY, None), field, wanted, LIMITS) == pytest.approx(1.7)
-    ends = [knob_for(patch, (KEY, None), field, far, LIMITS) for far in (0.0, 1e30)]
-    assert (ends[::-1] if figure.falls else ends) == pytest.approx(list(LIMITS))
+    assert knob_for(patch, (KEY, None), field, wanted) == pytest.approx(1.7)
+    ends = [knob_for(patch, (KEY, None), field, far) for far in (0.0, 1e30)]
+    low, high = OF_PATCHES[field].limits
+    if field == "knobs.density":
+        high = 1e5 / string_of(patch).density_kg_m3  # beyond it there is no such string
+    assert (ends[::-1] if figure.falls else ends) == pytest.approx([low, high])
 
 
 def test_where_there_is_no_such_string_it_goes_as_far_as_there_is_one(patch: Patch) -> None:
@@ -66,16 +69,16 @@ def test_where_there_is_no_such_string_it_goes_as_far_as_there_is_one(patch: Pat
     assert isinstance(strings, Fretted)
     dense = PhysicalString(**{**strings.string.model_dump(), "density_kg_m3": 50_000.0})
     heavy = patch.model_copy(update={"strings": Fretted(string=dense)})
-    assert knob_for(heavy, (KEY, None), "knobs.density", 1e9, (0.05, 20.0)) == pytest.approx(2.0)  # 1e5 kg/m³ at most
+    assert knob_for(heavy, (KEY, None), "knobs.density", 1e9) == pytest.approx(2.0)  # 1e5 kg/m³ at most
 
 
 def test_a_silent_key_is_told(patch: Patch) -> None:
     with pytest.raises(ValueError, match="key 10 of test is silent"):
-        knob_for(patch, (10, None), "knobs.tension", 80.0, LIMITS)
+        knob_for(patch, (10, None), "knobs.tension", 80.0)
 
 
 def test_a_guitars_key_is_measured_on_the_string_that_is_played(guitar: Patch) -> None:
     lowest = Strings(guitar).of_key(57, 5)
     assert lowest is not None
     wanted = FIGURES["knobs.length"].of(lowest.parameters)
-    assert knob_for(guitar, (57, 5), "knobs.length", 2 * wanted, LIMITS) == pytest.approx(2.0, rel=1e-2)
+    assert knob_for(guitar, (57, 5), "knobs.length", 2 * wanted) == pytest.approx(2.0, rel=1e-2)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+import numpy as np
 import pytest
 
+from app.instrument.glide import glides_cents
 from app.instrument.strings import KeyString, Strings, pitch_hz_of
 from app.patches.library import SHIPPED, file_stem, list_patches
 from app.patches.patch import CATEGORIES, Patch
@@ -21,6 +23,8 @@ PATCHES = [entry.patch for entry in ENTRIES]
 PITCH_RANGE_HZ = (30, 1500)
 MOST_INHARMONIC = 3e-3  # beyond it nothing was ever measured of the model
 MOST_TENSION_RISE = 0.5
+MOST_GLIDE_CENTS = 25
+GLIDING = ("Baritone twang", "Slack bass")  # besides the experimental ones: their descriptions promise the fall
 T60_RANGE_S = (0.5, 40)
 GRID_POINTS = 101
 
@@ -86,6 +90,15 @@ def test_no_pluck_raises_the_tension_beyond_training(patch: Patch) -> None:
         assert rises == sorted(rises)
         worst = max(worst, rises[-1])
     assert worst <= MOST_TENSION_RISE
+
+
+@pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.name)
+def test_the_hardest_stroke_starts_in_tune(patch: Patch) -> None:
+    hardest = float(np.nanmax(glides_cents(patch)[:, 127]))
+    print(f"{patch.name}: starts {hardest:.1f} cents sharp at most")
+    for_effect = patch.category == "experimental" or patch.name in GLIDING
+    assert for_effect or hardest <= MOST_GLIDE_CENTS
+    assert patch.name not in GLIDING or hardest > MOST_GLIDE_CENTS
 
 
 @pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.name)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target
 from tests.app.patches.conftest import STRING
 
@@ -35,6 +36,7 @@ Make = Callable[..., Patch]
         ("softest_mm", {"pluck": {"softest_mm": 4, "hardest_mm": 3}}),
         ("pickup.points", {"pickup": {"points": [0.1, 0.2, 0.3]}}),
         ("damping.let_ring", {"damping": {"let_ring": 1}}),
+        ("pluck.stops", {"pluck": {"stops": "no"}}),
         ("tuning.scale", {"tuning": {"scale": "x" * 65_537}}),
         ("tuning.scale", {"tuning": {"scale": "a\x1b[2J"}}),
         ("mod_wheel", {"mod_wheel": "name"}),
@@ -56,6 +58,17 @@ def test_a_patch_survives_json(make_patch: Make) -> None:
     strings = StringSet(strings=tuple(OpenString(note=n, string=make_patch().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
     whole = make_patch(strings=strings, macros=[Macro(name="m", targets=(Target(field="level_db", low=-3, high=3),))])
     assert Patch.model_validate_json(whole.model_dump_json()) == whole
+
+
+def test_what_plucks_a_patch_stops_its_string_unless_the_patch_says_otherwise(make_patch: Make) -> None:
+    """Patches of the time before that field, too; a hammer does not."""
+    older = make_patch().model_dump()
+    del older["pluck"]["stops"]
+    assert Patch.model_validate(older).pluck.stops
+    hammered = make_patch(pluck={"stops": False})
+    assert not Patch.model_validate_json(hammered.model_dump_json()).pluck.stops
+    struck = {entry.name for entry in list_patches(SHIPPED)[0] if not entry.patch.pluck.stops}
+    assert struck == {"cimbalom", "felt_on_wires", "santur_in_shur"}
 
 
 def test_the_engine_takes_its_strings(make_patch: Make) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from fractions import Fraction
@@ -116,6 +117,23 @@ def test_files_are_read_as_scala_writes_them(tmp_path: Path) -> None:
     mapping = tmp_path / "white.KBM"
     mapping.write_text(keymap(hz=430))
     assert Tuning(TuningChoice(keymap=read_scala(mapping))).hz(69) == pytest.approx(430)
+
+
+@pytest.mark.parametrize(("said", "listed"), [(7, 12), (12, 7), (7, 6), (10**4000, 7), (3, 0)])
+def test_a_scale_that_miscounts_its_notes_is_refused(tmp_path: Path, said: int, listed: int) -> None:
+    path = tmp_path / "wrong.scl"
+    tones = "".join(f" {100 * n}. ! a note\n" for n in range(1, listed + 1))
+    path.write_text(f"! wrong.scl\na scale\n {said}\n!\n{tones}")
+    told = f"wrong.scl: scale: says {str(said)[:20]} notes and lists {listed}; correct its count or its list of notes"
+    with pytest.raises(ValueError, match=re.escape(told)) as caught:
+        read_scala(path)
+    assert len(str(caught.value)) < 300
+
+
+def test_remarks_below_a_scale_are_no_notes(tmp_path: Path) -> None:
+    path = tmp_path / "right.scl"
+    path.write_text(scale("3/2", "2/1").replace("3/2", "3/2 ! a fifth\n\n! 5/3") + "\nby nobody in 1998\n")
+    assert Tuning(TuningChoice(scale=read_scala(path))).hz(69) == pytest.approx(440)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -26,6 +27,8 @@ class StandingSound:
     def __init__(self, rate_hz: int = 48_000) -> None:
         self.mixer = Mixer(rate_hz)
         self.load = 0.0
+        self.latency_s = 0.0
+        self._watch: Callable[[Any], None] = lambda status: None
 
     @property
     def rate_hz(self) -> int:
@@ -35,7 +38,14 @@ class StandingSound:
         return self.mixer.seconds
 
     def status(self) -> SimpleNamespace:
-        return SimpleNamespace(load=self.load)
+        return SimpleNamespace(load=self.load, latency_s=self.latency_s)
+
+    def watch(self, look: Callable[[Any], None]) -> None:
+        self._watch = look
+
+    def take_care(self) -> None:
+        """A turn of the caretaker's thread."""
+        self._watch(self.status())
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from app.playing.keyboard import (
     KeyPress,
     Reach,
     letters_of,
+    octaves_of,
     place_of,
     play,
     semitone_of,
@@ -106,3 +107,20 @@ def test_octave_and_velocity_keys_stay_within_bounds() -> None:
     assert turn(KeyPress("v"), 0, 120) == (0, 127)
     assert turn(KeyPress("c"), 0, 5) == (0, 1)
     assert turn(KeyPress("m"), 0, 5) is None
+
+
+@pytest.mark.parametrize("low", range(0, 114, 7))
+@pytest.mark.parametrize("keys", [0, 1, 11, 40])
+def test_octaves_are_those_at_which_a_key_sounds(low: int, keys: int) -> None:
+    """Compared with every octave tried."""
+    high = min(low + keys, 113)  # the highest of the computer's keys
+    sounding = [
+        octave
+        for octave in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)
+        if any(low <= key <= high for key in letters_of(octave))
+    ]
+    assert octaves_of(low, high) == (sounding[0], sounding[-1])
+
+
+def test_a_range_that_no_key_reaches_has_the_nearest_octave() -> None:
+    assert octaves_of(120, 127) == (HIGHEST_OCTAVE, HIGHEST_OCTAVE)

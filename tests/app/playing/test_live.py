@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,19 +12,32 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.instrument.events import KEYS, SUSTAIN, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent
-from app.instrument.player import Player
+from app.instrument.events import (
+    KEYS,
+    NOTES_OFF,
+    SOUND_OFF,
+    SUSTAIN,
+    Bend,
+    Controller,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+)
+from app.instrument.player import Player, Struck
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
+from app.playing.due import Due
 from app.playing.live import Live
-from app.playing.notes import Notes
+from app.playing.notes import Note, Notes
 from app.playing.playback import Playback
 from app.playing.sources import Sources
 from app.playing.stroke import Mix
 from engine.effects import Effects
 from engine.presets.finding import SHIPPED
-from engine.voices import Ear
+from engine.voices import Ear, Mixer
+from engine.voices.voice import FADE_S
 
 Wait = Callable[[Callable[[], bool]], None]
 EAR = Ear((0.3,))
@@ -235,8 +249,127 @@ def test_the_pick_up_through_which_it_is_heard_is_recorded(live: Live, patch: Pa
     ]
 
 
-def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(live: Live, wait: Wait) -> None:
-    playback = Playback(live.handle)
+class TurnedClock:
+    """Frames are taken by whoever looks at it: by the playback, in its thread."""
+
+    def __init__(self, sound: Any) -> None:
+        self._sound, self.buffer_s, self.heard = sound, 0.0, list[np.ndarray]()
+
+    @property
+    def mixer(self) -> Mixer:
+        self.heard.append(self._sound.mixer.render(100))
+        mixer: Mixer = self._sound.mixer
+        return mixer
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.04])
+def test_the_notes_of_a_file_begin_with_their_frames(
+    live: Live, sound: Any, monkeypatch: pytest.MonkeyPatch, late_s: float
+) -> None:
+    """Exactly, model and truth, also where Python is late and keys are struck again."""
+    times_s = [0.0, 0.0101, 0.05, 0.1, 0.1, 0.15003, 0.2]
+    keys = [45, 52, 57, 45, 60, 45, 52]
+    made: list[Note] = []
+    ended = Event()
+
+    def handle(event: Any, due: Due | None) -> None:
+        if len(made) in (2, 5):
+            sound.mixer.render(round(late_s * 48_000))
+        if (found := live.handle(event, due)) is not None:
+            made.append(found[1])
+
+    playback = Playback(handle, TurnedClock(sound), live.cancel, ended.set)
+    playback.play([TimedEvent(t, NoteOn(key, 90)) for t, key in zip(times_s, keys, strict=True)])
+    assert ended.wait(30)
+    sound.mixer.render(4_800)
+    begins = [{voice.began_frame for voice in note.voices.values()} for note in made]
+    assert all(len(each) == 1 for each in begins)
+    first = min(begins[0])
+    assert [min(each) - first for each in begins] == [round(t * 48_000) for t in times_s]
+
+
+def test_releases_and_bends_of_a_file_count_at_their_frames(live: Live, sound: Any, patch: Patch) -> None:
+    """As if each had come at its time; the first of them when all have been handed over."""
+    begin, played = (
+        1_024,
+        (NoteOn(45, 90), Bend(0.5), Bend(1.0), NoteOff(45), NoteOn(45, 60), Controller(SOUND_OFF, 0)),
+    )
+    frames = (0, 4_800, 9_600, 14_400, 17_280, 24_000)
+    for frame, event in zip(frames, played, strict=True):
+        live.handle(event, Due(sound.mixer, begin + frame, 0.0))
+    assert sound.mixer.frames == 64
+    heard = sound.mixer.render(begin - 64 + 28_800)[begin - 64 :, 0]
+    assert live._player is not None
+    mixer, struck = Mixer(48_000), list[Struck]()
+    mixer.render(begin)
+    player = Player(patch, live._player.preset, 48_000, struck.append, ("model",))
+    player.listen(EAR)
+    expected = []
+    for frame, event, end in zip(frames, played, (*frames[1:], 28_800), strict=True):
+        if isinstance(event, Controller):  # it fades in 20 ms, where one at once fades in 30
+            struck[-1].voices["model"].release(FADE_S)
+        elif (made := player.handle(event)) is not None:
+            made.voices["model"].start_with_gain(made.gain)
+            mixer.add(made.voices["model"])
+        expected.append(mixer.render(end - frame)[:, 0])
+    np.testing.assert_allclose(heard, np.concatenate(expected), atol=1e-6)
+
+
+def test_a_file_that_is_stopped_ends_what_was_handed_over(live: Live, sound: Any, wait: Wait) -> None:
+    ringing = live.handle(NoteOn(45, 90))
+    sound.mixer.render(4_800)
+    live.begin_recording()
+    soon = Due(sound.mixer, sound.mixer.frames + 2_000, time.monotonic() + 0.04)
+    later = [live.handle(NoteOn(key, 127), soon) for key in (45, 50)]
+    live.cancel()
+    live.handle(Controller(NOTES_OFF, 0))
+    sound.mixer.render(2_000)
+    assert ringing is not None
+    assert all(each is not None and each[1].over and each[1].began_frame == 0 for each in later)
+    assert ringing[0].damped, "it has its place again"
+    assert not ringing[0].over
+    assert NoteOn(50, 127) not in [each.event for each in live.end_recording()]
+    sound.mixer.render(24_000)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-4
+
+
+def test_a_key_that_is_struck_while_its_next_note_waits_sounds_at_once(live: Live, sound: Any) -> None:
+    """And not twice."""
+    soon = Due(sound.mixer, sound.mixer.frames + 2_000, 0.0)
+    waits, struck = live.handle(NoteOn(45, 90), soon), live.handle(NoteOn(45, 90))
+    sound.mixer.render(4_800)
+    assert waits is not None and struck is not None
+    assert struck[1].began_frame == 64
+    assert (waits[1].over, waits[1].began_frame) == (True, 0)
+
+
+def test_of_another_device_an_event_counts_at_once(live: Live, sound: Any) -> None:
+    gone = Due(Mixer(48_000), 10_000_000, 0.0)
+    made = live.handle(NoteOn(45, 90), gone)
+    live.handle(NoteOff(45), gone)
+    assert made is not None
+    assert made[0].begin_frame == 0
+    sound.mixer.render(64)
+    assert made[1].began_frame == 64
+
+
+def test_a_recording_has_the_events_of_a_file_when_they_are_heard(live: Live, sound: Any) -> None:
+    live.begin_recording()
+    now_s = time.monotonic()
+    for key, after_s in ((45, 0.2), (50, 0.25), (62, 60.0)):
+        live.handle(NoteOn(key, 90), Due(sound.mixer, round(48_000 * after_s), now_s + after_s))
+    live.handle(NoteOn(57, 90))
+    while time.monotonic() < now_s + 0.3:
+        time.sleep(0.01)
+    found = live.end_recording()
+    notes = {each.event.key: each.time_s for each in found if isinstance(each.event, NoteOn)}
+    assert list(notes) == [57, 45, 50], "in their order; the last is not due yet"
+    assert notes[50] - notes[45] == pytest.approx(0.05)
+    assert {each.event.key for each in found if isinstance(each.event, NoteOff)} == {45, 50, 57}
+
+
+def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(live: Live, notes: Notes, wait: Wait) -> None:
+    playback = Playback(live.handle, notes, live.cancel)
     bent = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.0, Bend(1.0)), TimedEvent(600.0, NoteOff(45))]
     playback.play(bent)
     wait(lambda: live._player is not None and live._player._hands.of(0).bend == 1.0)

@@ -16,6 +16,7 @@ from app.playing.midi import (
     meaning_of,
 )
 from app.session.choices import Choices
+from app.shared.parameters import OF_CHOICES
 
 REACH = Reach((0.3, 0.7), (1.0, 10.0))
 PRESETS = ["a", "b", "c"]
@@ -42,12 +43,12 @@ def test_a_taught_controller_goes_through_all_of_its_field() -> None:
     choices = MidiChoices()
     for number, field in enumerate(TURNED):
         choices = choices.learned(field, number)
-    for number, (field, turned) in enumerate(TURNED.items()):
-        for value, expected in ((0, turned.low), (127, turned.high)):
+    for number, field in enumerate(TURNED):
+        for value, expected in zip((0, 127), OF_CHOICES[field].limits, strict=True):
             meaning = meaning_of(Controller(number, value), choices, REACH, PRESETS)
             assert meaning == Meaning({field: pytest.approx(expected)})
             Choices(**meaning.changes)  # allowed to the last bit
-    assert TURNED["speed"].value(64) == pytest.approx(0.001**0.5, rel=0.05)
+    assert OF_CHOICES["speed"].value(64 / 127) == pytest.approx(0.001**0.5, rel=0.05)
 
 
 def test_learn_and_forget() -> None:

@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 import torch
 
+from app.audio.devices import AudioDevice
+from app.audio.output import ClockOutput
+from app.audio.sound import Sound
 from app.playing import notes as module
 from app.playing.ahead import LEAST_S
 from app.playing.notes import Note, Notes
@@ -129,14 +132,52 @@ def test_where_the_device_has_no_time_left_notes_end(
     notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf
 ) -> None:
     struck = [notes.strike(stroke_of(bank)) for _ in range(6)]
-    notes.poll()
+    sound.take_care()
     assert notes.ringing == 6
     sound.load = 0.9
-    notes.poll()
+    sound.take_care()
     assert [note.released for note in struck] == [True, True, False, False, False, False]
     for _ in range(6):
-        notes.poll()
+        sound.take_care()
     assert not struck[-1].released, "one always rings"
+
+
+def test_the_more_is_asked_of_the_device_the_more_notes_end_at_once(
+    notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf
+) -> None:
+    struck = [notes.strike(stroke_of(bank)) for _ in range(16)]
+    sound.load = 1.5
+    sound.take_care()
+    assert [note.released for note in struck] == [True] * 8 + [False] * 8
+
+
+def test_notes_end_under_load_while_the_window_hangs(
+    sources: Sources, bank: Path, stroke_of: StrokeOf, wait: Wait
+) -> None:
+    """Nothing but the sound's own thread is at work: nobody polls."""
+
+    class Laden(ClockOutput):
+        device = AudioDevice("Speakers", "ALSA", RATE_HZ)
+
+        def load(self) -> float:
+            return laden
+
+    laden = 0.2
+    with Sound(look_up=lambda *_: Laden.device, open_output=lambda _device, _buffer_s, mixer: Laden(mixer)) as sound:
+        sound.open()
+        wait(lambda: sound.status().changes_done > 0)
+        notes = Notes(sound, sources, lambda message, detail: None)
+        try:
+            struck = [notes.strike(stroke_of(bank)) for _ in range(6)]
+            wait(lambda: sound.status().load == laden)
+            assert notes.ringing == 6
+            laden = 0.9
+            wait(lambda: notes.ringing == 1)
+            wait(lambda: all(note.over for note in struck[:-1]))
+            laden = 0.2
+            assert not struck[-1].over
+        finally:
+            notes.close()
 
 
 def test_stop_ends_all_without_a_click(notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf) -> None:
@@ -337,8 +378,8 @@ def test_a_note_waits_for_its_frame(notes: Notes, sound: Any, bank: Path, stroke
     first.release_at(frame)
     seconds_of(sound.mixer, 0.2)
     assert second.began
-    assert second.began_frame == -(-frame // at.QUANTUM) * at.QUANTUM
-    assert second.began_frame - first.began_frame == pytest.approx(0.2 * RATE_HZ, abs=at.QUANTUM)
+    assert second.began_frame == frame
+    assert second.began_frame - first.began_frame == round(0.2 * RATE_HZ)
     assert first.over
 
 

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 import soundfile
 
+from app.export.choices import ExportChoices
 from app.export.files import SoundRequest, export_sound
 from app.presets.filter import PresetFilter
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
+from app.session.choices import SECONDS_RANGE
 from app.window.dropped_files import receive
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, preset_digest
@@ -138,6 +140,7 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
         "solo": 0,
         "stereo": False,
         "pickup": "displacement",
+        "keys_play": "place",
     }
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
     os.utime(preset_folder / "second.safetensors", ns=(1, 1))
@@ -145,8 +148,24 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     export_sound(replace(request, seconds=0.1, source="difference"), tmp_path / "c.wav")
     dropped = receive(tmp_path / "c.wav", library)
     assert "its duration of 0.1 s" in dropped.notice
+    assert "shown are 0.5 s" in dropped.notice
     assert dropped.choices["seconds"] == 0.5
     assert (dropped.choices["a"], dropped.choices["heard"]) == ("difference", "a")
+
+
+def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
+    library: Library, preset_folder: Path, tmp_path: Path
+) -> None:
+    """As the export dialog writes it: its longest duration, 30 s, is no choice for the window."""
+    export, preset = ExportChoices(), load_preset(preset_folder / "first.safetensors")
+    assert export.until_decayed
+    assert export.longest_s > SECONDS_RANGE[1]
+    request = SoundRequest(preset, Pluck(0.5, 2.0), 0.3, export.longest_s, decay_db=export.decay_db)
+    export_sound(request, tmp_path / "a.wav")
+    dropped = receive(tmp_path / "a.wav", library)
+    assert dropped.notice == ""
+    assert "seconds" not in dropped.choices
+    assert dropped.choices["position"] == 0.5
 
 
 def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render,
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
         every = frames_m(source, take).numpy()
         near = 1e-5 * np.abs(every).max()
-        motion = take.motion(name)
+        motion = take.motions[name]
         assert motion.complete
         np.testing.assert_allclose(motion.read(), every[:: take.stride], atol=near)
         for position_s in (0.0, 0.0613, 0.1871, 0.25):
@@ -177,14 +177,14 @@ def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, 
         slower.ask_again(replace(slower.request, speed=speed))
         slower.advance()
         for name in SOURCES:  # what was shown is, until the other is there
-            motion = slower.take.motion(name)
+            motion = slower.take.motions[name]
             assert motion.strobe_at(0.5 * motion.ready_frames / motion.rate_hz) is not None
     take = finished(slower)
     for name in SOURCES:
         near = 1e-6 * np.abs(there.motion_m(name)).max()
         for position_s in np.linspace(0, take.seconds, 20):
-            expected = there.motion(name).shape_m(position_s)
-            np.testing.assert_allclose(take.motion(name).shape_m(position_s), expected, atol=near)
+            expected = there.motions[name].shape_m(position_s)
+            np.testing.assert_allclose(take.motions[name].shape_m(position_s), expected, atol=near)
 
 
 def test_the_error_that_is_told_is_that_of_every_frame(job: Render, sources: Sources) -> None:

@@ -205,14 +205,14 @@ def test_another_presets_model_moves_beside_it(
     worker.submit(request_of(small_preset, others=(other,)))
     wait_until(lambda: bool(heard.finished))
     (take,) = heard.started
-    wait_until(lambda: take.others["preset:other"].complete)
-    np.testing.assert_array_equal(take.others["preset:other"].read(), take.motion_m("model"))
+    wait_until(lambda: take.motions["preset:other"].complete)
+    np.testing.assert_array_equal(take.motions["preset:other"].read(), take.motion_m("model"))
     wait_until(lambda: take.listened.signals["preset:other"].complete)
     np.testing.assert_array_equal(take.listened.signals["preset:other"].read(), take.listened.signals["model"].read())
     worker.submit(request_of(small_preset, others=(other, broken)))
-    wait_until(lambda: "preset:broken" in take.others and take.others["preset:broken"].complete)
+    wait_until(lambda: "preset:broken" in take.motions and take.motions["preset:broken"].complete)
     assert "broken.safetensors" in heard.others_failed[0]
-    assert not take.others["preset:broken"].read().any()
+    assert not take.motions["preset:broken"].read().any()
     assert not take.listened.signals["preset:broken"].read().any()
     assert heard.started == [take]
     assert len(heard.finished) == 1

@@ -20,6 +20,7 @@ from engine.presets import find_string, read_info
 from engine.presets.finding import SHIPPED
 from engine.presets.of_string import read_string
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 
 @pytest.fixture
@@ -70,13 +71,13 @@ def test_a_difference_of_nothing_or_too_little_is_named(
     take = Take("small", read_info(small_preset), Pluck(), 0.5, heard_ear(choices))
     rest = np.zeros((take.frames, take.info.grid_points), np.float32)
     assert why_difference_silent(choices, take) == ""  # nothing is known yet
-    take.append(rest, rest)
+    append_to(take, rest, rest)
     hear(take, heard_ear(choices))
     assert "are identical" in why_difference_silent(choices, take)
     assert why_difference_silent(choices.model_copy(update={"listen": 0.2}), take) == ""  # of there nothing is known
     for off_m, gain_db, words in ((1e-7, 20, "raise its gain"), (1e-7, 60, ""), (1e-3, 0, "")):
         take = Take("small", take.info, Pluck(), 0.5, heard_ear(choices))
-        take.append(rest + np.float32(off_m), rest)
+        append_to(take, rest + np.float32(off_m), rest)
         hear(take, heard_ear(choices))
         found = why_difference_silent(Choices(difference_gain_db=gain_db), take)
         assert words in found

@@ -11,15 +11,17 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QCheckBox
 from pytestqt.qtbot import QtBot
 
+from app.presets.library import Library
+from app.session.choices import Session
 from app.session.shown import ShownSource
 from app.views import theme
-from app.views.plots.error_plane_view import ErrorPlaneView
-from app.views.plots.error_time_view import ErrorTimeView
 from app.views.plots.plots import recolour
-from app.views.plots.space_time_view import SpaceTimeView
-from app.views.plots.spectrogram_view import SpectrogramView
-from app.views.plots.waveform_view import WaveformView
 from app.views.string.view import StringView
+from app.window.panels.error_plane import ErrorPlanePanel
+from app.window.panels.error_time import ErrorTimePanel
+from app.window.panels.space_time import SpaceTimePanel
+from app.window.panels.spectrogram import SpectrogramPanel
+from app.window.panels.waveform import WaveformPanel
 
 
 @pytest.fixture
@@ -81,14 +83,14 @@ def test_plots_take_on_another_theme_and_come_back(
     qtbot: QtBot, dark_again: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
-    view = WaveformView()
+    view = WaveformPanel(Session(), Library([]))
     qtbot.addWidget(view)
     sources = ("model", "truth", "difference", "preset:other")
     view.set_sources(tuple(ShownSource(source, "A", source, source == "truth") for source in sources))
-    line = view._horizon
+    line = view.plot.horizon
     faint = view._curves["model"].opts["pen"].color().alpha()
     stranger = pg.PlotDataItem(pen=pg.mkPen("#123456"))
-    view.addItem(stranger)
+    view.plot.addItem(stranger)
     for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
         theme.use(new)
         recolour(old, new)
@@ -98,17 +100,21 @@ def test_plots_take_on_another_theme_and_come_back(
             alpha = 255 if colour == new.truth else faint
             assert curve.opts["pen"].color() == theme.translucent(colour, alpha)
         assert line.pen.color() == QColor(new.warning)
-        assert view._horizon.label.color == QColor(new.warning)
-        assert view._horizon.label.fill.color() == theme.translucent(new.panel, 170)
-        assert view._untrained.brush.color() == theme.translucent(new.warning, 18)
-        assert view.backgroundBrush().color() == QColor(new.panel)
-        assert view.getPlotItem().getAxis("left").textPen().color() == QColor(new.faint)
+        assert view.plot.horizon.label.color == QColor(new.warning)
+        assert view.plot.horizon.label.fill.color() == theme.translucent(new.panel, 170)
+        assert view.plot._untrained.brush.color() == theme.translucent(new.warning, 18)
+        assert view.plot.backgroundBrush().color() == QColor(new.panel)
+        assert view.plot.getPlotItem().getAxis("left").textPen().color() == QColor(new.faint)
         assert stranger.opts["pen"].color() == QColor("#123456")
 
 
 def test_pictures_lie_on_the_ground_of_the_theme(qtbot: QtBot, dark_again: None) -> None:
     """What is nothing is as light, or as dark, as the panel; what is much is not."""
-    spectrogram, space_time, plane = SpectrogramView(), SpaceTimeView(), ErrorPlaneView()
+    spectrogram, space_time, plane = (
+        SpectrogramPanel(Session(), Library([])),
+        SpaceTimePanel(Session(), Library([])),
+        ErrorPlanePanel(Session(), Library([])),
+    )
     for widget in (spectrogram, space_time, plane):
         qtbot.addWidget(widget)
     for chosen in (theme.LIGHT, theme.DARK):
@@ -126,7 +132,7 @@ def test_the_errors_legend_has_the_colours_of_its_curves(
     qtbot: QtBot, dark_again: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(pg.CONFIG_OPTIONS, "foreground", theme.FAINT)
-    view = ErrorTimeView()
+    view = ErrorTimePanel(Session(), Library([]))
     qtbot.addWidget(view)
     for old, new in ((theme.DARK, theme.LIGHT), (theme.LIGHT, theme.DARK)):
         theme.use(new)

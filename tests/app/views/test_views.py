@@ -7,11 +7,18 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.analysis.string_frame import StringFrame
-from app.views.controls.knob import KnobRange
-from app.views.plots.spectrum_view import COLUMNS, Analyser, SpectrumView
-from app.views.plots.waveform_view import WaveformView, extremes
+from app.presets.library import Library
+from app.session.choices import Session
+from app.shared.parameters import PARAMETERS
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
+from app.window.panels.spectrum import COLUMNS, Analyser, SpectrumPanel
+from app.window.panels.waveform import WaveformPanel, extremes
+
+
+def nothing() -> tuple[Session, Library]:
+    """What a panel is made of."""
+    return Session(), Library([])
 
 
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 48_000])
@@ -47,12 +54,13 @@ def test_strokes_of_a_steep_flank_have_no_gaps_between_them() -> None:
 
 
 def test_a_period_of_a_few_pixels_does_not_beat_with_them(qtbot: QtBot) -> None:
-    view = WaveformView()
+    view = WaveformPanel(*nothing())
     qtbot.addWidget(view)
     view.resize(600, 240)
     view.show()
-    period_s = 2.1 / view.columns
-    view.set_take(1.0, 0.25, period_s)
+    period_s = 2.1 / view.plot.columns
+    view.plot.set_times(1.0, 0.25)
+    view._period_s = period_s
     view.show_signal("model", np.sin(np.arange(48_000) / (48_000 * period_s) * 2 * np.pi).astype(np.float32), 48_000)
     values = view._curves["model"].getData()[1]
     assert values[2:-2:2] == pytest.approx(-1, abs=0.01)
@@ -62,22 +70,22 @@ def test_a_period_of_a_few_pixels_does_not_beat_with_them(qtbot: QtBot) -> None:
 def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_where_it_has_few(
     qtbot: QtBot,
 ) -> None:
-    view = WaveformView()
+    view = WaveformPanel(*nothing())
     qtbot.addWidget(view)
     view.resize(600, 240)
     view.show()
-    view.set_take(1.0, 0.25)
+    view.plot.set_times(1.0, 0.25)
     signal = np.sin(np.arange(48_000, dtype=np.float32))
     view.show_signal("model", signal, 48_000)
     curve = view._curves["model"]
-    assert len(curve.getData()[0]) == 2 * view.columns
+    assert len(curve.getData()[0]) == 2 * view.plot.columns
     assert (curve.opts["connect"], curve.opts["antialias"]) == ("pairs", False)
     view.show_signal("model", signal[:24_000], 48_000)  # rendered half-way: half of the columns
     time_s = curve.getData()[0]
-    assert len(time_s) == pytest.approx(view.columns, abs=2)
-    pixels = np.diff(time_s[0::2]) * view.columns
+    assert len(time_s) == pytest.approx(view.plot.columns, abs=2)
+    pixels = np.diff(time_s[0::2]) * view.plot.columns
     assert pixels == pytest.approx(1), "no stroke beside the next pixel"
-    view.getPlotItem().setXRange(0.1, 0.102, padding=0)
+    view.plot.getPlotItem().setXRange(0.1, 0.102, padding=0)
     view.show_signal("model", signal, 48_000)
     assert (curve.opts["connect"], curve.opts["antialias"]) == ("all", True)
     assert len(curve.getData()[0]) == pytest.approx(96, abs=3)
@@ -85,17 +93,18 @@ def test_a_waveform_is_strokes_where_a_pixel_has_many_samples_and_a_smooth_line_
     assert curve.getData()[0] is None or len(curve.getData()[0]) == 0
 
 
-@pytest.mark.parametrize(
-    "limits",
-    [KnobRange(0, 20, 4, 0.25), KnobRange(0.001, 1, 0.004, 1.25, logarithmic=True), KnobRange(-60, 12, 0, 1.0)],
-)
-def test_a_knob_goes_from_end_to_end(limits: KnobRange) -> None:
+@pytest.mark.parametrize("id", PARAMETERS)
+def test_a_parameter_goes_from_end_to_end(id: str) -> None:
+    parameter = PARAMETERS[id]
+    low, high = parameter.limits
     for share in (0, 0.3, 1):
-        assert limits.share(limits.value(share)) == pytest.approx(share)
-    assert limits.value(-1) == pytest.approx(limits.low)
-    assert limits.value(2) == pytest.approx(limits.high)
-    assert limits.stepped(limits.high, 5) == limits.high
-    assert limits.stepped(limits.stepped(limits.default, 1), -1) == pytest.approx(limits.default)
+        assert parameter.share(parameter.value(share)) == pytest.approx(share)
+    assert parameter.value(-1) == pytest.approx(low)
+    assert parameter.value(2) == pytest.approx(high)
+    assert parameter.stepped(high, 5) == high
+    step = parameter.stepped(parameter.default, -1)
+    assert parameter.default == low or step < parameter.default
+    assert parameter.default == low or parameter.stepped(step, 1) == pytest.approx(parameter.default)
 
 
 def test_the_string_view_zooms_with_the_decay(qtbot: QtBot) -> None:
@@ -127,13 +136,13 @@ def test_the_axis_of_the_string_follows_the_pluck_at_rest(qtbot: QtBot) -> None:
 
 def test_animated_plots_survive(qtbot: QtBot) -> None:
     """Some pairs of PySide6 and pyqtgraph abort within seconds of this ("deallocating None")."""
-    spectrum, waveform, string = SpectrumView(), WaveformView(), StringView()
+    spectrum, waveform, string = SpectrumPanel(*nothing()), WaveformPanel(*nothing()), StringView()
     for view in (spectrum, waveform, string):
         qtbot.addWidget(view)
         view.resize(600, 240)
         view.show()
     spectrum.set_rate(16_000)
-    waveform.set_take(1.0, 0.25)
+    waveform.plot.set_times(1.0, 0.25)
     random = np.random.default_rng(0)
     for frame in range(300):
         noise = {name: random.standard_normal(16_000).astype(np.float32) for name in ("model", "truth")}
@@ -141,7 +150,7 @@ def test_animated_plots_survive(qtbot: QtBot) -> None:
             for name, signal in noise.items():
                 spectrum.show_signal(name, signal, Analyser(16_000))
                 waveform.show_signal(name, signal, 16_000)
-        waveform.show_playhead(frame / 300)
+        waveform.plot.show_playhead(frame / 300)
         shapes = {name: signal[:101] for name, signal in noise.items()}
         string.show_frame(StringFrame(shapes, shapes, shapes))
         qtbot.wait(1)
@@ -151,12 +160,13 @@ def test_animated_plots_survive(qtbot: QtBot) -> None:
 def test_a_click_on_the_waveform_asks_to_seek(qtbot: QtBot) -> None:
     from PySide6.QtCore import Qt
 
-    view = WaveformView()
+    view = WaveformPanel(*nothing())
     qtbot.addWidget(view)
     view.resize(600, 240)
-    view.set_take(2.0, 0.25)
+    view.plot.set_times(2.0, 0.25)
     with qtbot.waitExposed(view):
         view.show()
     with qtbot.waitSignal(view.seek_asked) as asked:
-        qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=view.viewport().rect().center())
+        viewport = view.plot.viewport()
+        qtbot.mouseClick(viewport, Qt.MouseButton.LeftButton, pos=viewport.rect().center())
     assert 0.7 < asked.args[0] < 1.3

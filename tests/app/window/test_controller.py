@@ -28,7 +28,7 @@ LEFT = Qt.MouseButton.LeftButton
 
 def view(controller: Controller, key: str) -> Any:
     """The view of a panel."""
-    return next(panel.view for panel in controller.panels if panel.key == key)
+    return next(getattr(panel, "view", panel) for panel in controller.panels if panel.key == key)
 
 
 def notes(controller: Controller) -> list[Note]:
@@ -479,7 +479,7 @@ def test_what_a_slot_holds_is_drawn_and_named(qtbot: QtBot, controller: Controll
     wait_for_take(qtbot, controller)
     session.update(a="preset:second", heard="a")
     title = controller.library.find("second").info.title
-    qtbot.waitUntil(lambda: controller.performance.take.others != {})
+    qtbot.waitUntil(lambda: controller.performance.take.motions.keys() > {"model", "truth"})
     qtbot.waitUntil(lambda: views[1]._curves["preset:second"].getData()[0] is not None)
     assert views[1].legend.text == f"A  {title} · heard   B  difference +20 dB"
     controller.play_or_stop()

@@ -12,10 +12,13 @@ from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from pytestqt.qtbot import QtBot
 
+from app.export.files import SoundRequest, export_sound
 from app.instrument.bodies import own_bodies
 from app.patches.tuning import Tuning
 from app.window.controller import Controller
 from engine.effects import Effects
+from engine.pluck import Pluck
+from engine.presets import load_preset
 
 FIVE = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
 FIVE_KEYS = "5\n0\n127\n60\n69\n440\n5\n" + "".join(f"{n}\n" for n in range(5))
@@ -167,3 +170,20 @@ def test_a_body_that_comes_back_is_heard_again(
     drop(patched, tmp_path / "knock.wav")
     qtbot.waitUntil(is_knock)
     assert patched.session.choices == chosen
+
+
+def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pick_up(
+    played: Controller, tmp_path: Path
+) -> None:
+    """The patch is heard in stereo, the recipe in mono; both are of the model of many strings."""
+    before, entry = played.session.choices, played.entry
+    assert before.patch is not None and before.keys_play == "pitch" and before.stereo and entry is not None
+    assert entry.name == before.patch.preset
+    export_sound(SoundRequest(load_preset(entry.path), Pluck(0.3, 2.0), 0.22, 0.6), tmp_path / "a.wav")
+    drop(played, tmp_path / "a.wav")
+    choices = played.session.choices
+    assert (choices.pluck.position, choices.listen, choices.stereo) == (0.3, 0.22, False)
+    assert choices.patch == before.patch
+    played.session.update(keys_play="pitch")
+    choices = played.session.choices
+    assert (choices.stereo, choices.listen, choices.patch) == (True, before.listen, before.patch)

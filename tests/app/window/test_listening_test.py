@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.analysis.abx.choices import AbxChoices
+from app.analysis.abx.trials import AbxChoices
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound

@@ -126,7 +126,7 @@ def test_enter_presses_what_tab_went_to_and_plucks_otherwise(qtbot: QtBot, contr
     qtbot.waitUntil(box.view().isVisible)
     box.hidePopup()
     assert not plucked
-    window.right.currentWidget().setFocus()  # as by a click
+    window.right.currentWidget().plot.setFocus()  # type: ignore[attr-defined]  # as by a click
     loop.setFocus()
     qtbot.keyClick(loop, Qt.Key.Key_Return)
     assert plucked
@@ -159,7 +159,7 @@ def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
 def test_the_plot_that_has_the_keyboard_is_ringed(qtbot: QtBot, controller: Controller) -> None:
     window = controller.window
     (ring,) = window.findChildren(FocusRing)
-    plot = window.right.currentWidget()
+    plot = window.right.currentWidget().plot  # type: ignore[attr-defined]
     plot.setFocus()
     qtbot.waitUntil(ring.isVisible)
     assert ring.geometry().size() == plot.size()
@@ -181,7 +181,7 @@ def themed(qapp: QApplication) -> Iterator[None]:
 @pytest.mark.usefixtures("themed")
 def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controller) -> None:
     window = controller.window
-    window.notices.tell("A fault in words that are long enough for two lines where the window is narrow. " * 2)
+    window.notices.tell(LONG)
     middle = window.centralWidget()
     for size in (QSize(1024, 560), QSize(820, 490)):
         window.resize(size)
@@ -282,27 +282,123 @@ def test_the_instrument_is_folded_away_and_comes_back(qtbot: QtBot, alive: MainW
     assert not alive.instrument.isVisible()
 
 
-def test_in_a_low_window_the_views_make_room_for_the_instrument(alive: MainWindow) -> None:
-    def seen() -> tuple[bool, ...]:
-        parts = (alive.left, alive.instrument.keys, alive.instrument.bar, alive.instrument.knobs)
-        return tuple(part.isVisible() for part in parts)
-
+def test_in_a_low_window_the_knobs_take_the_place_of_the_keys_and_the_views_go_last(alive: MainWindow) -> None:
+    parts = (alive.left, alive._facts, alive.instrument.keys, alive.instrument.bar, alive.instrument.knobs)
     alive.instrument.set_unfolded(True)
-    for height, parts in (
-        (830, (True, True, True, True)),
-        (700, (False, True, True, True)),
-        (600, (False, True, True, False)),
-        (500, (False, True, False, False)),
+    for height, seen in (
+        (800, (True, True, True, True, True)),
+        (720, (True, True, False, True, True)),
+        (640, (True, True, False, True, True)),  # of 720 with a title bar and a task bar
+        (600, (False, True, False, True, True)),
+        (500, (False, False, False, True, True)),
     ):
-        alive.resize(1000, height)
-        assert seen() == parts, height
+        alive.resize(1280, height)
+        assert tuple(part.isVisible() for part in parts) == seen, height
+    alive.show_solo(3)
+    for height in (500, 700, 500):
+        alive.resize(1280, height)
+        assert alive._solo.isVisible(), "with the preset's facts, or without"
+    alive.show_solo(0)
+    alive.resize(1280, 700)
+    assert not alive._solo.isVisible()
     alive.show_instrument(False)
     assert alive.left.isVisible()
-    alive.show_instrument(True)
-    alive.instrument.set_unfolded(False)
-    alive.resize(1000, 680)  # of 720 with a title bar
-    assert seen() == (True, True, True, False)
-    alive.notices.inform("It takes a line.")
-    assert seen() == (False, True, True, False)
-    alive.notices.hide()
-    assert seen() == (True, True, True, False)
+
+
+LONG = "A fault in words that are long enough for two lines where the window is narrow. " * 2
+
+
+def heights(window: MainWindow) -> list[int]:
+    return [part.height() for part in (window._string, window.left, window.right, window.transport)]
+
+
+@pytest.mark.usefixtures("themed")
+@pytest.mark.parametrize("size", [(1280, 720), (1280, 800), (1920, 1080), (1280, 640), (1000, 640)])
+def test_neither_a_notice_nor_the_knobs_of_the_string_remove_the_views(
+    qtbot: QtBot, controller: Controller, size: tuple[int, int]
+) -> None:
+    window, middle = controller.window, controller.window.centralWidget()
+    window.resize(*size)
+    window.notices.hide()
+    qtbot.wait(50)
+    bare = heights(window)
+    window.notices.tell(LONG)
+    qtbot.wait(50)
+    assert heights(window) == bare, "it lies over the window"
+    window.instrument.set_unfolded(True)
+    qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
+    assert window.instrument.knobs.isVisible()
+    for view, least in (
+        (window._string, window._string.minimumHeight()),
+        (window.left, window.left.minimumSizeHint().height()),
+        (window.right, window.right.minimumSizeHint().height()),
+    ):
+        assert view.isVisible()
+        assert view.height() >= least > 0
+    if not window.instrument.keys.isVisible():
+        assert heights(window) == bare
+
+
+@pytest.mark.usefixtures("themed")
+@pytest.mark.parametrize("height", [480, 533])  # of 1280 × 720 and 1280 × 800 at 150 %
+def test_the_knobs_of_the_string_work_at_150_percent(qtbot: QtBot, played: Controller, height: int) -> None:
+    window, strip = played.window, played.window.instrument
+    middle = window.centralWidget()
+    window.notices.tell(LONG)
+    window.resize(853, height)
+    for part in (strip.bar, strip.keys):
+        qtbot.waitUntil(part.isVisible)
+    qtbot.mouseClick(strip._fold, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
+    assert window._string.height() >= window._string.minimumHeight()
+    knob = strip.knobs.knobs["pickup.points.0"]  # one of the last
+    tab_to(qtbot, window, knob)
+    qtbot.waitUntil(lambda: knob.visibleRegion().boundingRect().size() == knob.size())
+    patch = played.session.choices.patch
+    qtbot.keyClick(knob, Qt.Key.Key_Up)
+    changed = played.session.choices.patch
+    assert patch is not None and changed is not None
+    assert changed.pickup.points[0] == pytest.approx(patch.pickup.points[0] + 0.01)
+    qtbot.mouseClick(strip._choice.findChildren(QAbstractButton)[0], Qt.MouseButton.LeftButton)
+    assert strip.keys.isVisible()
+
+
+@pytest.mark.usefixtures("themed")
+def test_a_notice_is_read_whole_over_the_window_and_dismissed_by_keys(qtbot: QtBot, controller: Controller) -> None:
+    window, notices = controller.window, controller.window.notices
+    for width in (1280, 853):
+        window.resize(width, 700)
+        for text in ("Saved.", LONG * 3):
+            notices.tell(text)
+            label = notices._label
+            qtbot.waitUntil(lambda label=label: label.height() >= label.heightForWidth(label.width()))
+            qtbot.waitUntil(lambda: window.presets.geometry().bottom() < notices.geometry().top())
+            place = notices.geometry()
+            assert 0 < place.left() < place.right() < width
+            assert notices.visibleRegion().boundingRect().size() == notices.size()
+    (dismiss,) = (each for each in notices.findChildren(QAbstractButton) if each.text() == "Dismiss")
+    tab_to(qtbot, window, dismiss)
+    qtbot.keyClick(dismiss, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: not notices.isVisible())
+    qtbot.keyClick(window, Qt.Key.Key_F8)
+    assert notices._list is not None
+    assert notices._list._list.count() == len(notices.notices)
+    notices._list.close()
+
+
+@pytest.mark.usefixtures("themed")
+@pytest.mark.parametrize("size", [(853, 480), (1280, 720), (1280, 800)])
+def test_a_browser_covers_a_notice_below_the_header_and_has_room_for_a_search(
+    qtbot: QtBot, controller: Controller, size: tuple[int, int]
+) -> None:
+    window = controller.window
+    window.resize(*size)
+    window.notices.tell(LONG)
+    for desk in (controller.presets, controller.patches):
+        desk.toggle()
+        browser = desk.browser
+        qtbot.waitUntil(lambda: window.presets.geometry().bottom() < window.notices.y())
+        qtbot.waitUntil(lambda browser=browser: browser.y() == window.notices.y())
+        qtbot.waitUntil(lambda browser=browser: browser.layout().minimumSize().width() <= browser.width())
+        assert browser.search.width() >= browser.search.minimumWidth() > 100
+        desk.toggle()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QInputDialog
+from PySide6.QtWidgets import QInputDialog, QToolTip
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
@@ -61,6 +61,31 @@ def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_K)
     assert played.performance.live.sounding().keys() == {72}
     qtbot.keyRelease(played.window, Qt.Key.Key_K)
+
+
+def test_octave_keys_stop_where_no_key_sounds_and_the_strip_says_so(qtbot: QtBot, played: Controller) -> None:
+    played.patches.choose("toy_wires")  # C3 to D♯6
+    for key, octave, words in ((Qt.Key.Key_Z, -1, "Lowest"), (Qt.Key.Key_X, 3, "Highest")):
+        QToolTip.hideText()
+        for _ in range(6):
+            press(qtbot, played, key)
+        assert played.session.choices.octave == octave
+        assert QToolTip.text() == f"{words} octave: Toy wires has C3 to D♯6"
+    assert played.window.instrument.bar.octave.text() == "from C6"
+    press(qtbot, played, Qt.Key.Key_A)
+    assert played.performance.live.sounding().keys() == {84}
+    played.window.instrument.bar.octave_asked.emit(1)
+    assert played.session.choices.octave == 3
+
+
+def test_the_octave_moves_into_the_range_of_another_instrument(qtbot: QtBot, played: Controller) -> None:
+    played.session.update(octave=2)  # C5 to F6
+    played.patches.choose("slack_bass")
+    assert played.session.choices.octave == 0
+    assert QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
+    assert played.window.instrument.bar.octave.text() == "from C3"
+    played.patches.choose("concert_harp")
+    assert played.session.choices.octave == 0, "keys sound there"
 
 
 def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller) -> None:
@@ -154,6 +179,37 @@ def test_a_patch_is_saved_renamed_and_deleted(played: Controller, monkeypatch: p
     assert not list(own_patches().glob("*.json"))
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
     assert "yours" not in played.patches.favourites
+
+
+def test_typing_after_an_arrow_searches_and_plays_no_key(qtbot: QtBot, played: Controller) -> None:
+    pressed: list[object] = []
+    played.instruments._keys.pressed.connect(pressed.append)
+    qtbot.waitUntil(played.window.isActiveWindow)
+    played.patches.toggle()
+    browser = played.patches.browser
+    qtbot.keyClick(browser.search, Qt.Key.Key_Down)
+    qtbot.waitUntil(browser.list.hasFocus)
+    for letter in "harp":
+        qtbot.keyClick(played.window.focusWidget(), letter)
+    assert browser.search.text() == "harp"
+    played.window.instrument.keys.setFocus()  # as by a click on a key, which the browser leaves in sight
+    for letter in "ab":
+        qtbot.keyClick(played.window.focusWidget(), letter)
+    assert browser.search.text() == "harpab"
+    assert played.session.choices.heard == "a", "B is a shortcut of the window"
+    assert pressed == []
+
+
+def test_an_old_search_does_not_hide_what_was_just_saved(played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    browser = played.patches.browser
+    for name, do in (("Mine", played.patches.save), ("Yours", played.patches.rename)):
+        browser.search.setText("harpsichord")
+        monkeypatch.setattr(QInputDialog, "getText", lambda *args, name=name, **words: (name, True))
+        do()
+        assert name.lower() in browser.listed
+        played.patches.toggle()
+        assert (browser.search.text(), browser.selected, browser._title.text()) == ("", name.lower(), name)
+        played.patches.toggle()
 
 
 def test_an_impossible_name_is_explained_and_asked_for_again(

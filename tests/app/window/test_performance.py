@@ -254,16 +254,16 @@ def test_another_listening_point_and_speed_are_of_the_same_take(
     for choices in ({"listen": 0.8}, {"pickup": "velocity", "stereo": True}, {"solo": 2}, {"speed": 0.1}):
         session.update(**choices)
         qtbot.waitUntil(lambda: take.listened.ear == heard_ear(session.choices) and take.listened.complete)
-    qtbot.waitUntil(lambda: take.motion("model").flashes.strobe.speed == 0.1)
+    qtbot.waitUntil(lambda: take.motions["model"].flashes.strobe.speed == 0.1)
     performance.seek(0.3)
     string = next(panel.view for panel in window.panels if panel.key == "string")
-    shape_m = take.motion("model").shape_m(0.3)
+    shape_m = take.motions["model"].shape_m(0.3)
     qtbot.waitUntil(
         lambda: string._frame is not None and abs(string._frame.shapes["model"] / 1000 - shape_m).max() < 1e-9
     )
     session.update(speed=0.37)
-    qtbot.waitUntil(lambda: take.motion("model").flashes.strobe.speed == 0.37)
-    other_m = take.motion("model").shape_m(0.3)
+    qtbot.waitUntil(lambda: take.motions["model"].flashes.strobe.speed == 0.37)
+    other_m = take.motions["model"].shape_m(0.3)
     assert abs(other_m - shape_m).max() > 1e-5
     qtbot.waitUntil(lambda: abs(string._frame.shapes["model"] / 1000 - other_m).max() < 1e-9)
     assert performance.take is take

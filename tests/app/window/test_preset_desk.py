@@ -88,7 +88,7 @@ def test_typing_filters_and_what_was_chosen_stays(
     assert browser.search.text() == "sec"
     assert listed(browser) == ["second"]
     assert controller.session.choices.preset == "first"
-    assert browser._card.text().startswith("The chosen preset is not in this list")
+    assert "File</td><td style='padding: 3px 0'>second, " in browser._card.text(), "the card is that of the hit"
     qtbot.keyClicks(browser.search, "x")
     assert listed(browser) == []
     assert "No matching preset" in browser._card.text()
@@ -152,12 +152,48 @@ def test_a_search_without_a_find_ends_with_the_browser(
     assert controller.session.choices.preset == "second"
 
 
-def test_the_marked_row_is_the_chosen_preset(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+def test_the_marked_row_is_the_chosen_preset_or_the_first_hit(controller: Controller, browser: PresetBrowser) -> None:
     controller.session.update(preset="second")
-    for words, marked in (("first", []), ("", ["second"]), ("zzz", []), ("", ["second"])):
+    for words, marked in (("first", ["first"]), ("", ["second"]), ("zzz", []), ("", ["second"])):
         browser.search.setText(words)
         rows = browser.list.selectionModel().selectedRows()
         assert [listed(browser)[row.row()] for row in rows] == marked
+
+
+def test_the_card_and_the_keys_are_those_of_the_first_hit(
+    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+) -> None:
+    browser.search.setText("second")
+    assert "File</td><td style='padding: 3px 0'>second, " in browser._card.text()
+    with qtbot.waitSignal(browser.favourite_asked) as asked:
+        qtbot.keyClick(browser.list, KEY.Key_D, CONTROL)
+    assert asked.args == ["second"]
+    assert controller.session.choices.preset == "first"
+    qtbot.keyClick(browser.list, KEY.Key_Space)
+    assert controller.session.choices.preset == "second"
+    qtbot.waitUntil(lambda: controller.performance.playing)
+
+
+def test_a_click_loads_the_first_hit(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+    browser.search.setText("second")
+    place = browser.list.visualItemRect(browser._rows[0]).center()
+    qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert controller.session.choices.preset == "second"
+
+
+def test_an_old_search_does_not_hide_what_was_just_added(
+    controller: Controller, preset_folder: Path, small_preset: Path
+) -> None:
+    browser = controller.presets.browser
+    browser.search.setText("second")
+    shutil.copy(small_preset, preset_folder / "third.safetensors")
+    controller.presets.toggle()
+    assert browser.search.text() == ""
+    assert "third" in listed(browser)
+    browser.search.setText("second")
+    controller.presets.toggle()
+    controller.presets.toggle()
+    assert browser.search.text() == "second", "nothing was added since"
 
 
 def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -> None:
@@ -275,7 +311,7 @@ def drop(controller: Controller, *files: Path) -> None:
 
 def test_a_file_over_any_view_reaches_the_window(controller: Controller) -> None:
     window = controller.window
-    for view in (panel.view for panel in controller.panels):
+    for view in controller.panels:
         under = view.childAt(view.rect().center()) or view
         while under is not window:
             assert not under.acceptDrops(), under

@@ -22,6 +22,7 @@ LONGEST_RELEASE_S = 0.4
 AUDIBLE_DB = -90.0  # relative to full scale
 TONE_DB = 20.0  # by which a tone of a chord must exceed the spectrum a quarter tone beside it
 STRIKE_S = 0.03  # of sound before and after a strike, whose levels are compared
+STRUCK_S = (0.015, 0.115)  # after a strike that stops its string: the sound whose level is that of the strike
 
 Sound = NDArray[np.float32]
 
@@ -80,6 +81,11 @@ def change_db(sound: Sound, strike_s: float) -> float:
     before = _power(_part(sound, strike_s - STRIKE_S - 0.002, strike_s - 0.002))
     after = _power(_part(sound, strike_s + 0.002, strike_s + 0.002 + STRIKE_S))
     return float(10 * np.log10(after / before))
+
+
+def struck_db(sound: Sound, strike_s: float) -> float:
+    """Level of a strike that stops its string, in dB relative to full scale."""
+    return float(10 * np.log10(_power(_part(sound, *(strike_s + each for each in STRUCK_S)))))
 
 
 def levels_db(sound: Sound, begins_s: float, ends_s: float) -> NDArray[np.float64]:

@@ -41,7 +41,8 @@ class Judgement:
         repeats, repeats_heard: of a key that is struck twelve times per second.
         pedal_db: the largest difference in level of a note held by a finger and the same held by the pedal.
         pedal_t60_s: of the damper when the pedal is released.
-        restrike_db: the largest fall of the level at a soft strike of a string that rings loudly.
+        restrike_db: of soft strikes of a string that rings loudly. Where a strike stops its string, from the softest
+            to the loudest, for each sounds by itself; where it does not, the largest fall of the level.
         holes, fades, clicks: in all that was played, see `analysis`; times in s from the beginning of the recording.
         loudest: the largest sample, ±1 being full scale.
     """
@@ -58,7 +59,7 @@ class Judgement:
     repeats_heard: int
     pedal_db: float | None = field(metadata=target(0))
     pedal_t60_s: float | None
-    restrike_db: float | None
+    restrike_db: float | None = field(metadata=target(0))
     holes: int = field(metadata=target(0))
     holes_ms: float = field(metadata=target(0))
     fades: int = field(metadata=target(0))
@@ -93,7 +94,7 @@ def judge(played: Played, patch: Patch, sound: Sound, at: At) -> Judgement:
     ]
     pedal_db = pedal_t60_s = restrike_db = None
     if "pedal" in played:
-        pedal_db, pedal_t60_s, restrike_db = _pedal(played["pedal"], sound, at)
+        pedal_db, pedal_t60_s, restrike_db = _pedal(played["pedal"], patch, sound, at)
     return Judgement(
         _worst(cents),
         _worst(cents_of(*tone) for tone in tones),
@@ -187,7 +188,7 @@ def _bends(
     return _worst(found)
 
 
-def _pedal(part: Sequence[TimedEvent], sound: Sound, at: At) -> tuple[float, float, float]:
+def _pedal(part: Sequence[TimedEvent], patch: Patch, sound: Sound, at: At) -> tuple[float, float, float]:
     """`pedal_db`, `pedal_t60_s` and `restrike_db` of a `Judgement`."""
     notes = score.sounded(part)
     finger, pedalled = (note for note in notes if note.key == score.PEDALLED)
@@ -196,6 +197,9 @@ def _pedal(part: Sequence[TimedEvent], sound: Sound, at: At) -> tuple[float, flo
     apart_db = float(np.abs(levels[0][:frames] - levels[1][:frames]).max())
     end_s = at(pedalled.damped_s)
     release_s = hearing.release_t60_s(sound, end_s, hearing.slope_db_s(sound, end_s - 0.5, end_s))
-    soft = [note for note in notes if note.key == score.RESTRUCK and note.velocity == score.QUIET]
-    fall_db = -min(hearing.change_db(sound, at(note.pressed_s)) for note in soft)
+    soft = [at(note.pressed_s) for note in notes if note.key == score.RESTRUCK and note.velocity == score.QUIET]
+    if patch.pluck.stops:
+        struck_db = [hearing.struck_db(sound, strike_s) for strike_s in soft]
+        return apart_db, release_s, max(struck_db) - min(struck_db)
+    fall_db = -min(hearing.change_db(sound, strike_s) for strike_s in soft)
     return apart_db, release_s, max(fall_db, 0.0)

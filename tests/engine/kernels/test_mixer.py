@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout as at
 from engine.kernels.limiter import BELIEVED
-from engine.kernels.mixer import TONE_FADE, TONE_HZ, TONE_LEVEL, UNDERFLOW, call
+from engine.kernels.mixer import TONE_HZ, TONE_LEVEL, UNDERFLOW, call
 from engine.voices import Mixer, Voice, plain_program
 from engine.voices.mixer import VOLUME_SMOOTHING_S
 
@@ -119,14 +119,16 @@ def test_other_channels_are_silent() -> None:
     assert not found[:, 2:].any()
 
 
+@pytest.mark.parametrize("rate_hz", [44_100, 48_000, 192_000])
 @pytest.mark.parametrize(("side", "sounds"), [("left", (1, 0)), ("right", (0, 1)), ("both", (1, 1))])
-def test_the_tone_sounds_on_its_side_for_a_second(side: str, sounds: tuple[int, int]) -> None:
-    mixer = Mixer(RATE_HZ, limited=False)
+def test_the_tone_sounds_on_its_side_for_a_second(side: str, sounds: tuple[int, int], rate_hz: int) -> None:
+    """Its fades last 20 ms at any rate."""
+    mixer = Mixer(rate_hz, limited=False)
     mixer.sound_tone(side)
-    found = mixer.render(RATE_HZ + 1000)
-    frame = np.arange(RATE_HZ + 1000)
-    envelope = np.clip(np.minimum(frame, RATE_HZ - frame) / TONE_FADE, 0, 1)
-    tone = TONE_LEVEL * envelope * np.sin(2 * np.pi * TONE_HZ * frame / RATE_HZ)
+    found = mixer.render(rate_hz + 1000)
+    frame = np.arange(rate_hz + 1000)
+    envelope = np.clip(np.minimum(frame, rate_hz - frame) / (0.02 * rate_hz), 0, 1)
+    tone = TONE_LEVEL * envelope * np.sin(2 * np.pi * TONE_HZ * frame / rate_hz)
     np.testing.assert_allclose(found, tone[:, None] * sounds, atol=1e-6)
 
 

@@ -10,10 +10,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from engine.kernels import layout, tension
+from engine.kernels.modes import row
+from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import Preset, PresetInfo, of_string
 from engine.sources import ModelSource, TruthSource
-from engine.voices import Ear, Voice, bank_program
+from engine.truth import ModalState, SplittingSolver
+from engine.voices import Ear, Mixer, Voice, bank_program
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]
@@ -46,6 +50,73 @@ def test_a_voice_is_the_model_and_the_string(
         expected = torch.cat([(let_go_m @ weights)[None], frames_m[0].double()]).numpy() / FULL_SCALE_M
         hard = nodes > 2 and isinstance(source, TruthSource)
         assert relative(found, expected) < (1e-3 if hard else 1e-5)
+
+
+def ringing(info: PresetInfo, frames: int) -> tuple[Tensor, Tensor]:
+    """The preset's string so long after a pluck that raises its tension by a half, in m and m/s, (modes,)."""
+    amplitudes = info.resonator.to_modes(Pluck(0.3, 1.0, "triangular").displacement(info.grid_points))
+    amplitudes = amplitudes * (0.5 / info.resonator.relative_tension_rise(amplitudes)).sqrt()
+    solver = SplittingSolver(info.resonator, info.rate_hz)
+    _, state = solver.advance(ModalState.at_rest(amplitudes[None]), frames)
+    return state.amplitude[0], state.velocity[0]
+
+
+def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string(
+    shipped: Callable[[str], Preset], rung: Rung
+) -> None:
+    preset = of_string(shipped("studio_any_string"), rate_hz=48_000)
+    info, model = preset.info, preset.model
+    assert isinstance(model, KoopmanTension)
+    q, v = ringing(info, 301)
+    program = bank_program(model, info, 48_000)
+    assert program is not None
+    shape_m = info.resonator.to_grid(q)
+    found = rung(48_000, Voice(program, shape_m, STEREO, begin=(q.numpy(), v.numpy())), attack=False)
+    points = info.resonator.shapes @ STEREO.weights(info.grid_points)
+    steps = len(found) - 1
+    true, _ = SplittingSolver(info.resonator, 48_000).advance(ModalState(q[None], v[None]), steps)
+    encoded = model.encode(*(info.resonator.to_grid(each)[None] / info.scale_m for each in (q, v / 48_000)))
+    for amplitudes in (model.amplitudes(encoded, steps) * info.scale_m, true):
+        expected = torch.cat([(q @ points)[None], amplitudes[0] @ points]).numpy() / FULL_SCALE_M
+        assert relative(found, expected) < 1e-5
+
+
+def test_what_is_set_out_comes_back(shipped: Callable[[str], Preset]) -> None:
+    """Also where all modes swing alike, which no pluck does, and raise the tension by a half."""
+    info, model = shipped("studio_any_string").info, shipped("studio_any_string").model
+    program = bank_program(model, info, 48_000)
+    assert program is not None
+    alike = torch.ones(info.modes, dtype=torch.float64)
+    alike = alike * (0.5 / info.resonator.relative_tension_rise(alike)).sqrt()
+    states = [ringing(info, 1), ringing(info, 301), ringing(info, 2_000), (alike, alike * info.resonator.omega)]
+    for q, v in ((q.numpy(), v.numpy()) for q, v in states):
+        memory = Voice(program, info.resonator.to_grid(torch.from_numpy(q)), STEREO, begin=(q, v)).memory
+        tension.prepare(memory, program.memory, q, v)
+        tension.set_out(memory, q, v, False)
+        assert relative(row(memory, len(q), 0), q) > 1e-6
+        back_q, back_v = np.empty_like(q), np.empty_like(v)
+        tension.physical(memory, back_q, back_v)
+        assert relative(back_q, q) < 1e-14
+        assert relative(back_v, v) < 1e-14
+
+
+def test_a_string_retuned_to_its_own_modes_does_not_change(shipped: Callable[[str], Preset]) -> None:
+    info, model = shipped("studio_any_string").info, shipped("studio_any_string").model
+    program = bank_program(model, info, 48_000)
+    assert program is not None
+    q, v = (each.numpy() for each in ringing(info, 301))
+    heard, latents = [], []
+    for retuned in (False, True):
+        mixer = Mixer(48_000, limited=False)
+        voice = Voice(program, info.resonator.to_grid(torch.from_numpy(q)), STEREO, begin=(q, v))
+        mixer.add(voice)
+        for _ in range(100):
+            if retuned:
+                voice.retune(info.resonator, 0.0)
+            heard.append(mixer.render(layout.QUANTUM))
+        latents.append(np.concatenate([row(voice.memory, len(q), 0), row(voice.memory, len(q), 1)]))
+    np.testing.assert_allclose(np.concatenate(heard[100:]), np.concatenate(heard[:100]), rtol=0, atol=1e-7)
+    assert relative(latents[1], latents[0]) < 1e-12
 
 
 def test_it_falls_silent_and_ends(shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung) -> None:

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
-from engine.kernels.voice import MOVE_QUANTA
 from engine.models import KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.presets import Preset, PresetInfo
+from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer, Voice, bank_program, plain_program, truth_program
 from engine.voices.derivative import REACH_FRAMES
+from engine.voices.programs import solver_program
 from engine.voices.voice import FADE_S
 
 RATE_HZ = 48_000
@@ -140,6 +141,45 @@ def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, run
     assert (np.diff(shares[loud_enough]) > -2e-3).all(), "the fade goes one way"
 
 
+RATES_HZ = pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000, 192_000])
+
+
+def slowest(rate_hz: int, ear: Ear) -> Voice:
+    """A string that all but stands still for the time of a test: by it every change of gain can be seen."""
+    slow = StringParameters(
+        length_m=2.0, density_kg_m3=20_000.0, tension_n=1e-3, youngs_modulus_pa=1e6, damping_d1_kg_m_s=0.0
+    )
+    program = solver_program(slow.resonator(1, tension_modulated=False), rate_hz)
+    voice = Voice(program, Pluck(0.5).displacement(program.grid_points), ear)
+    voice.begin_at_once()
+    return voice
+
+
+@RATES_HZ
+def test_the_way_to_another_listening_point_lasts_as_long_at_any_rate(rate_hz: int) -> None:
+    voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
+    mixer.add(voice)
+    mixer.render(4 * at.QUANTUM)
+    assert voice.listen(Ear((0.0,)))
+    frames = round(0.02 * rate_hz)
+    found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
+    np.testing.assert_allclose(found[:frames] / found[0], 1 - np.arange(frames) / frames, atol=2e-3)
+    assert np.abs(found[frames:]).max() < 1e-6
+
+
+@RATES_HZ
+def test_a_voice_that_is_silent_ends_in_as_long_at_any_rate(rate_hz: int) -> None:
+    voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
+    voice.memory[at.SILENT] = 0.0  # louder than it is
+    mixer.add(voice)
+    frames = round(0.02 * rate_hz)
+    found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
+    np.testing.assert_allclose(
+        found[at.QUANTUM : at.QUANTUM + frames] / found[0], 1 - np.arange(1, frames + 1) / frames, atol=2e-3
+    )
+    assert voice.over
+
+
 @KINDS
 @pytest.mark.parametrize("solo", [0, 2])
 def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int, struck: Strike, rung: Rung) -> None:
@@ -151,7 +191,7 @@ def test_another_listening_point_is_faded_to_and_then_exact(kind: str, solo: int
     assert not moved.listen(here), "a fade is under way"
     found = mixer.render(4800).astype(np.float64)
     before, after = rung(6720, struck(kind, here))[1920:], rung(6720, struck(kind, there))[1920:]
-    frames = MOVE_QUANTA * at.QUANTUM
+    frames = FADE
     share = np.minimum(np.arange(1, 4801) / frames, 1.0)[:, None]
     np.testing.assert_allclose(found, before + share * (after - before), atol=1e-6)
     if kind == "truth":
@@ -210,14 +250,53 @@ def test_one_that_never_ends_does_not(small_info: Callable[[bool], PresetInfo], 
     assert not voice.over
 
 
-@pytest.mark.parametrize(("frame", "begins"), [(1, 64), (640, 640), (641, 704)])
-def test_it_begins_at_the_quantum_that_it_is_told(frame: int, begins: int) -> None:
+@pytest.mark.parametrize("frame", [0, 1, 63, 64, 640, 641, 703])
+def test_it_begins_at_the_frame_that_it_is_told(frame: int) -> None:
     voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
     voice.begin_at(frame)
+    assert voice.waits
     mixer.add(voice)
     found = mixer.render(1000)[:, 0]
-    assert int(np.argmax(found != 0)) == begins == voice.began_frame
+    assert int(np.argmax(found != 0)) == frame == voice.began_frame
     assert voice.sounding
+
+
+@KINDS
+@pytest.mark.parametrize("pickup", ["displacement", "velocity"])
+@pytest.mark.parametrize("frame", [1, 700, 1023])
+def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
+    kind: str, pickup: str, frame: int, struck: Strike, rung: Rung
+) -> None:
+    """All of it, with a change of gain and the release, later by so many frames."""
+    ear = Ear((0.3, 0.6), "velocity" if pickup == "velocity" else "displacement")
+
+    def rendered(begins: int) -> Signal:
+        voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
+        voice.begin_at(begins)
+        mixer.add(voice)
+        first = -(-(begins + 1) // at.QUANTUM) * at.QUANTUM + 1280 if begins else 1280 + at.QUANTUM
+        parts = [mixer.render(first)]
+        voice.set_gain(0.5)
+        parts.append(mixer.render(640))
+        voice.release(0.003)  # it ends within a quantum
+        parts.append(mixer.render(640))
+        assert voice.over
+        return np.concatenate(parts)
+
+    at_once, later = rendered(0), rendered(frame)
+    assert not later[:frame].any()
+    np.testing.assert_array_equal(later[frame : frame + len(at_once) - 64], at_once[:-64])
+    assert np.abs(later[frame + len(at_once) - 64 :]).max() == 0
+
+
+@pytest.mark.parametrize("frame", [100, 4_000])
+def test_one_whose_frame_is_past_begins_with_the_next_quantum(frame: int) -> None:
+    voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
+    mixer.render(4_000)
+    voice.begin_at(frame)
+    mixer.add(voice)
+    mixer.render(100)
+    assert voice.began_frame == 4_032
 
 
 def test_it_is_released_at_the_quantum_that_it_is_told() -> None:

@@ -75,7 +75,7 @@ def test_some_frames_are_those_of_all(named_model: tuple[str, StringModel[Any]])
         some, state = model.sample(state, numbers, steps)
         expected = whole[:, done + numbers - 1]
         torch.testing.assert_close(some, expected, rtol=0, atol=near)
-        torch.testing.assert_close(heard, expected @ weights, rtol=0, atol=2 * near)
+        torch.testing.assert_close(heard, expected @ weights.to(expected), rtol=0, atol=2 * near)
         done += steps
 
 
@@ -97,7 +97,7 @@ def test_listening_is_the_grid_at_that_point(named_model: tuple[str, StringModel
     grid = model(initial, 64)
     heard = model(initial, 64, weights)
     assert heard.shape == (1, 64, 2)
-    torch.testing.assert_close(heard, grid @ weights, rtol=0, atol=2e-5 * float(grid.abs().max()))
+    torch.testing.assert_close(heard, grid @ weights.to(grid), rtol=0, atol=2e-5 * float(grid.abs().max()))
 
 
 def test_the_seed_decides_all(named_model: tuple[str, StringModel[Any]]) -> None:

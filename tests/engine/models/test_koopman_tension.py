@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from fractions import Fraction
 
 import pytest
@@ -141,9 +142,93 @@ def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
     with torch.no_grad():
         amplitudes = model.amplitudes(model.encode(released), 50)
     torch.testing.assert_close(torch.cat([together, rest], dim=1).detach(), alone.detach(), rtol=0, atol=1e-5)
-    torch.testing.assert_close((amplitudes @ model.shapes).float(), alone.detach(), rtol=0, atol=1e-5)
+    torch.testing.assert_close(amplitudes @ model.shapes, alone.detach(), rtol=0, atol=1e-5)
     assert state.nodes is not None
     assert state.nodes.tolist() == [5, 2, 3, 2]
+
+
+LOW = StringParameters(0.65, 5e-7, 7.4e-16, 1000.0, 2e10, 1.376e-3, 2.41e-7, 3.461)  # 64 Hz
+
+
+def ringing(string: StringParameters, modes: int, pluck: Pluck, rise: float, frames: int) -> tuple[Tensor, Tensor]:
+    """A string so long after a pluck that raises the tension by `rise`: amplitudes in m, speeds in m a frame."""
+    resonator = string.resonator(modes)
+    amplitudes = resonator.to_modes(pluck.displacement(101))
+    amplitudes = amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt()
+    _, state = SplittingSolver(resonator, 48_000).advance(ModalState.at_rest(amplitudes[None]), frames)
+    return state.amplitude, state.velocity / 48_000
+
+
+@pytest.mark.parametrize(
+    ("string", "modes", "pluck", "frames", "allowed"),
+    [
+        (LOW, 99, Pluck(0.3, 1.0, "triangular"), 301, 1e-9),
+        (LOW, 99, Pluck(0.2, 1.0, "raised_cosine", 0.08), 301, 2e-7),
+        (NYLON, 57, Pluck(0.3, 1.0, "triangular"), 777, 1e-11),
+    ],
+    ids=["low", "low and narrow", "nylon"],
+)
+def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
+    string: StringParameters, modes: int, pluck: Pluck, frames: int, allowed: float
+) -> None:
+    """Relative MSE of a second with a tension rise of 50 %; speeds as they are instead of w: 1e-7 to 1e-4."""
+    resonator, model = string.resonator(modes), made(string, modes, "series")
+    amplitudes, speeds = ringing(string, modes, pluck, 0.5, frames)
+    truth, _ = SplittingSolver(resonator, 48_000).advance(ModalState(amplitudes, speeds * 48_000), 48_000)
+    state = model.encode(*(resonator.to_grid(each) / 1e-3 for each in (amplitudes, speeds)))
+    found = model.amplitudes(state, 48_000) * 1e-3
+    assert float((found - truth).square().sum() / truth.square().sum()) < allowed
+
+
+def test_a_speed_of_nothing_is_rest_bit_for_bit() -> None:
+    displacement = pluck_m(NYLON, 25, 0.4) / 1e-3
+    model = made(NYLON, 25, "series")
+    with torch.no_grad():
+        moved, _ = model.advance(model.encode(displacement, torch.zeros_like(displacement)), 300)
+        assert torch.equal(moved, model.advance(model.encode(displacement), 300)[0])
+
+
+def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() -> None:
+    """It swings as far as one that was pulled so: what bounds it is the energy, not the displacement it begins at."""
+    model = made(NYLON, 25, "series", 16_000)
+    resonator = NYLON.resonator(25)
+    amplitudes = resonator.to_modes(modes_alike_m(0.5))
+    speeds = amplitudes * resonator.eigenvalues().imag / 16_000
+    pulled = model.encode(resonator.to_grid(amplitudes) / 1e-3)
+    struck = model.encode(torch.zeros(1, 101).double(), resonator.to_grid(speeds) / 1e-3)
+    assert model._nodes(struck, Fraction(1)).tolist() == model._nodes(pulled, Fraction(1)).tolist() == [5]
+    assert 0.5 < float(struck.largest_energy / pulled.largest_energy) <= 1
+    truth, _ = SplittingSolver(resonator, 16_000).advance(ModalState(0 * amplitudes, speeds * 16_000), 1_600)
+    found = model.amplitudes(struck, 1_600) * 1e-3
+    assert float((found - truth).square().sum() / truth.square().sum()) < 1e-4
+
+
+def test_the_compiled_loop_of_a_ringing_string_is_the_definition() -> None:
+    model, resonator = made(NYLON, 25, "series"), NYLON.resonator(25)
+    state = ringing(NYLON, 25, Pluck(0.3, 1.0, "triangular"), 0.4, 100)
+    displacement, velocity = (resonator.to_grid(each) / 1e-3 for each in state)
+    plain, _ = model.advance(model.encode(displacement, velocity), 300)
+    with torch.no_grad():
+        compiled, _ = model.advance(model.encode(displacement, velocity), 300)
+    torch.testing.assert_close(compiled, plain.detach(), rtol=0, atol=1e-6)
+
+
+@pytest.fixture
+def double_by_default() -> Iterator[None]:
+    torch.set_default_dtype(torch.float64)
+    yield
+    torch.set_default_dtype(torch.float32)
+
+
+def test_the_precision_is_the_models_own(double_by_default: None) -> None:
+    """Not that of tensors that are made without one, which a program may set for itself."""
+    displacement, model = pluck_m(NYLON, 25, 0.4), made(NYLON, 25, "series")
+    with torch.no_grad():
+        double = model(displacement / 1e-3, 10)
+        torch.set_default_dtype(torch.float32)
+        single = model(displacement / 1e-3, 10)
+    assert double.dtype == single.dtype == model.shapes.dtype
+    assert torch.equal(double, single)
 
 
 def test_gradients_reach_every_curve() -> None:

@@ -108,6 +108,33 @@ def test_wrong_tensors_are_named(preset_file: Path, fault: str) -> None:
         load_preset(rewritten(preset_file, tensors=change))
 
 
+RESONATOR_FAULTS = {
+    "another string": (lambda d: d["string"].update(tension_n=61.0), lambda t: None, "nu_log|theta_log"),
+    "another rate": (lambda d: d.update(rate_hz=44_100), lambda t: None, "nu_log"),
+    "another unit": (lambda d: d.update(scale_m=2e-3), lambda t: None, "stretch"),
+    "no tension": (lambda d: d.update(tension_modulated=False), lambda t: None, "coupling"),
+    "another frequency": (lambda d: None, lambda t: t["theta_log"][3].add_(1e-6), "theta_log"),
+    "another coupling": (lambda d: None, lambda t: t["coupling"].mul_(1.0001), "coupling"),
+    "another stretch": (lambda d: None, lambda t: t["stretch"][0].mul_(1.0001), "stretch"),
+    "another shape": (lambda d: None, lambda t: t["shapes"][5].neg_(), "shapes"),
+    "another analysis": (lambda d: None, lambda t: t["analysis"].mul_(2), "analysis"),
+}
+
+
+@pytest.mark.parametrize("fault", RESONATOR_FAULTS)
+def test_a_string_that_is_heard_and_not_shown_is_refused(tmp_path: Path, fault: str) -> None:
+    """A voice takes its string from the metadata, a picture from the tensors."""
+    facts, tensors, name = RESONATOR_FAULTS[fault]
+    copy = tmp_path / "copy.safetensors"
+    copy.write_bytes(find_preset("studio_any_string").read_bytes())
+    load_preset(copy)
+    rewritten(copy, info=facts, tensors=tensors)
+    words = rf"metadata\.string: tensor '({name})' is of another string, .*; get the preset again"
+    with pytest.raises(PresetError, match=words) as caught:
+        load_preset(copy)
+    assert str(caught.value).startswith(f"{copy}: ")
+
+
 @pytest.mark.parametrize("size", [0, 7, 200, 2000])
 def test_a_truncated_file_is_told(preset_file: Path, size: int) -> None:
     preset_file.write_bytes(preset_file.read_bytes()[:size])

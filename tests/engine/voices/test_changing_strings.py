@@ -224,6 +224,71 @@ def test_two_plucks_before_the_string_sounds_are_one_of_both(kind: str) -> None:
     assert not second.over
 
 
+def stopping(before: Voice, of: Program, seconds: float = 0.006) -> Voice:
+    voice = struck(of)
+    voice.stops(before, seconds)
+    return voice
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_a_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fades(kind: str) -> None:
+    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
+    first = struck(of)
+    mixer.add(first)
+    mixer.render(6_400)
+    mixer.add(stopping(first, of))
+    fresh.add(struck(of))
+    heard = mixer.render(6_400)[:, 0]
+    left = heard - fresh.render(6_400)[:, 0]
+    fade = np.clip(1 - np.arange(1, 6_401) / 288, 0, 1)
+    expected = fade * sound(of, [], 200)[6_400:]
+    np.testing.assert_allclose(left, expected, atol=1e-6)
+    assert first.over
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_of_plucks_that_wait_the_last_alone_sounds_and_the_ringing_one_is_stopped(kind: str) -> None:
+    """Also where the one that is stopped was to begin later."""
+    of, mixer, fresh = program(kind), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
+    ringing = struck(of)
+    mixer.add(ringing)
+    mixer.render(6_400)
+    waits = stopping(ringing, of)
+    later = stopping(waits, of)
+    later.begin_at(20_000)
+    last = stopping(later, of)
+    mixer.add(waits)
+    mixer.add(later)
+    mixer.add(last)
+    fresh.add(struck(of))
+    heard = mixer.render(32_000)[:, 0]
+    np.testing.assert_allclose(heard[320:], fresh.render(32_000)[320:, 0], atol=1e-6)
+    assert [each.over for each in (ringing, waits, later, last)] == [True, True, True, False]
+
+
+def test_a_pluck_that_is_added_does_not_wait_for_one_of_a_later_frame() -> None:
+    """It is added to the string that rings, and the later one never sounds."""
+    of, mixer, alone = program("model"), Mixer(RATE_HZ, limited=False), Mixer(RATE_HZ, limited=False)
+    ringing, again = struck(of), struck(of)
+    alone.add(ringing)
+    alone.render(6_400)
+    again.continues(ringing)
+    alone.add(again)
+    expected = alone.render(12_800)
+    ringing = struck(of)
+    mixer.add(ringing)
+    mixer.render(6_400)
+    later = stopping(ringing, of)
+    later.begin_at(8_000)
+    added = struck(of)
+    added.continues(later)
+    mixer.add(later)
+    mixer.add(added)
+    np.testing.assert_array_equal(mixer.render(12_800), expected)
+    assert ringing.over
+    assert later.over
+
+
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_modes_that_are_bent_beyond_half_the_rate_are_laid_to_rest(kind: str) -> None:
     high = modes_of(STRING, 80)
@@ -248,6 +313,40 @@ def test_modes_that_are_no_longer_read_are_freed() -> None:
         voice.retune(bent(turn / 50))
         mixer.render(layout.QUANTUM)
     assert len(voice._blocks) <= 2
+
+
+@pytest.mark.parametrize("kind", ["model", "truth"])
+def test_modes_count_from_their_frame_on(kind: str) -> None:
+    """As if they had been wished for then, to a quantum; each waits for those before it."""
+    quantum = layout.QUANTUM
+    asked: Changes = [(50, bent(1), 0.002), (51, bent(2), 0.005), (80, bent(-1), 0.01), (120, damped(0.2), 0.01)]
+    expected = sound(program(kind), asked)
+    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program(kind))
+    for at, wish, seconds in asked[:-1]:
+        assert isinstance(wish, Resonator)
+        voice.retune(wish, seconds, at * quantum - 5)
+    voice.retune(damped(0.2), 0.01, 120 * quantum)
+    mixer.add(voice)
+    heard = mixer.render(60 * quantum)[:, 0]
+    voice.retune(damped(0.2), 0.01)  # at once, but after what was wished for: the same once more
+    heard = np.concatenate([heard, mixer.render(240 * quantum)[:, 0]])
+    np.testing.assert_allclose(heard, expected, atol=1e-6)
+    assert len(voice._blocks) <= 5
+    voice.retune(bent(0))
+    mixer.render(quantum)
+    voice.retune(bent(0))
+    assert len(voice._blocks) <= 2
+
+
+def test_modes_of_a_voice_that_begins_within_a_quantum_are_no_earlier_than_their_frame() -> None:
+    """The first quantum of its own that begins at the frame or later has them."""
+    quantum, late = layout.QUANTUM, 20
+    mixer, voice = Mixer(RATE_HZ, limited=False), struck(program("model"))
+    voice.begin_at(late)
+    voice.retune(bent(2), 0.0, 50 * quantum + late)
+    mixer.add(voice)
+    expected = sound(program("model"), [(50, bent(2), 0.0)])[: 200 * quantum]
+    np.testing.assert_allclose(mixer.render(200 * quantum + late)[late:, 0], expected, atol=1e-6)
 
 
 def test_what_cannot_change_says_so() -> None:

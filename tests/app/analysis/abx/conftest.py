@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.analysis.abx.record import AbxRecord, HeardPluck, HeardSource, HeardThrough, make_record
+from app.analysis.abx.record import AbxRecord, Candidate
 from app.analysis.abx.trials import Run
 
 
@@ -16,16 +16,20 @@ def finished(planned: int, right: int, answered: int | None = None) -> Run:
     return run
 
 
-def record_of(run: Run, remark: str = "") -> AbxRecord:
+def record_of(run: Run) -> AbxRecord:
     a, b = (
-        HeardSource(label=label, preset="nylon", preset_sha256="0f" * 32, gain_db=gain_db)
+        Candidate(label=label, preset="nylon", preset_sha256="0f" * 32, gain_db=gain_db)
         for label, gain_db in (("Model", -0.5), ("Truth", 0.0))
     )
-    pluck = HeardPluck(position=0.35, amplitude_mm=4, shape="gaussian", width=0.06, listen=0.37, seconds=2)
-    through = HeardThrough(
-        device="Headphones", host_api="ALSA", rate_hz=48_000, volume_db=-3, restart_at_switch=False
+    return AbxRecord(
+        a=a,
+        b=b,
+        pluck={"position": 0.35, "shape": "gaussian"},
+        through={"device": "Headphones"},
+        planned_trials=run.planned,
+        seed=run.seed,
+        trials=run.trials,
     )
-    return make_record(run, a, b, pluck, through, remark)
 
 
 @pytest.fixture

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from app.commands.benchmarks.tune import pitch_hz
 from numpy.typing import NDArray
 
-from app.export.sampled.job import export_sampled
+from app.export.sampled.job import export_sampled, note_renderer
 from app.export.sampled.plan import SampledPlan
 from app.instrument.offline import render_note
 from app.patches.library import find_patch
@@ -42,9 +44,11 @@ def test_it_sounds_as_the_note_itself(
 ) -> None:
     out = tmp_path / f"harp.{kind}"
     seconds = 0.17 if kind == "sfz" else 1.0
-    gain_db = export_sampled(SampledPlan(harp, KEYS, layers=3, seconds=seconds), out, note).gain_db
+    plan = SampledPlan(harp, KEYS, layers=3, seconds=seconds)
+    gain_db = export_sampled(plan, out, note).gain_db
+    rendered = [zone.velocity for zone in plan.zones if zone.key == 52]
     offsets, cents = [], []
-    for key, velocity in [(52, 42), (52, 127), (53, 84), (53, 20), (53, 100)]:
+    for key, velocity in [(52, rendered[0]), (52, rendered[2]), (53, rendered[1]), (53, 20), (53, 127)]:
         direct = note(harp, key, velocity, seconds, seconds, RATE_HZ).T
         part = slice(480, round(0.12 * RATE_HZ))
         if kind == "sfz":
@@ -55,10 +59,35 @@ def test_it_sounds_as_the_note_itself(
             heard = play(out, [(0, key, velocity)], 1.0)
             part = slice(2_400, 40_000)
         offsets += [level_db(a[part]) - level_db(b[part]) - gain_db for a, b in zip(heard, direct, strict=True)]
-        if velocity in (42, 84, 127):  # as rendered; between them, a pluck glides as the layer's hardest does
+        if velocity in rendered:  # between them, a pluck glides as the one that was rendered
             cents.append(drift_cents(heard[0][part], direct[0][part]))
     assert np.ptp(offsets) < 1.0  # half a dB to either side
     assert np.abs(cents).max() < 0.05
+
+
+@pytest.mark.parametrize(("key", "layers"), [(28, 2), (28, 4), (33, 4)])
+def test_a_note_starts_within_the_reported_error(key: int, layers: int, play: Callable, tmp_path: Path) -> None:
+    """Rendered at the hardest velocity of its layer, a note would start about twice as far off."""
+    bass = find_patch("Electric bass").patch.with_value("room.mix", 0.0)
+    render, part = note_renderer(load_preset(find_preset(bass.preset)), "model"), slice(480, 12_000)
+    plan = SampledPlan(bass, (key, key), layers=layers, seconds=0.5)
+    export_sampled(plan, tmp_path / "a.sf2", render)
+
+    @cache
+    def live_hz(velocity: int) -> float:
+        sound = render(bass, key, velocity, 0.5, 0.5, RATE_HZ, advanced=lambda seconds: None)
+        return pitch_hz(sound[part, 0], near_hz)
+
+    near_hz = 440 * 2 ** ((key - 69) / 12)
+    errors, at_hardest = [], []
+    softest, hardest = plan.zones[-1].velocities
+    for velocity in (softest, 100, hardest):
+        heard_hz = pitch_hz(play(tmp_path / "a.sf2", [(0, key, velocity)], 0.5)[0][part], near_hz)
+        errors.append(abs(1200 * np.log2(heard_hz / live_hz(velocity))))
+        at_hardest.append(abs(1200 * np.log2(live_hz(hardest) / live_hz(velocity))))
+    print(f"key {key}, {layers} layers: cents {np.round(errors, 1)}, at the hardest {np.round(at_hardest, 1)}")
+    assert max(errors) < plan.pitch_error_cents
+    assert max(at_hardest) > 1.6 * max(errors) > 3
 
 
 UNHEARD: list[dict[str, object]] = [

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.export.sampled.levels import by_key, velocity_levels
+from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
 from app.patches.patch import Patch
@@ -16,6 +16,10 @@ NONE = "0" * 64
 
 def stored(level_db: float) -> StoredSample:
     return StoredSample(made_from=NONE, sha256=NONE, frames=64, channels=1, gain_db=0.0, level_db=level_db)
+
+
+def rendered(patch: Patch, layers: int) -> list[int]:
+    return [zone.velocity for zone in SampledPlan(patch, (60, 60), layers=layers).zones]
 
 
 def levels(patch: Patch, measured_db: list[float]) -> np.ndarray:
@@ -31,29 +35,44 @@ def amplitudes_db(patch: Patch) -> np.ndarray:
 def test_a_string_that_follows_its_plucks_does_so_at_every_velocity(curve: float, patch_of: PatchOf) -> None:
     patch = patch_of(pluck={"curve": curve})
     wanted = amplitudes_db(patch)
-    for rendered in ([127], [63, 127], [42, 84, 127]):
-        np.testing.assert_allclose(levels(patch, list(wanted[rendered])), wanted, atol=1e-9)
+    for layers in (1, 2, 3):
+        np.testing.assert_allclose(levels(patch, list(wanted[rendered(patch, layers)])), wanted, atol=1e-9)
 
 
 def test_what_was_measured_holds_where_it_was(patch: Patch) -> None:
     found = levels(patch, [-40.0, -25.0, -22.0])
-    assert list(found[[42, 84, 127]]) == pytest.approx([-40, -25, -22])
+    first, second, third = rendered(patch, 3)
+    assert list(found[[first, second, third]]) == pytest.approx([-40, -25, -22])
     assert (np.diff(found[1:]) > 0).all()
-    assert found[42] - found[1] == pytest.approx(15 * 41 / 42)  # as steep as to the next layer
+    # as steep as between the nearest two
+    assert found[first] - found[1] == pytest.approx(15 * (first - 1) / (second - first))
+    assert found[127] - found[third] == pytest.approx(3 * (127 - third) / (third - second))
 
 
 def test_plucks_of_one_strength_differ_in_width_alone(patch_of: PatchOf) -> None:
     patch = patch_of(pluck={"softest_mm": 2.0, "hardest_mm": 2.0})
-    assert levels(patch, [-30.0, -26.0])[95] == pytest.approx(-28)
+    first, second = rendered(patch, 2)
+    between = levels(patch, [-30.0, -26.0])[first : second + 1]
+    assert between == pytest.approx(np.linspace(-30, -26, second - first + 1))
 
 
 def test_a_silent_layer_says_nothing(patch: Patch) -> None:
-    np.testing.assert_allclose(levels(patch, [-120.0, -20.0]), amplitudes_db(patch) - amplitudes_db(patch)[-1] - 20)
+    amplitudes = amplitudes_db(patch)
+    hardest = rendered(patch, 2)[-1]
+    np.testing.assert_allclose(levels(patch, [-120.0, -20.0]), amplitudes - amplitudes[hardest] - 20)
+
+
+def test_headroom_is_up_to_the_loudest_velocity_of_a_layer(patch: Patch) -> None:
+    layers = SampledPlan(patch, (60, 60), layers=2).zones
+    found = headroom_db(patch, {zone: stored(level) for zone, level in zip(layers, [-30.0, -20.0], strict=True)})
+    levels_db = levels(patch, [-30.0, -20.0])
+    assert list(found.values()) == pytest.approx([levels_db[63] + 30, levels_db[127] + 20])
+    assert min(found.values()) > 1
 
 
 def test_layers_come_by_key_from_soft_to_hard(patch: Patch) -> None:
     zones = SampledPlan(patch, (50, 51), layers=3).zones
     samples: dict[Zone, StoredSample] = {zone: stored(-zone.key) for zone in reversed(zones)}
     found = list(by_key(samples))
-    assert [[zone.velocity for zone in layers] for layers, _ in found] == [[42, 84, 127]] * 2
+    assert [[zone.velocities for zone in layers] for layers, _ in found] == [[(1, 42), (43, 84), (85, 127)]] * 2
     assert [[each.level_db for each in own] for _, own in found] == [[-51] * 3, [-50] * 3]

@@ -3,14 +3,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from app.export.sampled.plan import MOST_LAYERS, WIDEST_STEP, SampledPlan, Zone
+from app.instrument.glide import glides_cents
 from app.patches.patch import Fretted, Patch, PhysicalString
 from engine.resonators.string import StringParameters
 
+PatchOf = Callable[..., Patch]
 STRING = PhysicalString(**{name: getattr(StringParameters(), name) for name in PhysicalString.model_fields})
 WHOLE = Patch(name="Whole", category="keys", strings=Fretted(string=STRING), range=(0, 127))
 
@@ -38,9 +41,27 @@ def test_no_key_is_transposed_unless_asked(patch: Patch) -> None:
     assert len(spans) == 7
 
 
-def test_layers_are_rendered_at_their_hardest(patch: Patch) -> None:
-    zones = [zone for zone in SampledPlan(patch, layers=3).zones if zone.key == 50]
-    assert [(zone.velocities, zone.velocity) for zone in zones] == [((1, 42), 42), ((43, 84), 84), ((85, 127), 127)]
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every: int, patch_of: PatchOf) -> None:
+    plan = SampledPlan(patch_of(pluck={"hardest_mm": 20.0}), layers=3, every=every)
+    zones, glides = [zone for zone in plan.zones if 50 in zone.keys], glides_cents(plan.patch)
+    assert [zone.velocities for zone in zones] == [(1, 42), (43, 84), (85, 127)]
+    for zone in zones:
+        (low, high), (softest, hardest) = zone.keys, zone.velocities
+        notes = glides[low : high + 1, softest : hardest + 1]
+        errors = [np.abs(notes - glides[zone.key, velocity]).max() for velocity in range(softest, hardest + 1)]
+        assert errors[zone.velocity - softest] == min(errors) <= plan.pitch_error_cents
+        assert errors[-1] > 1.5 * min(errors)  # as it was rendered at the hardest
+    assert plan.pitch_error_cents > 10
+    assert SampledPlan(plan.patch, layers=32, every=every).pitch_error_cents < 0.5 * plan.pitch_error_cents
+
+
+def test_a_string_that_does_not_glide_is_rendered_at_its_hardest(patch: Patch) -> None:
+    string = patch.strings.string.model_copy(update={"youngs_modulus_pa": 0.0, "second_moment_m4": 0.0})
+    flexible = patch.model_copy(update={"strings": Fretted(string=string)})
+    plan = SampledPlan(flexible, layers=3)
+    assert [zone.velocity for zone in plan.zones if zone.key == 50] == [42, 84, 127]
+    assert plan.pitch_error_cents == 0
 
 
 def test_largest_bytes_counts_every_frame(patch: Patch, patch_of: Callable[..., Patch]) -> None:

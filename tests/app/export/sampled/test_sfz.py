@@ -191,7 +191,7 @@ def test_no_name_becomes_a_path_or_an_opcode(name: str, patch: Patch, render: Re
     assert sorted(tmp_path.iterdir()) == sorted([out, sample_folder(out)])
     assert lint(out) == ""
     text = out.read_text("utf-8")
-    assert opcodes(re.sub("//.*", "", text), "sample") == ["key060_vel127.flac"]
+    assert opcodes(re.sub("//.*", "", text), "sample") == [f"{plan.zones[0].stem}.flac"]
     assert re.findall(r"^<\w+>", text, re.M) == ["<control>", "<global>", "<group>", "<region>"]
     assert "#include" not in re.sub("//.*", "", text)
 

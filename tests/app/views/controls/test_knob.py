@@ -8,7 +8,8 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QToolTip
 from pytestqt.qtbot import QtBot
 
-from app.views.controls.knob import DRAG_PIXELS, Knob, KnobRange
+from app.shared.parameters import Parameter, Taper
+from app.views.controls.knob import DRAG_PIXELS, Knob
 
 LEFT = Qt.MouseButton.LeftButton
 SHIFT, NONE = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.NoModifier
@@ -17,7 +18,7 @@ SHIFT, NONE = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.NoModifier
 @pytest.fixture
 def knob(qtbot: QtBot) -> Knob:
     """From 0 to 20 by 0.25, at 4; it follows what is asked."""
-    made = Knob("amplitude", KnobRange(0, 20, 4.0, 0.25, "{:.2f} mm"))
+    made = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")))
     qtbot.addWidget(made)
     made.value_asked.connect(made.set_value)
     made.show()

@@ -1,4 +1,4 @@
-"""Keys reach the instrument wherever the keyboard is, but never from someone who writes."""
+"""Keys reach the instrument wherever the keyboard is, but never from someone who writes or browses."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QVBoxLayout, Q
 from pytestqt.qtbot import QtBot
 
 from app.views.controls.playing_keys import PlayingKeys
+from app.views.instrument.patch_browser import PatchBrowser
 
 
 @pytest.fixture
@@ -46,6 +47,21 @@ def test_who_writes_is_left_alone(qtbot: QtBot, window: QWidget, heard: list[str
     QApplication.instance().focusChanged.emit(None, line)  # type: ignore[union-attr]
     qtbot.keyClicks(line, "asdc1")
     assert (line.text(), heard) == ("asdc1", [])
+
+
+def test_while_a_browser_is_open_keys_search_in_it(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
+    browser = PatchBrowser(window)
+    browser.show_over()
+    box = window.findChild(QComboBox)
+    for focused in (browser.list, browser, box, window):
+        browser.search.clear()
+        QApplication.instance().focusChanged.emit(None, focused)  # type: ignore[union-attr]
+        qtbot.keyClicks(focused, "ah")
+        assert (browser.search.text(), heard) == ("ah", [])
+    assert box.currentText() == "first"
+    browser.dismiss()
+    qtbot.keyClicks(window, "a")
+    assert heard == ["A"]
 
 
 def test_a_key_that_is_held_down_is_told_once_and_shortcuts_are_not_notes(

@@ -13,11 +13,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.analysis.abx.choices import AbxChoices
-from app.analysis.abx.record import AbxRecord, HeardPluck, load_record
-from app.analysis.abx.sound import Candidate
-from app.analysis.abx.subject import Subject
-from app.analysis.abx.trials import draw_order
+from app.analysis.abx.record import AbxRecord, Candidate, Subject, load_record
+from app.analysis.abx.trials import AbxChoices, draw_order
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
@@ -28,8 +25,11 @@ from engine.voices import Mixer
 RATE_HZ = 48_000
 FRAMES = 4800
 HEADPHONES = AudioDevice("Headphones", "Test API", RATE_HZ)
-PLUCK = HeardPluck(position=0.4, amplitude_mm=4, shape="gaussian", width=0.06, listen=0.37, seconds=0.1)
-CANDIDATES = tuple(Candidate(name, name.capitalize(), "small", "0f" * 32) for name in ("model", "truth"))
+PLUCK: dict[str, object] = {"position": 0.4, "amplitude_mm": 4.0, "seconds": 0.1}
+CANDIDATES = tuple(
+    Candidate(source=name, label=name.capitalize(), preset="small", preset_sha256="0f" * 32)
+    for name in ("model", "truth")
+)
 Open = Callable[..., AbxDialog]
 Sounds = Mapping[str, NDArray[np.float32]]
 
@@ -112,7 +112,7 @@ def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Pat
     assert str(tmp_path / "records") in text
     assert (record.seed, record.correct, record.complete) == (seed, 3, True)
     assert [(trial.x, trial.auditions) for trial in record.trials] == [(x, 4) for x in order]
-    assert (record.through.device, record.through.rate_hz) == ("Headphones", RATE_HZ)
+    assert (record.through["device"], record.through["rate_hz"]) == ("Headphones", RATE_HZ)
     assert (record.a.label, record.b.label) == ("Model", "Truth")
     assert record.a.gain_db == pytest.approx(0, abs=0.01)
     assert record.b.gain_db == pytest.approx(-3.52, abs=0.02)
@@ -194,7 +194,7 @@ def test_a_device_that_vanishes_ends_the_test(qtbot: QtBot, open_dialog: Open, s
     sound.open(other)
     qtbot.waitUntil(lambda: not dialog.testing)
     assert saved(tmp_path).remark == DEVICE_CHANGED
-    assert saved(tmp_path).through.device == "Headphones"
+    assert saved(tmp_path).through["device"] == "Headphones"
 
 
 def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> None:
@@ -262,7 +262,7 @@ def test_a_record_that_cannot_be_written_is_told_and_saved_elsewhere(
     monkeypatch.setattr(
         "app.views.dialogs.abx_dialog.QFileDialog.getExistingDirectory", lambda *_: str(tmp_path / "other")
     )
-    dialog._result._save.click()
+    dialog._result.save.click()
     assert len(list((tmp_path / "other").iterdir())) == 1
     assert "cannot be written" not in texts(dialog)
 
@@ -277,19 +277,3 @@ def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
     assert "Too few" in texts(dialog)
     assert not any(button.isChecked() for button in setup._usual.buttons())
     assert dialog.choices().trials == 4
-
-
-def test_earlier_records_are_shown_and_exported(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
-    dialog = open_dialog(trials=1)
-    start(dialog)
-    press(qtbot, dialog, "x", "1")
-    (tmp_path / "records" / "abx_broken.json").write_text("{")
-    dialog._result.records_asked.emit()
-    page = dialog._records
-    assert page._list.count() == 1
-    assert "Headphones (Test API)" in page._text.toPlainText()
-    assert "abx_broken.json" in texts(page)
-    page.export(tmp_path / "record.txt")
-    assert (tmp_path / "record.txt").read_text(encoding="utf-8") == page._text.toPlainText()
-    page.back_asked.emit()
-    assert "of 1 right" in texts(dialog)

@@ -187,6 +187,19 @@ def test_a_batch_is_counted_checked_and_written(qtbot: QtBot, made, tmp_path: Pa
     run(qtbot, dialog, "0 files written, 8 kept")
 
 
+def test_a_batch_follows_the_present_pluck_until_a_list_is_given(made) -> None:
+    first = made(heard={"amplitude_mm": 2.0})
+    batch = first.batch.choices()
+    assert (batch.presets, batch.positions, batch.amplitudes) == (("small",), "0.4", "2")
+    second = made(first.export_choices().model_dump(), {"amplitude_mm": 7.5, "position": 0.25, "preset": "other"})
+    batch = second.batch.choices()
+    assert (batch.presets, batch.positions, batch.amplitudes) == (("other",), "0.25", "7.5")
+    second.batch.amplitudes.setText("1; 3")
+    third = made(second.export_choices().model_dump(), {"amplitude_mm": 5.0, "position": 0.3})
+    batch = third.batch.choices()
+    assert (batch.presets, batch.positions, batch.amplitudes) == (("small",), "0.3", "1; 3")
+
+
 def test_a_batch_says_what_all_its_plucks_have_and_shows_what_is_checked(qtbot: QtBot, made) -> None:
     dialog = made({"batch": {"presets": ("small",)}}, {"shape": "raised_cosine", "width": 0.1, "listen": 0.2})
     assert dialog.batch.what.text() == "raised cosine 0.100 wide, heard at 0.20"

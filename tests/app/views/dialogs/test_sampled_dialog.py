@@ -17,6 +17,8 @@ from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QFil
 from pytestqt.qtbot import QtBot
 
 from app.export.sampled.choices import SampledChoices
+from app.export.sampled.plan import SampledPlan
+from app.export.sampled.words import pitch_words
 from app.patches.library import find_patch
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry, list_presets
@@ -110,8 +112,8 @@ def test_an_sfz_is_written_as_it_was_told(
     assert f"Saved {out} (6 samples rendered, 0 kept" in dialog.state.text()
     assert "peak -1.0 dBFS" in dialog.state.text()
     assert "softer than the patch, so that no note clips" in dialog.state.text()
-    wanted = [(key, velocity, 0.2, 44_100, "truth") for key in (60, 61, 62) for velocity in (63, 127)]
-    assert [note[1:] for note in notes.rendered] == wanted
+    zones = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones
+    assert [note[1:] for note in notes.rendered] == [(z.key, z.velocity, 0.2, 44_100, "truth") for z in zones]
     samples = sorted((folder / "Classical_guitar_samples").glob("*.wav"))
     assert len(samples) == MADE
     assert (soundfile.info(samples[0]).samplerate, soundfile.info(samples[0]).subtype) == (44_100, "PCM_16")
@@ -146,14 +148,26 @@ def test_size_follows_the_choices_and_nothing_is_written(qtbot: QtBot, made, fol
     dialog.form.seconds.setValue(10)
     settle(qtbot, dialog)
     counted = "1 sample (1 key, 1 velocity layer)"
-    assert dialog.size_text.text() == f"{counted}, at most 2.9 MB, before FLAC compression"
+    pitch = pitch_words(SampledPlan(dialog._patch, (60, 60), layers=1).pitch_error_cents)
+    assert dialog.size_text.text() == f"{counted}, at most 2.9 MB, before FLAC compression; {pitch}"
     dialog.form.form.setCurrentIndex(dialog.form.form.findData("sf2"))
     settle(qtbot, dialog)
     told = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
-    assert dialog.size_text.text() == told
+    assert dialog.size_text.text() == f"{told}; {pitch}"
     dialog.close_button.click()
     assert not dialog.isVisible()
     assert list(folder.iterdir()) == [] and notes.rendered == []
+
+
+def test_the_error_of_pitch_is_reported_before_and_after(qtbot: QtBot, made, patch: Patch) -> None:
+    dialog = made(layers=1)
+    for layers in (1, 8):
+        dialog.form.layers.setValue(layers)
+        settle(qtbot, dialog)
+        cents = SampledPlan(patch, SMALL["keys"], layers=layers).pitch_error_cents
+        assert dialog.size_text.text().endswith(f"; note starts within {cents:.1f} cents of the patch")
+    run(qtbot, dialog, "Saved")
+    assert f"note starts within {cents:.1f} cents of the patch)." in dialog.state.text()
 
 
 def test_more_than_there_is_room_for_is_told(made, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,7 +203,8 @@ def test_progress_is_shown_and_the_choices_wait(
     assert not dialog.save.isEnabled()
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
-    assert "key 61, velocity 127, about " in dialog.state.text()
+    fourth = SampledPlan(dialog._patch, SMALL["keys"], layers=SMALL["layers"]).zones[3]
+    assert f"key 61, velocity {fourth.velocity}, about " in dialog.state.text()
     assert " s left. You can play on meanwhile." in dialog.state.text()
     notes.gate.set()
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractButton
 from pytestqt.qtbot import QtBot
 
 from app.views.instrument.panel import InstrumentPanel
@@ -52,22 +53,36 @@ def test_a_note_of_the_other_surface_ends_when_it_is_hidden(qtbot: QtBot, panel:
 
 def test_the_knobs_of_the_string_are_folded_at_first(qtbot: QtBot, panel: InstrumentPanel) -> None:
     assert not panel.knobs.isVisible()
-    with qtbot.waitSignal(panel.surface_changed):
-        qtbot.mouseClick(panel._fold, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(panel._fold, Qt.MouseButton.LeftButton)
     assert panel.unfolded
     assert panel.knobs.isVisible()
     facts = panel.knobs.facts
     qtbot.waitUntil(lambda: facts.visibleRegion().boundingRect().height() == facts.height())  # and is not cut
 
 
-def test_in_little_room_the_surface_is_left(panel: InstrumentPanel) -> None:
-    panel.set_unfolded(True)
-    panel.set_low(True, False)
-    assert (panel.knobs.isVisible(), panel.bar.isVisible(), panel.keys.isVisible()) == (False, True, True)
-    panel.set_low(True, True)
-    assert (panel.knobs.isVisible(), panel.bar.isVisible(), panel.keys.isVisible()) == (False, False, True)
-    panel.set_low(False, False)
-    assert panel.knobs.isVisible()
+def test_in_a_low_window_the_knobs_take_the_place_of_the_keys(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    def seen() -> tuple[bool, bool, bool]:
+        return panel.bar.isVisible(), panel.knobs.isVisible(), panel.keys.isVisible()
+
+    panel.resize(1500, 300)  # without scroll bars
+    panel.set_low(True)
+    assert seen() == (True, False, True)
+    height = panel.sizeHint().height()
+    assert panel._hint.isVisible()
+    qtbot.mouseClick(panel._fold, Qt.MouseButton.LeftButton)
+    assert seen() == (True, True, False)
+    assert not panel._hint.isVisible()
+    assert panel.sizeHint().height() <= height, "the strip takes no more room"
+    panel.set_low(False)
+    assert seen() == (True, True, True)
+    assert panel.sizeHint().height() > height
+    panel.set_low(True)
+    for name in ("keys", "neck"):  # also the one that is checked already
+        panel.set_unfolded(True)
+        button = next(each for each in panel._choice.findChildren(QAbstractButton) if each.objectName() == name)
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+        assert (panel.unfolded, panel.knobs.isVisible(), panel._stack.isVisible()) == (False, False, True)
+        assert panel.surface == name
 
 
 def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPanel) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton
+from PySide6.QtWidgets import QAbstractButton, QToolTip
 from pytestqt.qtbot import QtBot
 
 from app.patches.patch import Macro, Patch, Target, TuningChoice
@@ -97,7 +97,7 @@ def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
     assert (bar.record.text(), bar.record.isChecked()) == ("■  1:13", True)
     bar.show_recording(None)
     assert not bar.record.isChecked()
-    bar.show_octave(-1)
+    bar.show_octave(-1, -2, 3)
     assert bar.octave.text() == "from C-1"
     bar.show_velocity(17)
     assert bar.velocity.text() == "velocity 17"
@@ -138,3 +138,21 @@ def test_scala_is_shown_by_name_and_can_be_removed(qtbot: QtBot, bar: PatchBar, 
         qtbot.mouseClick(bar.scala, LEFT)
     bar.show_patch(guitar, own=True)
     assert not bar.scala.isVisible()
+
+
+def test_the_octave_buttons_stop_where_no_key_sounds_and_say_why(qtbot: QtBot, bar: PatchBar) -> None:
+    lower, higher = (
+        next(each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == name)
+        for name in ("Octave down", "Octave up")
+    )
+    for octave, ends in ((2, (False, True)), (3, (True, True)), (6, (True, False))):
+        bar.show_octave(octave, 2, 6)
+        assert (lower.isEnabled(), higher.isEnabled()) == ends
+    bar.say_octave("Highest octave: a <b>harp</b>")
+    assert QToolTip.isVisible()
+    assert "Highest octave: a &lt;b&gt;harp" in QToolTip.text()
+    QToolTip.hideText()
+    qtbot.waitUntil(lambda: not QToolTip.isVisible())
+    bar.show_pitches(False)
+    bar.say_octave("It is not shown.")
+    assert not QToolTip.isVisible()

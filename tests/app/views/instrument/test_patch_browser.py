@@ -92,6 +92,92 @@ def test_space_plays_and_is_a_blank_in_a_search(qtbot: QtBot, browser: PatchBrow
     assert browser.search.text() == "of b"
 
 
+def test_the_first_hit_is_selected_shown_and_what_keys_are_for(qtbot: QtBot, browser: PatchBrowser) -> None:
+    chosen: list[str] = []
+    browser.chosen.connect(chosen.append)
+    browser.search.setText("guitar")
+    assert browser.listed == ("nylon", "steel", "mine")
+    assert (browser.selected, browser._title.text()) == ("steel", "steel"), "what is loaded, if it is listed"
+    browser.search.setText("harp")
+    assert (browser.selected, browser._title.text()) == ("harp of brass", "harp of brass")
+    assert browser.list.currentItem().text().endswith("harp of brass")
+    with qtbot.waitSignal(browser.favourite_asked) as told:
+        qtbot.mouseClick(browser._star, LEFT)
+    assert told.args == ["harp of brass"]
+    with qtbot.waitSignal(browser.audition_asked) as told:
+        qtbot.mouseClick(browser._play, LEFT)
+    assert told.args == ["harp of brass"]
+    assert chosen == [], "it is shown, not loaded"
+    browser.search.setText("tuba")
+    assert (browser.selected, browser._title.text()) == ("", "No matching patch")
+    browser.search.clear()
+    assert browser.selected == "steel"
+
+
+def test_a_hit_by_its_name_is_better_than_one_by_its_description(
+    qtbot: QtBot, browser: PatchBrowser, guitar: Patch
+) -> None:
+    sharp = entry(guitar, "bass", description="Starts sharp")
+    browser.show_entries([sharp, entry(guitar, "nylon"), entry(guitar, "brass harp")], (), "nylon")
+    browser.search.setText("harp")
+    assert (browser.listed, browser.selected) == (("bass", "brass harp"), "brass harp")
+    browser.search.setText("starts")
+    assert browser.selected == "bass"
+    browser.set_chosen("bass")
+    browser.search.setText("harp")
+    assert browser.selected == "brass harp", "although the loaded one is listed too"
+    place = browser.list.visualItemRect(browser.list.item(1)).center()
+    qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place)
+    assert browser.selected == browser._title.text() == "bass"
+
+
+@pytest.mark.parametrize("loads", ["arrow", "click", "Enter"])
+def test_the_first_hit_is_loaded_although_it_is_selected_already(
+    qtbot: QtBot, browser: PatchBrowser, loads: str
+) -> None:
+    chosen: list[str] = []
+    browser.chosen.connect(chosen.append)
+    browser._category.setCurrentIndex(browser._category.findData("harp"))
+    if loads == "click":
+        place = browser.list.visualItemRect(browser.list.currentItem()).center()
+        qtbot.mouseClick(browser.list.viewport(), LEFT, pos=place)
+    else:
+        qtbot.keyClick(browser.search, KEY.Key_Down if loads == "arrow" else KEY.Key_Return)
+    assert chosen == ["harp of brass"]
+
+
+def test_typing_searches_wherever_the_focus_is(qtbot: QtBot, browser: PatchBrowser) -> None:
+    for focused in (browser.list, browser._category, browser._starred, browser._play, browser.search):
+        browser.search.clear()
+        focused.setFocus()
+        qtbot.keyClicks(focused, "h")
+        assert browser.search.hasFocus()
+        qtbot.keyClicks(browser.search, "arp")
+        assert browser.search.text() == "harp"
+        assert browser._category.currentIndex() == 0
+    browser._category.setFocus()
+    qtbot.keyClick(browser._category, KEY.Key_Escape)
+    assert not browser.isVisible()
+
+
+def test_a_heading_is_not_selected(qtbot: QtBot, browser: PatchBrowser) -> None:
+    chosen: list[str] = []
+    browser.chosen.connect(chosen.append)
+    heading = browser.list.visualItemRect(browser.list.item(0)).center()
+    qtbot.mouseClick(browser.list.viewport(), LEFT, pos=heading)
+    assert (browser.selected, chosen) == ("steel", [])
+    assert browser.list.currentItem().text().endswith("steel")
+
+
+def test_an_entry_that_a_search_hides_is_revealed(browser: PatchBrowser) -> None:
+    browser.search.setText("harp")
+    browser.reveal("harp of brass")
+    assert browser.search.text() == "harp"
+    browser.reveal("mine")
+    assert browser.search.text() == ""
+    assert "mine" in browser.listed
+
+
 def test_control_d_makes_a_favourite(qtbot: QtBot, browser: PatchBrowser) -> None:
     with qtbot.waitSignal(browser.favourite_asked) as told:
         qtbot.keyClick(browser.list, KEY.Key_D, Qt.KeyboardModifier.ControlModifier)

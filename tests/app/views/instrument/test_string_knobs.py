@@ -25,7 +25,7 @@ def test_every_field_is_shown_and_can_be_turned_to_both_ends(knobs: StringKnobs,
         if field.startswith("tuning."):
             continue
         assert knob.value == guitar.value(field)
-        for value in (knob.limits.low, knob.limits.high):
+        for value in knob.parameter.limits:
             if field not in ("pluck.softest_mm", "pluck.hardest_mm"):  # which bound each other
                 assert guitar.with_value(field, value).value(field) == pytest.approx(value)
     assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz

@@ -7,8 +7,10 @@ from itertools import pairwise
 import pyqtgraph as pg
 from pytestqt.qtbot import QtBot
 
+from app.presets.library import Library
+from app.session.choices import Session
 from app.views.plots.axis_label import TICK_PIXELS, UprightLabel, UprightTicks, sparse
-from app.views.plots.error_plane_view import ErrorPlaneView
+from app.window.panels.error_plane import ErrorPlanePanel
 
 TICKS = [(float(place), f"{place}") for place in range(11)]
 
@@ -59,7 +61,7 @@ def test_numbers_follow_height_and_range(qtbot: QtBot) -> None:
 
 
 def test_a_low_error_map_has_no_clipped_words(qtbot: QtBot) -> None:
-    view = ErrorPlaneView()
+    view = ErrorPlanePanel(Session(), Library([]))
     qtbot.addWidget(view)
     view.show()
     for height, label, foot in ((400, "amplitude (mm)", True), (130, "mm", False), (400, "amplitude (mm)", True)):

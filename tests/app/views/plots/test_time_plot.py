@@ -46,10 +46,10 @@ def test_the_end_of_training_is_set_off_from_a_picture(qtbot: QtBot) -> None:
         plot = TimePlot("t", "", shaded=shaded)
         qtbot.addWidget(plot)
         plot.set_times(2.0, 0.5)
-        assert plot._horizon.isVisible()
+        assert plot.horizon.isVisible()
         assert plot._edge.isVisible() != shaded
         assert plot._edge.value() == 0.5
-        assert plot._edge.pen.width() > plot._horizon.pen.width()
+        assert plot._edge.pen.width() > plot.horizon.pen.width()
         plot.set_times(2.0, 3.0)
         assert not plot._edge.isVisible()
 
@@ -131,9 +131,9 @@ def test_what_is_in_view_stays_for_a_take_of_the_same_length(plot: TimePlot) -> 
 
 
 def test_the_end_of_training_is_marked_where_it_lies_within(plot: TimePlot) -> None:
-    assert plot._horizon.isVisible()
-    assert plot._horizon.value() == 0.25
+    assert plot.horizon.isVisible()
+    assert plot.horizon.value() == 0.25
     assert plot._untrained.getRegion() == (0.25, 4.0)
     plot.set_times(0.2, 0.25)
-    assert not plot._horizon.isVisible()
+    assert not plot.horizon.isVisible()
     assert not plot._untrained.isVisible()

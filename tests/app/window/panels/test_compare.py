@@ -18,7 +18,7 @@ from app.window.panels import compare as module
 @pytest.fixture
 def shown(qtbot: QtBot, controller: Controller) -> Any:
     controller.session.update(right_view="compare")
-    view = next(panel.view for panel in controller.panels if panel.key == "compare")
+    view = next(panel for panel in controller.panels if panel.key == "compare")
     qtbot.waitUntil(lambda: bool(view.table.rows))  # type: ignore[attr-defined]
     return view
 
@@ -49,8 +49,8 @@ def test_the_preset_on_screen_is_computed_first_and_what_is_in_a_slot_next(
     panel = next(panel for panel in controller.panels if panel.key == "compare")
     qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
     order: list[str] = []
-    panel._background.progressed.connect(  # type: ignore[attr-defined]
-        lambda _, row: order.append(row.name) if row is not None else None
+    panel.background.progressed.connect(  # type: ignore[attr-defined]
+        lambda share, text, row: order.append(row.name) if row is not None else None
     )
     controller.session.update(preset="second", position=0.6)
     qtbot.waitUntil(lambda: order == ["second", "first"])
@@ -130,9 +130,9 @@ def test_a_bad_preset_is_a_row_with_the_reason(
 
 def test_it_is_stopped_and_goes_on(qtbot: QtBot, controller: Controller, shown: Any) -> None:
     panel = next(panel for panel in controller.panels if panel.key == "compare")
-    qtbot.waitUntil(lambda: panel._background.busy)  # type: ignore[attr-defined]
+    qtbot.waitUntil(lambda: panel.background.busy)  # type: ignore[attr-defined]
     qtbot.mouseClick(shown._stop, Qt.MouseButton.LeftButton)
     assert shown.progress.share is None
-    assert not panel._background.busy  # type: ignore[attr-defined]
+    assert not panel.background.busy  # type: ignore[attr-defined]
     qtbot.mouseClick(shown._stop, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))

@@ -35,7 +35,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Pluck]:
 @pytest.fixture
 def shown(qtbot: QtBot, asked: list[Pluck], controller: Controller) -> Any:
     controller.session.update(left_view="error_plane")
-    view = next(panel.view for panel in controller.panels if panel.key == "error_plane")
+    view = next(panel for panel in controller.panels if panel.key == "error_plane")
     qtbot.waitUntil(lambda: view._picture is not None and view._picture.spacing == 1)
     return view
 
@@ -83,7 +83,7 @@ def test_beyond_the_training_is_told(shown: Any) -> None:
 def test_any_range_of_amplitudes_is_drawn(shown: Any) -> None:
     """A preset may tell that it was trained from no amplitude on, or beyond the map."""
     for trained_mm in ((0.0, 20.0), (1e-9, 1e9), (0.0, 0.0)):
-        shown.set_trained((0.1, 0.9), trained_mm)
+        shown.map.set_trained((0.1, 0.9), trained_mm)
     assert not shown.map.is_trained(0.5, 3.0)
 
 

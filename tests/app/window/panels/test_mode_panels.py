@@ -20,7 +20,7 @@ LEFT = Qt.MouseButton.LeftButton
 def view(controller: Controller, key: str) -> Any:
     """The view of a panel, brought to the front."""
     controller.session.update(left_view=key)
-    return next(panel.view for panel in controller.panels if panel.key == key)
+    return next(panel for panel in controller.panels if panel.key == key)
 
 
 @pytest.fixture

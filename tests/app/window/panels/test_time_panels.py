@@ -21,22 +21,17 @@ from app.rendering.take import Motion
 from app.session.choices import Choices, Session
 from app.session.ears import heard_ear
 from app.session.shown import ShownSource
-from app.views.plots.space_time_view import AUTO
 from app.window.controller import Controller
-from app.window.panels import (
-    ErrorTimePanel,
-    Moment,
-    Panel,
-    SpaceTimePanel,
-    SpectrogramPanel,
-    SpectrumPanel,
-    StringPanel,
-    WaveformPanel,
-)
-from app.window.panels.spectrum import EVERY
+from app.window.panels import Moment, Panel, StringPanel
+from app.window.panels.error_time import ErrorTimePanel
+from app.window.panels.space_time import AUTO, SpaceTimePanel
+from app.window.panels.spectrogram import SpectrogramPanel
+from app.window.panels.spectrum import EVERY, SpectrumPanel
+from app.window.panels.waveform import WaveformPanel
 from engine.pluck import Pluck
 from engine.presets import read_info
 from engine.voices import Ear
+from tests.app.takes import append_to
 
 LEFT = Qt.MouseButton.LeftButton
 FRAMES = 4001  # a second
@@ -54,7 +49,7 @@ def take(small_preset: Path, hear: Hear) -> Take:
     truth = (0.004 * np.exp(-3 * time_s) * np.cos(2 * np.pi * made.fundamental_hz * time_s) * shape).astype(
         np.float32
     )
-    made.append(np.float32(1.01) * truth, truth)
+    append_to(made, np.float32(1.01) * truth, truth)
     hear(made, heard_ear(Choices()))
     return made
 
@@ -68,17 +63,17 @@ def make(qtbot: QtBot, take: Take) -> Iterator[Make]:
         panel = kind(Session(), Library([]))
         panels.append(panel)
         panel.choices_changed(frozenset(Choices.model_fields))
-        qtbot.addWidget(panel.view)
-        panel.view.resize(700, 300)
-        with qtbot.waitExposed(panel.view):
-            panel.view.show()
+        qtbot.addWidget(panel)
+        panel.resize(700, 300)
+        with qtbot.waitExposed(panel):
+            panel.show()
         panel.take_started(take)
         return panel
 
     yield made
     for panel in panels:
-        panel.close()
-    names = {"space-time", "spectrogram", "error-course"}
+        panel.end()
+    names = {panel.key for panel in panels}
     assert not names & {thread.name for thread in threading.enumerate()}
 
 
@@ -94,8 +89,8 @@ def watch(qtbot: QtBot, panel: Panel, take: Take, until: Callable[[], bool]) -> 
 
 def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(SpaceTimePanel)
-    view = panel.view
-    watch(qtbot, panel, take, lambda: panel._envelopes is not None and panel._envelopes.complete)
+    view: Any = panel
+    watch(qtbot, panel, take, lambda: panel._made is not None and panel._made.complete)
     view.plot.show_times(0.0, 0.02)
     watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
     assert view._image.image.shape[0] == 101
@@ -112,33 +107,31 @@ def test_the_map_shows_motion_and_error_in_mm(qtbot: QtBot, make: Make, take: Ta
 
 def test_bar_colours_and_readout_agree_on_the_sign(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(SpaceTimePanel)
-    view = panel.view
+    view: Any = panel
     watch(qtbot, panel, take, lambda: "without sign" in view.readout.text())
     assert view._bar.levels() == (0, pytest.approx(view.scale_mm))
     assert view._image.image.min() >= 0
-    panel._tell(0.3, 0.5)
+    panel._hover(0.3, 0.5)
     assert view.readout.text().endswith(f"peak {panel._picture.at(0.3, 0.5) * 1000:.4g} mm")
     view.plot.show_times(0.0, 0.02)
-    panel._tell(float("nan"), 0.5)
+    panel._hover(float("nan"), 0.5)
     watch(qtbot, panel, take, lambda: view.readout.text() == "every frame")
     assert view._bar.levels() == (-view.scale_mm, view.scale_mm)
 
 
 def test_small_errors_have_a_scale_of_their_own(make: Make) -> None:
-    view = make(SpaceTimePanel).view
-    view.set_take(1.0, 0.5, 4.0)
+    view = make(SpaceTimePanel)
     view.gains.setCurrentIndex(view.gains.findData(10_000))
     view.gains.activated.emit(0)
     axis = view._bar.axis
     assert (axis.labelText, axis.scale) == ("µm", pytest.approx(1000))
-    view.tell(0.1, 0.5, 0.0003)
-    assert view.readout.text() == "0.1000 s   position 0.50   +0.3 µm"
+    assert view._wordings(0.1, 0.5, 0.3e-6)[0] == "0.1000 s   position 0.50   +0.3 µm"
 
 
 def test_levels_below_the_range_are_told(make: Make) -> None:
-    view = make(SpectrogramPanel).view
+    view = make(SpectrogramPanel)
     view.begin_picture(2, 3, 0.1)
-    view.show_columns(0, np.full((2, 3), -95.0, np.float32))
+    view.show_columns(np.full((2, 3), -95.0, np.float32))
     assert view.readout.text() == "all levels are below −90 dB"
     view.ranges.setCurrentIndex(view.ranges.findData(130))
     view.ranges.activated.emit(0)
@@ -146,7 +139,7 @@ def test_levels_below_the_range_are_told(make: Make) -> None:
 
 
 def test_each_quantity_keeps_its_gain(make: Make) -> None:
-    view = make(SpaceTimePanel).view
+    view = make(SpaceTimePanel)
     view.gains.setCurrentIndex(view.gains.findData(10))
     view.gains.activated.emit(0)
     assert view.scale_mm == 0.4
@@ -158,7 +151,7 @@ def test_each_quantity_keeps_its_gain(make: Make) -> None:
 
 def test_a_click_on_the_map_seeks_and_with_shift_listens_there(qtbot: QtBot, make: Make) -> None:
     panel = make(SpaceTimePanel)
-    plot = panel.view.plot
+    plot = panel.plot
     place = plot.mapFromScene(plot.getPlotItem().vb.mapViewToScene(QPointF(0.25, 0.8)))
     before = panel.session.choices.listen
     with qtbot.waitSignal(panel.seek_asked) as asked:
@@ -169,7 +162,7 @@ def test_a_click_on_the_map_seeks_and_with_shift_listens_there(qtbot: QtBot, mak
     assert panel.session.choices.listen == pytest.approx(0.8, abs=0.02)
     panel.session.update(listen=0.1)
     panel.choices_changed(frozenset({"listen"}))
-    assert panel.view._listening.value() == 0.1
+    assert panel._listening.value() == 0.1
 
 
 @pytest.mark.parametrize("kind", [StringPanel, SpectrumPanel, WaveformPanel])
@@ -225,26 +218,26 @@ def test_the_spectrogram_follows_the_listening_point(qtbot: QtBot, make: Make, t
         hear(take, Ear((listen,)))
 
         def drawn(listen: float = listen) -> bool:
-            made = panel._drawn_of[0] if panel._drawn_of else None
+            made = panel._shown[0] if panel._shown else None
             return made is not None and made.listened.ear == Ear((listen,)) and panel._drawn == made.columns
 
         watch(qtbot, panel, take, drawn)
-        peaks_db.append(panel.view._levels_db[10].max())
+        peaks_db.append(panel._levels_db[10].max())
     assert peaks_db[0] == pytest.approx(20 * np.log10(1.01 * 4 / 10), abs=2)
-    assert panel.view._bar.getAxis("left").labelText == "dB re 10 mm"
+    assert panel._bar.getAxis("left").labelText == "dB re 10 mm"
     choose(panel, pickup="velocity")
-    assert panel.view._bar.getAxis("left").labelText == "dB re 30 m/s"
+    assert panel._bar.getAxis("left").labelText == "dB re 30 m/s"
     assert peaks_db[1] - peaks_db[0] == pytest.approx(20 * np.log10(0.5), abs=0.1)
 
 
 def test_the_spectrograms_scale_is_one_for_all_sources(qtbot: QtBot, make: Make, take: Take, hear: Hear) -> None:
     panel = make(SpectrogramPanel)
     hear(take, Ear((0.5,)))
-    view = panel.view
+    view: Any = panel
     seen = {}
     for key in ("truth", "error"):
         view.quantities.show_key(key)
-        watch(qtbot, panel, take, lambda key=key: panel._drawn_of[1:2] == (key,) and panel._drawn > 10)
+        watch(qtbot, panel, take, lambda key=key: panel._shown[1:2] == (key,) and panel._drawn > 10)
         seen[key] = int(view._pixels[10].max())
     assert (seen["truth"] - seen["error"]) / 255 * 90 == pytest.approx(40, abs=1)  # dB
     view.ranges.setCurrentIndex(view.ranges.findData(60))
@@ -255,11 +248,11 @@ def test_the_spectrograms_scale_is_one_for_all_sources(qtbot: QtBot, make: Make,
 
 def test_linear_and_logarithmic_rows(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(SpectrogramPanel)
-    view = panel.view
+    view: Any = panel
     watch(qtbot, panel, take, lambda: panel._drawn > 10)
     logarithmic = int(view._levels_db[10].argmax())
     qtbot.mouseClick(view.scales._group.button(1), LEFT)
-    watch(qtbot, panel, take, lambda: panel._drawn_of[2:] == (False,) and panel._drawn > 10)
+    watch(qtbot, panel, take, lambda: panel._shown[2:] == (False,) and panel._drawn > 10)
     linear = int(view._levels_db[10].argmax())
     rows = view._levels_db.shape[1]
     assert linear / rows * 2000 == pytest.approx(take.fundamental_hz, abs=30)
@@ -269,8 +262,8 @@ def test_linear_and_logarithmic_rows(qtbot: QtBot, make: Make, take: Take) -> No
 
 def test_the_error_over_time(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(ErrorTimePanel)
-    view = panel.view
-    watch(qtbot, panel, take, lambda: panel._course is not None and panel._course.complete)
+    view: Any = panel
+    watch(qtbot, panel, take, lambda: panel._made is not None and panel._made.complete)
     watch(qtbot, panel, take, lambda: view._curves["mae"].getData()[0] is not None)
     for name in ("mae", "rmse"):
         assert view._curves[name].getData()[1] == pytest.approx(-2, abs=1e-3)  # 1 %
@@ -292,23 +285,23 @@ def test_the_error_over_time(qtbot: QtBot, make: Make, take: Take) -> None:
 
 def test_ten_seconds_are_asked_for_with_a_button(qtbot: QtBot, make: Make) -> None:
     panel = make(ErrorTimePanel)
-    qtbot.mouseClick(panel.view.longer, LEFT)
+    qtbot.mouseClick(panel.longer, LEFT)
     assert panel.session.choices.seconds == 10
     panel.choices_changed(frozenset({"seconds"}))
-    assert not panel.view.longer.isEnabled()
+    assert not panel.longer.isEnabled()
 
 
 def test_the_spectrum_tells_level_and_nearest_partial(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(SpectrumPanel)
-    watch(qtbot, panel, take, lambda: bool(panel.view._levels_db))
+    watch(qtbot, panel, take, lambda: bool(panel._levels_db))
     second_hz = float(take.info.string.undamped_frequencies(2)[1]) / (2 * np.pi)
-    panel.view.hovered.emit(second_hz * 2 ** (10 / 1200))
-    assert f"partial 2: {second_hz:.1f} Hz (+10 cents)" in panel.view.readout.text()
-    assert "A −" in panel.view.readout.text().replace("-", "−")
-    assert 10 ** panel.view._partial.value() == pytest.approx(second_hz)
-    panel.view.hovered.emit(float("nan"))
-    assert panel.view.readout.text() == ""
-    assert not panel.view._partial.isVisible()
+    panel.hover(second_hz * 2 ** (10 / 1200))
+    assert f"partial 2: {second_hz:.1f} Hz (+10 cents)" in panel.readout.text()
+    assert "A −" in panel.readout.text().replace("-", "−")
+    assert 10 ** panel._partial.value() == pytest.approx(second_hz)
+    panel.hover(float("nan"))
+    assert panel.readout.text() == ""
+    assert not panel._partial.isVisible()
 
 
 def test_at_the_end_the_spectrum_stays(qtbot: QtBot, make: Make, take: Take) -> None:
@@ -318,7 +311,7 @@ def test_at_the_end_the_spectrum_stays(qtbot: QtBot, make: Make, take: Take) -> 
         qtbot.waitUntil(
             lambda at=position_s: panel.show_moment(Moment(take, at, False, 0.016)) or panel._shown[2:3] == (at,)
         )
-        assert panel.view._levels_db["truth"].max() > -60
+        assert panel._levels_db["truth"].max() > -60
 
 
 def test_while_a_take_grows_the_spectrum_is_of_a_whole_window(make: Make, take: Take) -> None:
@@ -329,14 +322,14 @@ def test_while_a_take_grows_the_spectrum_is_of_a_whole_window(make: Make, take: 
     panel.take_started(growing)
     for _ in range(EVERY):
         panel.show_moment(Moment(growing, 0.499, True, 0.016))
-    edge_db = panel.view._levels_db["truth"]
+    edge_db = panel._levels_db["truth"]
     for _ in range(EVERY):
-        panel.show_moment(Moment(take, 0.5 - panel.view._analysers["truth"].window_frames / 4000, True, 0.016))
-    assert edge_db == pytest.approx(panel.view._levels_db["truth"], abs=1e-6)
+        panel.show_moment(Moment(take, 0.5 - panel._analysers["truth"].window_frames / 4000, True, 0.016))
+    assert edge_db == pytest.approx(panel._levels_db["truth"], abs=1e-6)
 
 
 def test_the_spectrums_range_is_one_for_both_sources(make: Make, take: Take) -> None:
-    view = make(SpectrumPanel).view
+    view = make(SpectrumPanel)
     view.ranges.setCurrentIndex(0)
     view.ranges.activated.emit(0)
     for source in ("model", "truth"):
@@ -351,11 +344,11 @@ def test_the_waveform_is_that_of_the_listening_point(qtbot: QtBot, make: Make, t
         hear(take, Ear((listen,)))
         all_of_it = (take.listened, {"model": FRAMES, "truth": FRAMES})
         watch(qtbot, panel, take, lambda all_of_it=all_of_it: panel._shown[:2] == all_of_it)
-        time_s, drawn_mm = panel.view._curves["model"].getData()
+        time_s, drawn_mm = panel._curves["model"].getData()
         signal_mm = 1000 * take.motion_m("model")[:, round(100 * listen)]
         assert drawn_mm.max() == pytest.approx(signal_mm.max(), rel=1e-5)
         assert drawn_mm.min() == pytest.approx(signal_mm.min(), rel=1e-5)
-        assert time_s[-1] == pytest.approx(1.0, abs=1.5 / panel.view.columns)
+        assert time_s[-1] == pytest.approx(1.0, abs=1.5 / panel.plot.columns)
 
 
 def drawn(view: Any, source: str) -> Any:
@@ -387,23 +380,21 @@ def test_a_velocity_is_drawn_in_m_s(
     choose_and_hear(waveform, pickup="velocity", listen=0.5)
     choose_and_hear(spectrum, pickup="velocity", listen=0.5)
     watch(qtbot, waveform, take, lambda: waveform._shown[1:2] == ({"model": FRAMES, "truth": FRAMES},))
-    watch(qtbot, spectrum, take, lambda: bool(spectrum.view._levels_db))
+    watch(qtbot, spectrum, take, lambda: bool(spectrum._levels_db))
     omega = 2 * np.pi * take.fundamental_hz
-    assert drawn(waveform.view, "truth").max() == pytest.approx(0.004 * omega, rel=0.02)
-    assert waveform.view.getPlotItem().getAxis("left").labelText == "velocity (m/s)"
+    assert drawn(waveform, "truth").max() == pytest.approx(0.004 * omega, rel=0.02)
+    assert waveform.plot.getPlotItem().getAxis("left").labelText == "velocity (m/s)"
     choose_and_hear(waveform, amplitude_mm=4.0, listen=0.999)
-    watch(qtbot, waveform, take, lambda: "mm/s" in waveform.view.getPlotItem().getAxis("left").labelText)
-    assert drawn(waveform.view, "truth").max() == pytest.approx(4 * omega * np.sin(0.001 * np.pi), rel=0.05)
+    watch(qtbot, waveform, take, lambda: "mm/s" in waveform.plot.getPlotItem().getAxis("left").labelText)
+    assert drawn(waveform, "truth").max() == pytest.approx(4 * omega * np.sin(0.001 * np.pi), rel=0.05)
     # The spectrum at 0.5 s: a sine of 0.004·e^−1.5·ω, in units of 30 m/s
     expected_db = 20 * np.log10(0.004 * np.exp(-1.5) * omega / 30)
-    assert spectrum.view._levels_db["truth"].max() == pytest.approx(expected_db, abs=2.5)
-    assert "30 m/s" in spectrum.view.plot.getPlotItem().getAxis("left").labelText
+    assert spectrum._levels_db["truth"].max() == pytest.approx(expected_db, abs=2.5)
+    assert "30 m/s" in spectrum.plot.getPlotItem().getAxis("left").labelText
     choose_and_hear(spectrum, pickup="displacement")
     watch(qtbot, spectrum, take, lambda: spectrum._shown[:1] == (take.listened,))
-    assert spectrum.view._levels_db["truth"].max() == pytest.approx(
-        20 * np.log10(0.004 * np.exp(-1.5) / 0.01), abs=2.5
-    )
-    assert "10 mm" in spectrum.view.plot.getPlotItem().getAxis("left").labelText
+    assert spectrum._levels_db["truth"].max() == pytest.approx(20 * np.log10(0.004 * np.exp(-1.5) / 0.01), abs=2.5)
+    assert "10 mm" in spectrum.plot.getPlotItem().getAxis("left").labelText
 
 
 def test_a_slot_with_the_difference_is_drawn_with_its_gain(
@@ -412,21 +403,21 @@ def test_a_slot_with_the_difference_is_drawn_with_its_gain(
     waveform, spectrum = make(WaveformPanel), make(SpectrumPanel)
     for panel in (waveform, spectrum):
         choose_and_hear(panel, b="difference", difference_gain_db=20.0, listen=0.5)
-        assert set(panel.view._curves) == {"model", "difference"}
-        assert panel.view.legend.text == "A  model · heard   B  difference +20 dB"
+        assert set(panel._curves) == {"model", "difference"}
+        assert panel.legend.text == "A  model · heard   B  difference +20 dB"
     watch(qtbot, waveform, take, lambda: waveform._shown[1:2] == ({"model": FRAMES, "difference": FRAMES},))
-    watch(qtbot, spectrum, take, lambda: set(spectrum.view._levels_db) == {"model", "difference"})
-    assert drawn(waveform.view, "difference").max() == pytest.approx(0.4, rel=1e-2)  # 1 % of 4 mm, ten times
-    levels_db = spectrum.view._levels_db
+    watch(qtbot, spectrum, take, lambda: set(spectrum._levels_db) == {"model", "difference"})
+    assert drawn(waveform, "difference").max() == pytest.approx(0.4, rel=1e-2)  # 1 % of 4 mm, ten times
+    levels_db = spectrum._levels_db
     assert levels_db["model"].max() - levels_db["difference"].max() == pytest.approx(20.1, abs=0.1)
     choose(waveform, difference_gain_db=40.0)
-    watch(qtbot, waveform, take, lambda: drawn(waveform.view, "difference").max() > 3.9)
+    watch(qtbot, waveform, take, lambda: drawn(waveform, "difference").max() > 3.9)
     choose(waveform, heard="b")
-    top = max(waveform.view._curves.items(), key=lambda pair: pair[1].zValue())
+    top = max(waveform._curves.items(), key=lambda pair: pair[1].zValue())
     assert top[0] == "difference"
     choose(waveform, a="truth", b="truth")
-    assert set(waveform.view._curves) == {"truth"}
-    watch(qtbot, waveform, take, lambda: len(drawn(waveform.view, "truth")) > 0)
+    assert set(waveform._curves) == {"truth"}
+    watch(qtbot, waveform, take, lambda: len(drawn(waveform, "truth")) > 0)
 
 
 def test_another_preset_is_drawn_at_its_rate_when_it_is_there(
@@ -437,20 +428,20 @@ def test_another_preset_is_drawn_at_its_rate_when_it_is_there(
     for panel in (waveform, spectrum):
         choose_and_hear(panel, b=source, heard="b", listen=0.5)
     watch(qtbot, waveform, take, lambda: waveform._shown[1:2] == ({"model": FRAMES},))
-    watch(qtbot, spectrum, take, lambda: "model" in spectrum.view._levels_db)
-    assert len(drawn(waveform.view, source)) == 0
+    watch(qtbot, spectrum, take, lambda: "model" in spectrum._levels_db)
+    assert len(drawn(waveform, source)) == 0
     time_s = np.arange(16_001)[:, None] / 16_000
     motion = 1e-3 * np.cos(2 * np.pi * 3_000 * time_s) * np.sin(np.pi * np.linspace(0, 1, 51))
-    take.others[source] = Motion(16_000, 51, 1.0)
-    take.others[source].append(motion.astype(np.float32))
+    take.motions[source] = Motion(16_000, 51, 1.0)
+    take.motions[source].append(motion.astype(np.float32))
     choose_and_hear(waveform)
-    watch(qtbot, waveform, take, lambda: len(drawn(waveform.view, source)) > 0)
-    watch(qtbot, spectrum, take, lambda: source in spectrum.view._levels_db)
-    assert drawn(waveform.view, source).max() == pytest.approx(1.0, rel=1e-3)
-    assert waveform.view._curves[source].getData()[0][-1] == pytest.approx(1.0, abs=1.5 / waveform.view.columns)
-    loudest_hz = spectrum.view._curves[source].getData()[0][spectrum.view._levels_db[source].argmax()]
+    watch(qtbot, waveform, take, lambda: len(drawn(waveform, source)) > 0)
+    watch(qtbot, spectrum, take, lambda: source in spectrum._levels_db)
+    assert drawn(waveform, source).max() == pytest.approx(1.0, rel=1e-3)
+    assert waveform._curves[source].getData()[0][-1] == pytest.approx(1.0, abs=1.5 / waveform.plot.columns)
+    loudest_hz = spectrum._curves[source].getData()[0][spectrum._levels_db[source].argmax()]
     assert loudest_hz == pytest.approx(np.log10(3_000), abs=0.01) or loudest_hz == pytest.approx(3_000, rel=0.02)
-    assert set(spectrum.view.levels_db(3_000)) == {source}  # the model's rate ends before
+    assert set(spectrum.levels_db(3_000)) == {source}  # the model's rate ends before
 
 
 def test_a_mode_alone_and_the_ear_are_told(
@@ -459,12 +450,12 @@ def test_a_mode_alone_and_the_ear_are_told(
     panel = make(WaveformPanel)
     choose_and_hear(panel, solo=2, stereo=True)
     watch(qtbot, panel, take, lambda: panel._shown[1:2] == ({"model": FRAMES, "truth": FRAMES},))
-    assert "(µm)" in panel.view.getPlotItem().getAxis("left").labelText
-    assert np.abs(drawn(panel.view, "truth")).max() < 1e-3  # the take has the first mode alone
-    assert panel.view.legend.text.startswith("mode 2, left   A  model")
+    assert "(µm)" in panel.plot.getPlotItem().getAxis("left").labelText
+    assert np.abs(drawn(panel, "truth")).max() < 1e-3  # the take has the first mode alone
+    assert panel.legend.text.startswith("mode 2, left   A  model")
     choose_and_hear(panel, solo=0, stereo=False)
-    watch(qtbot, panel, take, lambda: drawn(panel.view, "truth").max() > 1)
-    assert panel.view.legend.text.startswith("A  model")
+    watch(qtbot, panel, take, lambda: drawn(panel, "truth").max() > 1)
+    assert panel.legend.text.startswith("A  model")
 
 
 def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Controller) -> None:
@@ -472,7 +463,7 @@ def test_in_the_window_they_follow_one_playhead(qtbot: QtBot, controller: Contro
     panels = {panel.key: panel for panel in controller.panels}
     for left, right in (("spectrogram", "space_time"), ("spectrogram", "error_time")):
         session.update(left_view=left, right_view=right)
-        plots = [panels[key].view.plot for key in (left, right)]
+        plots = [panels[key].plot for key in (left, right)]
         qtbot.waitUntil(lambda: controller.performance.take is not None)  # else there is nothing to seek in
         with qtbot.waitSignal(panels[right].seek_asked):
             plots[1].seek_asked.emit(0.3)
@@ -490,7 +481,7 @@ def test_a_view_that_is_not_looked_at_lets_the_last_take_go(
     """Takes have tens of megabytes."""
     panel = make(kind)
     last = Take("last", take.info, take.pluck, 1.0, Ear((0.5,)))
-    last.append(take.motion_m("model"), take.motion_m("truth"))
+    append_to(last, take.motion_m("model"), take.motion_m("truth"))
     hear(last, Ear((0.5,)))
     panel.take_started(last)
     for _ in range(20):
@@ -515,8 +506,8 @@ def test_the_string_says_that_it_shows_all_modes(make: Make, take: Take) -> None
 def test_the_string_shows_both_motions_at_one_moment_however_late_they_are(make: Make, take: Take) -> None:
     late = Take(take.preset_name, take.info, take.pluck, take.seconds, take.listened.ear)
     model, truth = take.motion_m("model"), take.motion_m("truth")
-    late.append(model[:400], truth[:400])
-    late.motion("model").append(model[400:900])  # the truth's half of a block is on its way
+    append_to(late, model[:400], truth[:400])
+    late.motions["model"].append(model[400:900])  # the truth's half of a block is on its way
     panel = make(StringPanel)
     panel.take_started(late)
     panel.show_moment(Moment(late, take.seconds, True, 0.016))

@@ -9,8 +9,10 @@ import pyqtgraph as pg
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.views.plots.spectrum_view import SpectrumView, analyser_at
-from app.views.plots.waveform_view import WaveformView
+from app.presets.library import Library
+from app.session.choices import Session
+from app.window.panels.spectrum import SpectrumPanel, analyser_at
+from app.window.panels.waveform import WaveformPanel
 
 RATE_HZ = 16_000
 
@@ -29,22 +31,22 @@ def painted(monkeypatch: pytest.MonkeyPatch) -> list[pg.AxisItem]:
     return found
 
 
-def draw_waveform(view: WaveformView, turn: int) -> None:
+def draw_waveform(view: WaveformPanel, turn: int) -> None:
     view.set_scale(1.0, "displacement", "mm")
     view.show_signal("model", np.sin(np.arange(100 * (turn + 1)) / 9).astype(np.float32), RATE_HZ)
 
 
-def draw_spectrum(view: SpectrumView, turn: int) -> None:
+def draw_spectrum(view: SpectrumPanel, turn: int) -> None:
     view.show_signal("model", np.sin(np.arange(4096) / (9 + turn)).astype(np.float32), analyser_at(RATE_HZ))
 
 
 @pytest.mark.parametrize(
-    ("make", "draw"), [(WaveformView, draw_waveform), (SpectrumView, draw_spectrum)], ids=["waveform", "spectrum"]
+    ("make", "draw"), [(WaveformPanel, draw_waveform), (SpectrumPanel, draw_spectrum)], ids=["waveform", "spectrum"]
 )
 def test_axes_stay_while_curves_move(
-    qtbot: QtBot, painted: list[pg.AxisItem], make: Callable[[], pg.QtWidgets.QWidget], draw: Callable[..., None]
+    qtbot: QtBot, painted: list[pg.AxisItem], make: Callable[..., pg.QtWidgets.QWidget], draw: Callable[..., None]
 ) -> None:
-    view = make()
+    view = make(Session(), Library([]))
     qtbot.addWidget(view)
     view.resize(500, 300)
     with qtbot.waitExposed(view):
@@ -60,16 +62,16 @@ def test_axes_stay_while_curves_move(
 
 
 def test_what_is_kept_follows_the_view(qtbot: QtBot, painted: list[pg.AxisItem]) -> None:
-    view = WaveformView()
+    view = WaveformPanel(Session(), Library([]))
     qtbot.addWidget(view)
     view.resize(500, 300)
-    view.set_take(2.0, 1.0)
+    view.plot.set_times(2.0, 1.0)
     with qtbot.waitExposed(view):
         view.show()
     qtbot.wait(100)
-    item = view.getPlotItem()
+    item = view.plot.getPlotItem()
     for change, side in (
-        (lambda: view.zoom(0.5), "bottom"),
+        (lambda: view.plot.zoom(0.5), "bottom"),
         (lambda: view.set_scale(3.0, "velocity", "m/s"), "left"),
     ):
         painted.clear()

@@ -1,0 +1,64 @@
+"""Pitch glide: by how many cents a key starts above its resting pitch, in closed form.
+
+A pluck stretches the string, which raises its tension. Over a period of each mode, q_n² averages to half its peak and
+q_n³ to three quarters of it, so that the first partial is raised to
+
+    ω² = ω₁² + k₁ (Σ_m η_m² q_m² / 2 + η₁² q₁² / 4),
+
+with the symbols of `engine.resonators.base`. Each q_m² decays by exp(-2σ_m t); here it is its mean over the first
+START_S, as high modes of short strings die away before a pitch is heard. The glide grows with amplitude squared.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from app.instrument.strings import MOST_MODES, KeyString, Strings
+from app.patches.patch import HIGHEST_KEY, VELOCITIES, Patch
+from engine.pluck import LARGEST_AMPLITUDE_MM
+from engine.resonators.sine_transform import analysis_matrix
+
+START_S = 0.1  # of a note, over which its pitch is averaged
+GRID_POINTS = 101
+
+
+@lru_cache(maxsize=8)
+def glides_cents(patch: Patch) -> NDArray[np.float64]:
+    """The glides of a patch in cents by key and velocity, (128, 128); velocity 0 as 1. Read-only.
+
+    A key that is silent or has no possible string is a row of NaN.
+
+    Raises:
+        ValueError: the tuning is impossible.
+    """
+    strings = Strings(patch)
+    plucks = [patch.pluck.pluck(velocity) for velocity in range(VELOCITIES[1] + 1)]
+    amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
+    shapes_m = torch.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
+    modal_m = (shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)).numpy()
+    found = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
+    low, high = patch.range
+    for key in range(low, high + 1):
+        try:
+            string = strings.of_key(key)
+        except ValueError:
+            continue
+        if string is not None:
+            pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)
+            found[key] = _of_string(string, modal_m * pulled[:, None])
+    found.setflags(write=False)
+    return found
+
+
+def _of_string(string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The glides (plucks,) of plucks with these modal amplitudes, (plucks, at least the string's modes)."""
+    parameters, modes = string.parameters, string.modes
+    decayed = 2 * START_S * parameters.decay_rates(modes).numpy()
+    decayed = np.maximum(decayed, 1e-9)  # a string may be without damping
+    squares = (modal_m[:, :modes] * parameters.wavenumbers(modes).numpy()) ** 2 * (-np.expm1(-decayed) / decayed)
+    coupling = float(parameters.tension_coupling(1)) / parameters.undamped_frequency(1) ** 2
+    return np.asarray(600 * np.log2(1 + coupling * (squares.sum(1) / 2 + squares[:, 0] / 4)))

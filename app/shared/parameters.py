@@ -1,0 +1,261 @@
+"""The table of parameters: each one's identity, range, unit, words and use, declared once.
+
+Knobs, MIDI controllers, the modulation wheel, macros, undo, fields of patches and of the session's choices read it.
+It needs no engine but the ranges of a pluck, a body and a room.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
+from engine.effects.body import SIZE
+from engine.effects.room import T60_S
+from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+
+Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
+_ORDER: tuple[Modulation, ...] = ("none", "learn", "macro", "wheel")
+PITCH, STRING, DECAY, PLUCK, PICKUP, BODY = "PITCH", "STRING", "DECAY", "PLUCK", "PICK-UP", "BODY"
+
+
+@dataclass(frozen=True)
+class Taper:
+    """How a value moves and reads: `step` of an arrow key or a wheel notch, a ratio above 1 where logarithmic."""
+
+    step: float
+    text: str = "{:.2f}"  # format, with the unit
+    logarithmic: bool = False
+
+
+TIMES = Taper(1.03, "× {:.2f}", True)
+MILLIMETRES, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", True)
+PLACE, WIDTH, PERCENT = Taper(0.01), Taper(1.05, "{:.3f}", True), Taper(0.02, "{:.0%}")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a player can change.
+
+    Attributes:
+        id: its path, in a patch ("knobs.tension") or in the session's choices ("volume_db"); files hold it.
+        label: on a knob.
+        limits: the lowest and the highest value.
+        group: title of the knobs that it stands with; "": none.
+        modulation: what may change it besides its knob: a learned controller, also macros, also the modulation wheel.
+        name: in a sentence or a list; empty: the label.
+        wheel: its value at the modulation wheel's end; None: `wheel_factor` times its own value.
+        figure_unit: unit of the physical figure that its knob shows, see `app.instrument.facts`; None: none.
+        whole: whether it is an integer.
+    """
+
+    id: str
+    label: str
+    limits: tuple[float, float]
+    default: float
+    taper: Taper
+    group: str = ""
+    modulation: Modulation = "none"
+    name: str = ""
+    wheel: float | None = None
+    wheel_factor: float = 1.0
+    figure_unit: str | None = None
+    whole: bool = False
+    tip: str = field(init=False, default="")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.name or self.label)
+        object.__setattr__(self, "tip", TIPS.get(self.id, ""))
+
+    def share(self, value: float) -> float:
+        """0 … 1 along the range."""
+        low, high = self.limits
+        return (
+            math.log(value / low) / math.log(high / low) if self.taper.logarithmic else (value - low) / (high - low)
+        )
+
+    def value(self, share: float) -> float:
+        """The inverse of `share`, which is limited to 0 … 1."""
+        (low, high), share = self.limits, min(max(share, 0.0), 1.0)
+        return self.clamped(low * (high / low) ** share if self.taper.logarithmic else low + share * (high - low))
+
+    def stepped(self, value: float, steps: float) -> float:
+        """`value` moved by so many steps, within the range."""
+        step = self.taper.step
+        return self.clamped(value * step**steps if self.taper.logarithmic else value + step * steps)
+
+    def clamped(self, value: float) -> float:
+        return min(max(value, self.limits[0]), self.limits[1])
+
+    def shown(self, value: float) -> str:
+        """The value with its unit."""
+        return self.taper.text.format(value)
+
+    def allows(self, modulation: Modulation) -> bool:
+        """Whether this kind of modulation may change it."""
+        return _ORDER.index(self.modulation) >= _ORDER.index(modulation)
+
+
+_PLACE_TIP = "0 and 1 are the ends of the string, 0.5 its middle"
+TIPS = {
+    "tuning.a4_hz": "Pitch of A4",
+    "tuning.transpose": "Transposition, in keys",
+    "knobs.tension": "Tension; the pitch stays, so that the length follows. Tight strings glide less at hard plucks",
+    "knobs.length": "Length of the string; the pitch stays, so that the tension follows: longer is tighter",
+    "knobs.gauge": "Thickness (diameter) at the same length: thick strings are heavier, tighter and stiffer",
+    "knobs.density": "Mass of the material at the same length: gut is light and slack, steel heavy and tight",
+    "knobs.modulus": "Stiffness of the material (Young's modulus): how much a hard pluck glides in pitch",
+    "knobs.stiffness": "Bending stiffness alone: how far partials are spread. The figure is the inharmonicity B: "
+    "partial n of f lies at n f √(1 + B n²)",
+    "knobs.decay": "Damping of all partials alike: more is shorter. The figure is the T60 of the first",
+    "knobs.brightness_decay": "Damping that grows with frequency: more darkens sooner. The figure is the T60 of the "
+    "partial near 3 kHz",
+    "damping.release_t60_s": "Time in which a released key falls by 60 dB",
+    "pluck.position": f"Where it is plucked; {_PLACE_TIP}",
+    "pluck.width": "Width of the softest pluck, in lengths of the string: wide is mellow",
+    "pluck.width_hard": "Width of the hardest pluck, in lengths of the string: narrow is bright",
+    "pluck.softest_mm": "How far the softest key pulls the string",
+    "pluck.hardest_mm": "How far the hardest key pulls the string",
+    "pluck.curve": "Velocity curve: above 0 middle velocities are louder, below 0 softer",
+    "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
+    "pickup.points.1": "Where the right channel hears the string; a patch in mono has none",
+    "body.mix": "Mix of the body: 0 % the strings alone, 100 % the body alone",
+    "room.mix": "Mix of the room: 0 % without it, 100 % its reverberation alone",
+    "level_db": "Level of the patch; saved with it",
+    "position": "Pluck position; 0 and 1 are the ends of the string",
+    "amplitude_mm": "Peak displacement of the pluck",
+    "width": "Width of the pluck as a share of the string's length",
+    "listen": "Listening point on the string",
+    "listen_right": "Listening point of the right channel in stereo; the left is at “listen”",
+    "seconds": "Length of a rendered pluck",
+    "speed": "Slow motion of the string view, as under a stroboscope; the sound is not slowed",
+    "volume_db": "Playback volume; exported files are not affected",
+}
+
+
+def _knob(part: str, label: str, limits: tuple[float, float], figure_unit: str, **more: str | float) -> Parameter:
+    """A multiplier of the string, which the wheel multiplies by four at its end, unless said otherwise."""
+    group = DECAY if part in ("decay", "brightness_decay") else STRING
+    factor = float(more.get("wheel_factor", 4.0))
+    return Parameter(
+        f"knobs.{part}",
+        label,
+        limits,
+        1.0,
+        TIMES,
+        group,
+        "wheel",
+        str(more.get("name", "")),
+        None,
+        factor,
+        figure_unit,
+    )
+
+
+MULTIPLIER = (0.05, 20.0)
+AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
+OF_PATCHES: Mapping[str, Parameter] = {
+    each.id: each
+    for each in (
+        Parameter(
+            "tuning.a4_hz",
+            "A4",
+            (220, 880),
+            440,
+            Taper(2 ** (1 / 1200), "{:.1f} Hz", True),
+            PITCH,
+            name="pitch of A4",
+        ),
+        Parameter(
+            "tuning.transpose",
+            "transpose",
+            (-48, 48),
+            0,
+            Taper(1, "{:+.0f}"),
+            PITCH,
+            name="transposition",
+            whole=True,
+        ),
+        _knob("tension", "tension", (0.0625, 16.0), "N"),  # over which the length goes through its own range
+        _knob("length", "length", (0.25, 4.0), "mm", name="string length", wheel_factor=2.0),
+        _knob("gauge", "gauge", (0.25, 4.0), "mm"),
+        _knob("density", "density", MULTIPLIER, "kg/m³"),
+        _knob("modulus", "modulus", MULTIPLIER, "GPa"),
+        _knob("stiffness", "stiffness", MULTIPLIER, ""),
+        _knob("decay", "decay", MULTIPLIER, "s"),
+        _knob("brightness_decay", "dulling", MULTIPLIER, "s"),
+        Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
+        Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", 0.5),
+        Parameter("pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", wheel=0.02),
+        Parameter("pluck.width_hard", "hard width", WIDTH_RANGE, 0.06, WIDTH, PLUCK, "wheel", wheel=0.02),
+        Parameter("pluck.softest_mm", "softest", AMPLITUDE_MM, 0.1, MILLIMETRES, PLUCK, "macro", "softest amplitude"),
+        Parameter(
+            "pluck.hardest_mm",
+            "hardest",
+            AMPLITUDE_MM,
+            3.0,
+            MILLIMETRES,
+            PLUCK,
+            "wheel",
+            "hardest amplitude",
+            wheel_factor=2,
+        ),
+        Parameter("pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", 1.0),
+        Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
+        Parameter(
+            "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"
+        ),
+        Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", 1.0),
+        Parameter("body.size", "size", SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),
+        Parameter("room.mix", "room", (0, 1), 0, PERCENT, BODY, "wheel", wheel=1.0),
+        Parameter("room.t60_s", "time", T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3),
+        Parameter("level_db", "level", (-60, 24), 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro"),
+    )
+}
+OF_CHOICES: Mapping[str, Parameter] = {
+    each.id: each
+    for each in (
+        Parameter("position", "position", POSITION_RANGE, 0.35, PLACE, modulation="learn", name="pluck position"),
+        Parameter(
+            "amplitude_mm", "amplitude", (0, LARGEST_AMPLITUDE_MM), 4.0, Taper(0.25, "{:.2f} mm"), modulation="learn"
+        ),
+        Parameter("width", "width", WIDTH_RANGE, 0.06, WIDTH, modulation="learn", name="pluck width"),
+        Parameter("listen", "listen", (0, 1), DEFAULT_LISTEN, PLACE, modulation="learn", name="listening point"),
+        Parameter(
+            "listen_right",
+            "right",
+            (0, 1),
+            1 - DEFAULT_LISTEN,
+            PLACE,
+            modulation="learn",
+            name="right listening point",
+        ),
+        Parameter("seconds", "duration", (0.5, 12), 4.0, Taper(0.5, "{:.1f} s"), modulation="learn"),
+        # 1 is real time; a thousandth shows one period of a low string in seconds
+        Parameter(
+            "speed",
+            "slow-mo",
+            (0.001, 1),
+            0.004,
+            Taper(1.25, "× {:.3f}", True),
+            modulation="learn",
+            name="slow motion",
+        ),
+        Parameter("volume_db", "volume", (-60, 12), 4.0, Taper(1, "{:+.0f} dB"), modulation="learn"),
+        Parameter("difference_gain_db", "difference", DIFFERENCE_GAIN_RANGE_DB, 20.0, Taper(10, "{:+.0f} dB")),
+    )
+}
+PARAMETERS: Mapping[str, Parameter] = {**OF_PATCHES, **OF_CHOICES}
+MACRO = Parameter("macro", "macro", (0, 1), 0.5, PERCENT, modulation="learn")  # the position of any macro
+
+
+def modulated_by(modulation: Modulation) -> Iterator[Parameter]:
+    """The parameters of patches that this kind of modulation may change, in the table's order."""
+    return (each for each in OF_PATCHES.values() if each.allows(modulation))
+
+
+def in_group(group: str) -> tuple[Parameter, ...]:
+    """The parameters of patches whose knobs stand together."""
+    return tuple(each for each in OF_PATCHES.values() if each.group == group)

@@ -1,0 +1,149 @@
+"""A thread of its own for long work, with progress and cancelling; the latest work alone is done.
+
+Work is a function of a `Job`. It calls `Job.report` a few times a second, which ends it where it is not wanted any
+more.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from app.shared.thread_priority import Rank, step_back
+
+BREATH_S = 0.001  # between pieces of a job, so that other threads get their turn
+LOOK_AGAIN_S = 0.02  # while a job rests
+REPORT_EVERY_S = 0.05  # shares of progress; results so far are reported at once
+
+
+class Cancelled(Exception):
+    """The result of a computation is no longer wanted."""
+
+
+class Job:
+    """One piece of work under way.
+
+    Args:
+        say: is called in the worker's thread with the job, a signal's name and its arguments.
+        rests: whether the job is to wait where it is.
+    """
+
+    def __init__(self, say: Callable[..., None] = lambda *_: None, rests: Callable[[], bool] = lambda: False) -> None:
+        self._say, self._rests = say, rests
+        self._stop = threading.Event()
+        self._reported_s = 0.0
+
+    def cancel(self) -> None:
+        """Asks the work to end at its next call; returns at once."""
+        self._stop.set()
+
+    def wait(self, seconds: float = 0.0) -> None:
+        """Waits, less where the job is cancelled.
+
+        Raises:
+            Cancelled: the result is no longer wanted.
+        """
+        if self._stop.wait(seconds):
+            raise Cancelled
+
+    def check(self) -> None:
+        """Returns when the job may go on.
+
+        Raises:
+            Cancelled: see `wait`.
+        """
+        self.wait()
+        while self._rests():
+            self.wait(LOOK_AGAIN_S)
+
+    def report(self, share: float, text: str = "", so_far: object = None) -> None:
+        """Reports the share that is done, 0 … 1, what is being done, and a result that can be shown already.
+
+        Raises:
+            Cancelled: see `wait`.
+        """
+        self.wait(BREATH_S)
+        self.check()
+        now_s = time.monotonic()
+        if so_far is not None or now_s - self._reported_s >= REPORT_EVERY_S:
+            self._reported_s = now_s
+            self._say(self, "progressed", share, text, so_far)
+
+
+Work = Callable[[Job], Any]
+
+
+class Worker:
+    """Does one job at a time, the latest; its thread starts with the first.
+
+    Args:
+        name: of the thread.
+        say: see `Job`; signals are "progressed" (share, text, result so far), and one of "finished" (what the work
+            returned), "failed" (message, details) and "cancelled" at the end of each job.
+        expected: errors whose message is for the user; of any other the details have the traceback.
+        rests: see `Job`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        say: Callable[..., None],
+        expected: tuple[type[Exception], ...] = (),
+        rests: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._name, self._say, self._expected, self._rests = name, say, expected, rests
+        self._mailbox = threading.Condition()
+        self._next: tuple[Job, Work] | None = None
+        self._job: Job | None = None  # the latest
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def start(self, work: Work) -> Job:
+        """Does `work` as soon as the job under way has given up."""
+        self.cancel()
+        job = Job(self._say, self._rests)
+        with self._mailbox:
+            self._job, self._next = job, (job, work)
+            self._mailbox.notify()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            self._thread.start()
+        return job
+
+    def cancel(self) -> None:
+        """Asks the job under way to end; one that waits is not begun."""
+        if self._job is not None:
+            self._job.cancel()
+
+    def close(self, seconds: float | None = 10.0) -> None:
+        """Cancels and ends the thread, waiting so long for it (None: as long as it takes); may be called again."""
+        self.cancel()
+        with self._mailbox:
+            self._closing = True
+            self._mailbox.notify()
+        if self._thread is not None:
+            self._thread.join(seconds)
+
+    def _run(self) -> None:
+        step_back(Rank.BACKGROUND)
+        while True:
+            with self._mailbox:
+                self._mailbox.wait_for(lambda: self._next is not None or self._closing)
+                if self._next is None:
+                    return
+                (job, work), self._next = self._next, None
+            try:
+                job.wait()
+                result = work(job)
+                self._say(job, "finished", result)
+            except Cancelled:
+                self._say(job, "cancelled")
+            except self._expected as error:
+                self._say(job, "failed", str(error), "")
+            except Exception as error:  # shown to the user; the thread goes on
+                self._say(job, "failed", f"Computing failed: {error}", traceback.format_exc())
+            result = None
+            del job, work  # they may hold a take

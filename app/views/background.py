@@ -1,0 +1,68 @@
+"""A `Worker` in Qt: what it says arrives as signals in the window's thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Qt, Signal, Slot
+
+from app.shared.worker import Job, Work, Worker
+from engine.presets import PresetError
+
+
+class Background(QObject):
+    """Does one job at a time, the latest. Methods belong to the thread that made it, where its signals arrive too.
+
+    Args: see `Worker`.
+    """
+
+    progressed = Signal(float, str, object)  # share of the job, what is done, a result so far or None
+    finished = Signal(object)
+    failed = Signal(str, str)  # message, details
+    cancelled = Signal()  # the job gave up after `stop`
+
+    _said = Signal(object, str, tuple)  # the job, which signal, its arguments
+
+    def __init__(
+        self,
+        name: str,
+        parent: QObject | None = None,
+        *,
+        expected: tuple[type[Exception], ...] = (PresetError,),
+        rests: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__(parent)
+        self._job: Job | None = None  # the one whose signals are passed on
+        self._worker = Worker(name, lambda job, what, *told: self._said.emit(job, what, told), expected, rests)
+        self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def busy(self) -> bool:
+        """Whether the latest job has been started and its end has not arrived yet."""
+        return self._job is not None
+
+    def start(self, work: Work) -> None:
+        """Does `work` as soon as the job under way has given up; `finished` has its return value."""
+        self._job = self._worker.start(work)
+
+    def stop(self) -> None:
+        """Asks the job under way to end; its end is still reported."""
+        self._worker.cancel()
+
+    def cancel(self) -> None:
+        """Abandons the job under way: nothing of it arrives any more."""
+        self._worker.cancel()
+        self._job = None
+
+    def close(self, seconds: float | None = 10.0) -> None:
+        """Abandons the job and ends the thread, waiting so long for it; may be called again."""
+        self.cancel()
+        self._worker.close(seconds)
+
+    @Slot(object, str, tuple)
+    def _pass_on(self, job: Job, what: str, told: tuple[object, ...]) -> None:
+        if job is not self._job:
+            return
+        if what != "progressed":
+            self._job = None
+        getattr(self, what).emit(*told)

@@ -1,0 +1,78 @@
+"""A panel over the time of a take, which shows what is computed as the take grows."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterable
+from functools import partial
+from typing import ClassVar, Generic, TypeVar
+
+from PySide6.QtWidgets import QWidget
+
+from app.analysis.growing import Growing, keep_up
+from app.presets.library import Library
+from app.rendering import Take
+from app.session.choices import Session
+from app.views.controls.parts import lay_out_view
+from app.views.controls.readout import Readout
+from app.views.plots.time_plot import TimePlot
+from app.window.panels.base import Moment, Panel
+
+G = TypeVar("G", bound=Growing)
+
+
+class TimePanel(Panel, Generic[G]):
+    """Small controls and a readout above a plot. What is computed is begun when the panel is visible."""
+
+    EVERY: ClassVar[int] = 3  # moments
+
+    def __init__(self, session: Session, library: Library, plot: TimePlot) -> None:
+        super().__init__(session, library)
+        self.plot, self.readout = plot, Readout()
+        self.plot.seek_asked.connect(self.seek_asked)
+        self.plot.hovered.connect(self._hover)
+        self._made: G | None = None
+        self._shown: tuple[object, ...] = ()  # what the picture was made of
+        self._moments = 0
+
+    def _lay_out(self, *controls: QWidget) -> None:
+        lay_out_view(self, controls, self.readout, (), self.plot, gap=0)
+
+    @abstractmethod
+    def _begin(self, take: Take) -> G:
+        """What is to be computed from a take."""
+
+    @abstractmethod
+    def _draw(self, made: G) -> None:
+        """Shows it as far as it is ready."""
+
+    @abstractmethod
+    def _words(self, made: G, time_s: float, place: float) -> Iterable[str]:
+        """What is there, in one or more wordings, the longest first; none where nothing is."""
+
+    def _is_of(self, made: G, take: Take) -> bool:
+        """Whether it shows the take as it is heard now."""
+        return True
+
+    def take_started(self, take: Take) -> None:
+        self.background.cancel()
+        self._made, self._shown = None, ()  # which would hold the last take
+        self.plot.set_times(take.seconds, take.info.horizon_s)
+
+    def show_moment(self, moment: Moment) -> None:
+        self.plot.show_playhead(moment.position_s)
+        self._moments += 1
+        take = moment.take
+        if take is None or self._moments % self.EVERY:
+            return
+        made = self._made
+        if made is None or not self._is_of(made, take):
+            self._made = made = self._begin(take)
+            self.background.start(partial(keep_up, made))
+        self._draw(made)
+
+    def _hover(self, time_s: float, place: float) -> None:
+        made = self._made
+        wordings = [] if made is None or not math.isfinite(time_s) else [*self._words(made, time_s, place)]
+        self.readout.tell(*(wordings or ("",)))

@@ -1,0 +1,50 @@
+"""The closed form of the pitch glide against rendered notes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.commands.benchmarks.tune import pitch_hz
+
+from app.instrument.glide import START_S, glides_cents
+from app.instrument.offline import render_note
+from app.instrument.strings import Strings
+from app.patches.library import find_patch
+from app.patches.patch import Patch, TuningChoice
+from engine.presets import Preset
+
+RATE_HZ = 48_000
+
+
+@pytest.mark.parametrize("source", ["model", "truth"])
+@pytest.mark.parametrize(
+    ("name", "key", "velocity"),
+    [("Slack bass", 44, 127), ("Slack bass", 50, 100), ("Electric bass", 45, 127), ("Harpsichord", 84, 127)],
+)
+def test_a_rendered_note_starts_as_sharp(name: str, key: int, velocity: int, source: str, preset: Preset) -> None:
+    """Keys high enough for many periods in START_S: partials of a lower one overlap in its spectrum."""
+    patch = find_patch(name).patch.with_value("room.mix", 0.0)
+    string = Strings(patch).of_key(key)
+    assert string is not None
+    cents = glides_cents(patch)[key, velocity]
+    sound = render_note(patch, preset, key, velocity, 0.2, START_S, RATE_HZ, source)[:, 0]
+    found = 1200 * np.log2(pitch_hz(sound, string.pitch_hz * 2 ** (cents / 1200)) / string.pitch_hz)
+    print(f"{name}, key {key}, velocity {velocity}: {cents:.1f} cents, {source} {found:.1f}")
+    assert found == pytest.approx(cents, rel=0.15)
+
+
+def test_it_grows_with_amplitude_squared(patch: Patch) -> None:
+    """So that its error over a layer of velocities has one least value."""
+    glides = glides_cents(patch)
+    assert (np.diff(glides[60, 1:]) > 0).all()
+    halved = glides_cents(patch.with_value("pluck.hardest_mm", patch.pluck.hardest_mm / 2))
+    assert glides[60, 127] / halved[60, 127] == pytest.approx(4, rel=0.01)
+
+
+def test_keys_without_a_string_have_none(patch: Patch) -> None:
+    low, high = patch.range
+    whole = np.isfinite(glides_cents(patch)).all(axis=1)
+    assert list(np.flatnonzero(whole)) == list(range(low, high + 1))
+    beyond = patch.model_copy(update={"range": (60, 127), "tuning": TuningChoice(transpose=48)})
+    glides = glides_cents(beyond)
+    assert np.isfinite(glides[60]).all() and np.isnan(glides[127]).all()

@@ -1,0 +1,92 @@
+"""What one thread writes for another: in order, also on processors that let writes overtake one another."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from numba import njit
+
+from engine.effects import Effects, Room
+from engine.kernels import layout as at
+from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import publish
+from engine.pluck import FULL_SCALE_M, Pluck
+from engine.resonators.string import StringParameters
+from engine.voices import Ear, Mixer, Voice, plain_program
+from engine.voices import mixer as mixer_module
+from engine.voices import voice as voice_module
+from engine.voices.programs import solver_program
+
+RATE_HZ = 48_000
+Published = list[tuple[int, int]]
+
+
+def test_what_is_published_lies_between_two_fences() -> None:
+    """x86 keeps the order of writes by itself, so that only the code can be looked at."""
+    uncached = njit(**{**COMPILED, "cache": False})(publish.py_func)
+    uncached(np.zeros(4, np.int64), 2, 7)
+    (code,) = uncached.inspect_llvm().values()
+    function = re.search(r"^define [^@]*i32 @.*?^}", code, re.DOTALL | re.MULTILINE)
+    assert function is not None
+    steps = re.findall(r"^\s*(fence seq_cst|store i64 %arg\.whole)", function[0], re.MULTILINE)
+    assert steps == ["fence seq_cst", "store i64 %arg.whole", "fence seq_cst"]
+
+
+@pytest.fixture
+def published(monkeypatch: pytest.MonkeyPatch) -> Published:
+    """What is published, slot and number, while nothing of it is written."""
+    found: Published = []
+
+    def note(slots: np.ndarray, slot: int, whole: int) -> None:
+        found.append((slot, whole))
+
+    monkeypatch.setattr(mixer_module, "publish", note)
+    monkeypatch.setattr(voice_module, "publish", note)
+    return found
+
+
+def string_voice() -> Voice:
+    program = solver_program(StringParameters().resonator(4), RATE_HZ)
+    return Voice(program, Pluck().displacement(program.grid_points), Ear((0.37,)))
+
+
+def test_samples_and_voices_are_published_when_they_are_there(published: Published) -> None:
+    """The numbers by which the device's thread finds them change in no other way."""
+    samples = np.full((100, 1), 0.25, np.float32)
+    rendered = Voice(plain_program(RATE_HZ), torch.full((3,), FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
+    rendered.append(samples)
+    assert published == [(at.READY, 100)]
+    assert rendered.memory.view(np.int64)[at.READY] == 0
+    assert rendered._samples is not None
+    np.testing.assert_array_equal(rendered._samples[:100], samples)
+    mixer, voices = Mixer(RATE_HZ), [string_voice(), string_voice()]
+    mixer.add(*voices)
+    counts = mixer.memory.view(np.int64)
+    assert published[1:] == [(at.M_PUSHED, 2)]
+    assert [int(each) for each in counts[at.M_RING : at.M_RING + 2]] == [each.address for each in voices]
+    assert counts[at.M_PUSHED] == 0
+
+
+@pytest.mark.parametrize(
+    ("tell", "slot"),
+    [
+        (lambda voice: voice.listen(Ear((0.2,))), at.NEXT_WEIGHTS),
+        (lambda voice: voice.retune(StringParameters().resonator(4)), at.WISHES),
+    ],
+    ids=["listening points", "modes"],
+)
+def test_what_a_voice_is_told_is_published(tell: Callable[[Voice], object], slot: int, published: Published) -> None:
+    voice = string_voice()
+    tell(voice)
+    assert [each for each, _ in published] == [slot]
+    assert voice.memory.view(np.int64)[slot] == 0
+
+
+def test_a_response_is_published_after_the_convolver(published: Published) -> None:
+    mixer = Mixer(RATE_HZ)
+    mixer.set_effects(Effects(room=Room(mix=0.5)))
+    assert [slot for slot, _ in published] == [at.M_CONVOLVER, at.M_EFFECTS]
