@@ -7,12 +7,7 @@ number has a bound here. The bounds lie far beyond every string and model that a
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from engine.resonators.string import StringParameters
 
 # Files
 LARGEST_PRESET_BYTES = 64 * 2**20
@@ -104,43 +99,6 @@ def check_sizes(configuration: object) -> None:
             for entry in value:
                 if isinstance(entry, int | float):
                     check(field.name, entry, (-LARGEST_WIDTH, LARGEST_WIDTH))
-
-
-def check_motion(
-    string: StringParameters, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool
-) -> None:
-    """That a string's motion can be computed in ordinary memory and time, in closed form.
-
-    Raises:
-        ValueError: it cannot, or a mode does not oscillate; the message names the fields.
-    """
-    check("rate_hz", rate_hz, (1, HIGHEST_RATE_HZ), "Hz")
-    check("grid_points", grid_points, (3, SIZES["grid_points"][1]))
-    if not 1 <= modes <= grid_points - 2:
-        raise ValueError(f"a grid of {grid_points} points cannot hold {brief(modes)} modes")
-    if modes * grid_points > MOST_MATRIX_NUMBERS:
-        raise ValueError(
-            f"modes times grid_points must be at most {MOST_MATRIX_NUMBERS}, not {modes} times {grid_points}"
-        )
-    if grid_points * rate_hz > MOST_NUMBERS_A_SECOND:
-        raise ValueError(
-            f"grid_points times rate_hz must be at most {MOST_NUMBERS_A_SECOND}, not {grid_points} times {rate_hz:g}"
-        )
-    # σ² < ω² is a quadratic in η² that is not above 0 at η = 0: it holds for all modes if for the first and the last
-    for mode in (1, modes):
-        if not string.decay_rate(mode) < string.undamped_frequency(mode):
-            raise ValueError(f"mode {mode} is overdamped: lower its damping, or keep fewer modes")
-    if not tension_modulated:
-        return
-    highest_hz = string.undamped_frequency(modes) / (2 * math.pi)
-    substeps = math.ceil(SUBSTEPS_IN_A_PERIOD * highest_hz / rate_hz)
-    if substeps > MOST_SUBSTEPS:
-        raise ValueError(
-            f"mode {modes} at {highest_hz:.3g} Hz is too high for a rate_hz of {rate_hz:g}: the truth would take"
-            f" {substeps:.3g} sub-steps, at most {MOST_SUBSTEPS}; keep fewer modes"
-        )
-    if modes * min(modes, substeps) > MOST_FLOWS:
-        raise ValueError(f"{modes} modes with {substeps} sub-steps of the truth are too many; keep fewer modes")
 
 
 def brief(value: object) -> str:

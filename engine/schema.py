@@ -120,6 +120,20 @@ def read(kind: type[T], data: object, where: str) -> T:
         raise SchemaError(f"{where}: a number is too large ({error})") from error
 
 
+def without_retired(data: object, retired: Mapping[str, Any], where: str) -> Any:
+    """Plain data without the fields of earlier versions, which are given with the only value that they ever had.
+
+    Raises:
+        SchemaError: one has another value; the message names it.
+    """
+    if not isinstance(data, Mapping):
+        return data
+    for name in retired.keys() & data.keys():
+        if write(data[name]) != retired[name]:
+            raise SchemaError(f"{where}.{name}: {bounds.brief(data[name])} is of an earlier version; train it anew")
+    return {name: value for name, value in data.items() if name not in retired}
+
+
 @functools.cache
 def _type_hints(kind: type) -> dict[str, Any]:
     return get_type_hints(kind)

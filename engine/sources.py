@@ -14,13 +14,12 @@ import torch
 from torch import Tensor
 
 from engine.models.base import AnyFrameModel
-from engine.pluck import FULL_SCALE_M
+from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.truth import ModalState, SplittingSolver
 
 SILENCE = 1e-9  # of a mode, of all: what the truth leaves out is 180 dB down
-RUNAWAY_FACTOR = 20.0  # a string let go never exceeds about its initial peak
 
 
 class Runaway(RuntimeError):
@@ -90,8 +89,8 @@ class ModelSource(StringSource):
     def start(self, displacement_m: Tensor) -> SourceState:
         _check_grid(displacement_m, self.grid_points)
         displacement = (displacement_m / self._scale_m).float()
-        inner = self._model.release(displacement)
-        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(displacement_m.abs().max()), 1e-4))
+        inner = self._model.encode(displacement)
+        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(displacement_m.abs().max()), LEAST_PEAK_M))
 
     @torch.inference_mode()
     def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:

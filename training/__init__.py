@@ -1,6 +1,7 @@
 """Training: data sets from the reference solver, and models fitted to them, down to a preset file.
 
 `configuration`  what a run is; `cell` and `by_name` have it from a name
+`start`          how its model starts, and what that is given of the string
 `run`            a whole run: fit, errors, preset, and its row in `results`
 `evaluate`       the errors of a model
 `data`           data sets, their cache, and batches of them
@@ -8,4 +9,5 @@
 `sweeping`       many runs: the plan, its order, the workers
 `tables`         the paper's tables with our results beside them
 `figures`        pictures of presets and of runs
+`research`       what models are compared with, and starts that no preset needs to sound
 """

@@ -9,14 +9,13 @@ from functools import cached_property
 from typing import Any, Literal
 
 from engine import bounds
-from engine.models import MODELS, DiagonalModel, read_model_configuration
-from engine.models.string_modes import StartsFromModes
+from engine.models import MODELS, read_model_configuration
+from engine.models import RETIRED as RETIRED_SIZES
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, read, write
+from engine.schema import SchemaError, read, without_retired, write
 
-# models that can start from what the displacement shows (`fitting.phases`)
-FROM_PHASES = tuple(name for name, (kind, _) in MODELS.items() if issubclass(kind, StartsFromModes))
+FROM_PHASES = ("koopman_integrated", "fgru", "frnn")  # what can start from what the displacement shows
 DIGEST_VERSION = 2  # of the rule by which runs are told apart; see `training.migration`
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
@@ -49,7 +48,7 @@ class DatasetConfiguration:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if self.steps % self.stride:
             raise ValueError(f"steps must be a multiple of stride, {self.stride}, not {self.steps}")
-        bounds.check_motion(self.string, self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
+        self.string.check_motion(self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
         if self.substeps is not None:
             bounds.check("substeps", self.substeps, (1, bounds.MOST_SUBSTEPS))
         size_bytes = 4 * self.count * (self.steps // self.stride + 1) * self.modes
@@ -98,8 +97,6 @@ class Recipe:
     prediction_weight: float = 1.0  # α₁ of the paper's loss
     encoding_weight: float = 1.0  # α₂
     consistency_weight: float = 0.01  # α₃
-    # of both terms, where the paper's text and its authors' code differ: see `fitting.losses`
-    koopman_terms: Literal["text", "code"] = "text"
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
@@ -155,8 +152,6 @@ class TrainingConfiguration:
             raise ValueError(f"latents_per_mode needs blind and the model 'koopman_integrated', not {self.model!r}")
         if self.recipe.latents_per_mode and "state_size" in self.model_configuration:
             raise ValueError("state_size follows latents_per_mode; leave one of them out")
-        if self.recipe.koopman_terms == "code" and not issubclass(MODELS[self.model][0], DiagonalModel):
-            raise ValueError(f"koopman_terms 'code' needs a Koopman model, not {self.model!r}")
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:
@@ -172,23 +167,27 @@ class TrainingConfiguration:
         return self.data.steps if self.horizon is None else self.horizon
 
     @property
+    def own_start(self) -> str:
+        """How the model itself is initialised: the recipe's choice, or its source's own."""
+        return self.recipe.initialisation or MODELS[self.model][0].own_initialisation()
+
+    @property
     def digest(self) -> str:
         """Of all that determines the run's result, the model's defaults among it; what it is called does not.
 
         Of data and recipe, whose defaults are never changed, fields that have theirs are left out, so that one which
-        comes later leaves earlier runs their digest. Where a model's sizes change, or this rule does, rows are
-        carried over by `training.migration`.
+        comes later leaves earlier runs their digest; sizes that are no longer there count with the value that they
+        had. Where a model's sizes change otherwise, or this rule does, rows are carried over by `training.migration`.
         """
-        kind, sizes = MODELS[self.model]
-        start = self.recipe.initialisation or kind.own_initialisation()
+        sizes = write(read_model_configuration(self.model, self.model_configuration, "model_configuration"))
         return digest_of(
             {
                 "digest_version": DIGEST_VERSION,
                 "model": self.model,
-                "model_configuration": write(read(sizes, self.model_configuration, "model_configuration")),
+                "model_configuration": sizes | RETIRED_SIZES.get(self.model, {}),
                 "data": unlike_default(self.data),
                 "data_version": DATA_VERSION,
-                "recipe": {**unlike_default(self.recipe), "initialisation": start},
+                "recipe": {**unlike_default(self.recipe), "initialisation": self.own_start},
                 "horizon": self.steps,
             }
         )
@@ -201,7 +200,7 @@ def digest_of(plain: dict[str, Any]) -> str:
 
 # fields of earlier versions, and the only value that they ever had in a run that was kept
 RETIRED: dict[str, dict[str, Any]] = {
-    "recipe": {"random_start": False},
+    "recipe": {"random_start": False, "koopman_terms": "text"},
     "model_configuration": {"input": "displacement"},
 }
 
@@ -213,18 +212,10 @@ def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
         SchemaError: it is none, or sets what is no longer there; the message names the field.
     """
     if isinstance(plain, dict):
-        plain = {name: _without_retired(name, value, where) for name, value in plain.items()}
+        plain = {
+            name: without_retired(value, RETIRED.get(name, {}), f"{where}.{name}") for name, value in plain.items()
+        }
     return read(TrainingConfiguration, plain, where)
-
-
-def _without_retired(part: str, value: Any, where: str) -> Any:
-    retired = RETIRED.get(part, {})
-    if not isinstance(value, dict):
-        return value
-    for name in retired.keys() & value.keys():
-        if value[name] != retired[name]:
-            raise SchemaError(f"{where}.{part}.{name}: {value[name]!r} is of an earlier version; train it anew")
-    return {name: entry for name, entry in value.items() if name not in retired}
 
 
 def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:

@@ -61,7 +61,7 @@ def _predicted(model: StringModel[Any], initial: Tensor, kept: int, stride: int)
     """Frames stride, 2 stride, …, (batch, kept, grid_points)."""
     if stride > 1 and isinstance(model, KoopmanModel):
         frames = stride * torch.arange(1, kept + 1, device=initial.device)
-        return model.decode(model.latents(model.release(initial).origin, frames))
+        return model.decode(model.latents(model.encode(initial).origin, frames))
     return model(initial, kept * stride)[:, stride - 1 :: stride]
 
 
@@ -124,7 +124,7 @@ def evaluate_past_horizon(
         for part, rows in enumerate(parts):
             sounds = torch.empty(2, rows.stop - rows.start, steps)
             initial, blocks = _true_motion(dataset, rows, steps, frames_at_once)
-            state, first = model.release((initial @ synthesis).float().to(device)), 0
+            state, first = model.encode((initial @ synthesis).float().to(device)), 0
             for amplitudes in blocks:
                 last = first + amplitudes.shape[1]
                 predicted, state = model.advance(state, last - first)
@@ -169,7 +169,7 @@ def evaluate_partials(
     parts = _parts(c, split, trajectories)
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
-            state, tracks = model.release((initial[rows] @ synthesis).float().to(device)), []
+            state, tracks = model.encode((initial[rows] @ synthesis).float().to(device)), []
             true = true_phasors(
                 c.resonator,
                 initial[rows],

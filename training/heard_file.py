@@ -10,16 +10,15 @@ import csv
 import io
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_type_hints
 
 from filelock import FileLock
 
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
-from engine.schema import SchemaError, read
-from engine.whole_file import whole_file
+from engine.schema import SchemaError
+from engine.table import columns_of, read_record, write_table
 
 NAME = "heard.csv"
 METHOD = 1  # of the measurement: lines of another one say nothing
@@ -79,9 +78,7 @@ class Heard:
                 raise ValueError(f"{field} must lie in {low:g} … {high:g}, not {value:g}")
 
 
-COLUMNS = tuple(field.name for field in fields(Heard))
-REQUIRED = len(COLUMNS) - 1  # a line of before the last column was measured says nothing of it
-_HINTS = get_type_hints(Heard)
+COLUMNS = columns_of(Heard)
 
 
 def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
@@ -112,17 +109,14 @@ def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
     with FileLock(path.with_name(f".{NAME}.lock")):
         known = {heard.name: heard for heard in read_heard(folder)[0].values()}
         known |= {heard.name: heard for heard in measured}
-        with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows(_row(known[name]) for name in sorted(known))
+        write_table(path, Heard, (_rounded(known[name]) for name in sorted(known)))
 
 
 def _parsed(path: Path, text: str) -> tuple[dict[str, Heard], list[str]]:
     found: dict[str, Heard] = {}
     problems: list[str] = []
     lines = iter(io.StringIO(text, newline="").readlines())
-    if next(lines, "").strip() not in (",".join(COLUMNS), ",".join(COLUMNS[:REQUIRED])):
+    if next(lines, "").strip() not in (",".join(COLUMNS), ",".join(COLUMNS[:-1])):
         return {}, [f"{path}: not a table of this program's: its first line must be {','.join(COLUMNS)}"]
     for number, line in enumerate(lines, 2):
         try:
@@ -143,22 +137,12 @@ def _line(line: str, where: str) -> Heard | None:
         (texts,) = csv.reader([line])
     except (csv.Error, ValueError) as error:
         raise SchemaError(f"{where}: not a line of values ({error})") from error
-    if not REQUIRED <= len(texts) <= len(COLUMNS):
-        raise SchemaError(f"{where}: holds {len(texts)} values for {len(COLUMNS)} columns")
-    values: dict[str, Any] = {}
-    for name, text in zip(COLUMNS, texts, strict=False):
-        if _HINTS[name] is str:
-            values[name] = text
-        elif text:
-            try:
-                values[name] = int(text) if _HINTS[name] is int else float(text)
-            except ValueError:
-                raise SchemaError(f"{where}, column {name}: {text[:40]!r} is not a number") from None
-    heard = read(Heard, values, where)
+    columns = COLUMNS[:-1] if len(texts) == len(COLUMNS) - 1 else COLUMNS  # before the last one was measured
+    heard = read_record(Heard, columns, texts, where)
     return heard if heard.method == METHOD else None
 
 
-def _row(heard: Heard) -> list[str]:
-    """A thousandth is far less than can be heard; adding nothing makes -0 a 0."""
-    values = (getattr(heard, name) for name in COLUMNS)
-    return ["" if v is None else str(round(v, 3) + 0.0) if isinstance(v, float) else str(v) for v in values]
+def _rounded(heard: Heard) -> Heard:
+    """To a thousandth, which is far less than can be heard; adding nothing makes -0 a 0."""
+    figures = {name: getattr(heard, name) for name in _BOUNDS}
+    return replace(heard, **{name: round(value, 3) + 0.0 for name, value in figures.items() if value is not None})

@@ -9,17 +9,16 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_type_hints
+from typing import Literal
 
 from filelock import FileLock
 
-from engine import bounds
 from engine.read_file import UnusableFile, read_bounded
-from engine.schema import SchemaError, read
-from engine.whole_file import whole_file
-from training.knowledge import given_to
+from engine.schema import SchemaError
+from engine.table import columns_of, read_record, write_table
+from training.start import given_to
 
 QUARTERS = 4  # windows of the horizon, with an error each
 SHORT_HORIZON = 400  # frames; the paper's second horizon, over which every run is measured too
@@ -109,8 +108,7 @@ class Row:
         return bool(given_to(self.model, self.initialisation))
 
 
-COLUMNS = tuple(field.name for field in fields(Row))
-_HINTS = get_type_hints(Row)
+COLUMNS = columns_of(Row)
 
 
 def read_results(path: Path) -> list[Row]:
@@ -129,7 +127,7 @@ def read_results(path: Path) -> list[Row]:
         if unknown := sorted(set(columns) - set(COLUMNS)):
             raise SchemaError(f"{path}: unknown column {unknown[0]!r}; it is of a newer version: update this program")
         # one at a time, so that it ends at the first fault
-        return [_parse(columns, row, f"{path}: line {n}") for n, row in enumerate(lines, 2)]
+        return [read_record(Row, columns, row, f"{path}: line {n}") for n, row in enumerate(lines, 2)]
     except FileNotFoundError:
         return []
     except UnusableFile as error:
@@ -158,35 +156,9 @@ def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
                 given = {name: value for name in COLUMNS if (value := getattr(row, name)) is not None}
                 found[row.digest] = Row(**(lacking | given))
         merged = sorted(found.values(), key=lambda row: (row.name, row.digest))
-        with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows([_text(getattr(row, name)) for name in COLUMNS] for row in merged)
+        write_table(path, Row, merged)
     return merged
 
 
 def _rank(row: Row) -> tuple[bool, str]:
     return row.status == "done", row.finished
-
-
-def _text(value: object) -> str:
-    if value is None:
-        return ""
-    return str(value)  # of a float all digits: what is read again is what was measured
-
-
-def _parse(columns: list[str], line: list[str], where: str) -> Row:
-    if len(line) != len(columns):
-        raise SchemaError(f"{where}: holds {len(line)} values for {len(columns)} columns; restore the file")
-    values: dict[str, Any] = {}
-    for name, text in zip(columns, line, strict=True):
-        hint = _HINTS[name]
-        if hint is str or hint is Status:
-            values[name] = text
-        elif text:
-            kind = float if hint == float | None else int
-            try:
-                values[name] = kind(text)
-            except ValueError:
-                raise SchemaError(f"{where}, column {name}: {bounds.brief(text)} is not a number") from None
-    return read(Row, values, where)

@@ -1,15 +1,13 @@
-"""A whole run: fit, errors, preset, and the preset read back and measured again."""
+"""A whole run: fit, errors, preset, and the preset read back."""
 
 from __future__ import annotations
 
 import csv
 import json
-import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +22,9 @@ from engine.excitation import (
     PLUCK_WIDTH_RANGE,
     WIDTH_RANGE,
 )
-from engine.metrics import ErrorSums, RelativeError
-from engine.presets import Preset, PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
+from engine.metrics import ErrorSums
+from engine.models import count_parameters
+from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
 from engine.schema import SchemaError, read, write
 from engine.whole_file import naming, whole_file
 from training import provenance
@@ -33,49 +32,36 @@ from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit
-from training.knowledge import initialisation_of, knowledge_of
 from training.migration import carried_over
 from training.results import QUARTERS, Row
-from training.row_errors import configuration_of, row_errors
+from training.row_errors import REPEATED, configuration_of, row_errors
+from training.start import initialisation_of, knowledge_of
 
 LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
-REPEAT_TOLERANCE = 1e-5  # relative; a sum in another order moves a float32 error by less
 
 
-@dataclass(frozen=True)
-class TrainedPreset:
-    """A run's result: the preset as read back from its file, and the errors measured with it."""
-
-    preset: Preset
-    validation: ErrorSums
-    test: ErrorSums
-    result: FitResult
-
-
-def train(
+def _trained(
     configuration: TrainingConfiguration,
     dataset: Dataset,
     output: Path,
     run_folder: Path,
     *,
-    device: torch.device | str = "cpu",
-    report: Callable[[Progress], None] = lambda progress: None,
-    checkpoint_every_s: float | None = None,
-) -> TrainedPreset:
-    """Makes the preset `output`; goes on with the run in `run_folder` where one was interrupted.
+    device: torch.device | str,
+    report: Callable[[Progress], None],
+    checkpoint_every_s: float | None,
+) -> dict[str, Any]:
+    """Makes the preset `output`, or goes on with the run in `run_folder`; its errors and what it took, as in a row.
 
-    Args:
-        dataset: of `configuration.data`.
-        report: see `fit`. An epoch is in `run_folder`/log.csv when it is told; the run ends with a plot, log.png.
+    An epoch is in `run_folder`/log.csv when it is reported; the run ends with a plot, log.png.
 
     Raises:
         Diverged, ValueError: see `fit`.
-        RuntimeError: the preset that was written does not measure as the model that was trained.
+        RuntimeError: the preset that was written is not the model that was trained.
         OSError: a folder cannot be written.
     """
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=output.parent):
-        pass  # a folder that cannot be written is told before the work
+        pass  # a folder that cannot be written is reported before the work
     log = TrainingLog(run_folder / "log.csv")
 
     def log_and_report(progress: Progress) -> None:
@@ -96,15 +82,14 @@ def train(
         _plot(log.path)
         raise
     _plot(log.path)
-    result = replace(result, model=result.model.cpu())
-    info = preset_info(configuration, dataset, result)
-    save_preset(output, info, result.model)
-    preset = load_preset(output)
-    validation, test = (
-        evaluate_model(preset.model, dataset, split, configuration.steps) for split in ("validation", "test")
-    )
-    _check_repeats(info, validation.total(), test.total(), output)
-    return TrainedPreset(preset, validation, test, result)
+    model = result.model.cpu()
+    sums = {split: evaluate_model(model, dataset, split, configuration.steps) for split in ("validation", "test")}
+    figures = row_errors(model, dataset, sums, configuration.steps)
+    save_preset(output, preset_info(configuration, dataset, result, figures), model)
+    weights = load_preset(output).model.state_dict()
+    if not all(torch.equal(weights[name], weight) for name, weight in model.state_dict().items()):
+        raise RuntimeError(f"{output}: holds other weights than the trained model; train it again")
+    return figures | _figures(configuration, result, sums["validation"])
 
 
 def run_row(
@@ -132,7 +117,7 @@ def run_row(
         waits: is told where another process trains in that folder, whose end is awaited.
 
     Raises:
-        ValueError, RuntimeError, OSError: see `train`.
+        ValueError, RuntimeError, OSError: see `_trained`.
     """
     folder = runs / name
     folder.mkdir(parents=True, exist_ok=True)
@@ -164,7 +149,7 @@ def run_row(
             "commit": provenance.commit(),
         }
         try:
-            trained = train(
+            figures = _trained(
                 configuration,
                 dataset,
                 output,
@@ -175,7 +160,7 @@ def run_row(
             )
         except Diverged as error:
             return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
-        row = Row(**facts, status="done", finished=provenance.now(), **_figures(trained, dataset))
+        row = Row(**facts, status="done", finished=provenance.now(), **figures)
         if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
             return known  # the preset alone was missing: where and when it was trained stays
         with whole_file(file) as unfinished:
@@ -205,28 +190,22 @@ def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
         lock.release()
 
 
-def _figures(trained: TrainedPreset, dataset: Dataset) -> dict[str, Any]:
-    """The errors of a run and what it took, as a row names them."""
-    info, result, sums = trained.preset.info, trained.result, trained.validation
-    spread = sums.spread()
+def _figures(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
+    """What a run took, and how its errors on validation are spread over trajectories and time, as in a row."""
+    spread, data = sums.spread(), configuration.data
     figures: dict[str, Any] = {
-        **row_errors(
-            trained.preset.model,
-            dataset,
-            {"validation": trained.validation, "test": trained.test},
-            info.horizon_steps,
-        ),
         "rel_mse_spread": spread.rel_mse,
         "rel_mae_spread": spread.rel_mae,
-        "parameters": trained.preset.parameters,
+        "parameters": count_parameters(result.model),
         "epochs": result.epochs,
         "start_rel_mse": result.start.rel_mse if result.start else None,
         "start_rel_mae": result.start.rel_mae if result.start else None,
         "best_epoch": result.best_epoch,
         "seconds": result.seconds,
     }
-    edges_s = [info.horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
-    for number, window in enumerate(sums.windows(info.rate_hz / dataset.configuration.stride, edges_s), 1):
+    horizon_s = configuration.steps / data.rate_hz
+    edges_s = [horizon_s * quarter / QUARTERS for quarter in range(QUARTERS + 1)]
+    for number, window in enumerate(sums.windows(data.rate_hz / data.stride, edges_s), 1):
         figures |= {f"rel_mse_q{number}": window.rel_mse, f"rel_mae_q{number}": window.rel_mae}
     return figures
 
@@ -243,12 +222,11 @@ def default_runs() -> Path:
     return Path(os.environ.get("LEARNED_STRINGS_RUNS", Path(__file__).parents[1] / "runs"))
 
 
-def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: FitResult) -> PresetInfo:
-    """What the preset of a finished fit says of itself, its errors measured here."""
+def preset_info(
+    configuration: TrainingConfiguration, dataset: Dataset, result: FitResult, errors: Mapping[str, Any]
+) -> PresetInfo:
+    """What the preset of a finished fit says of itself; `errors` as in a row."""
     data, recipe = configuration.data, configuration.recipe
-    validation, test = (
-        evaluate_model(result.model, dataset, split, configuration.steps).total() for split in ("validation", "test")
-    )
     return PresetInfo(
         title=configuration.title,
         description=configuration.description,
@@ -266,18 +244,10 @@ def preset_info(configuration: TrainingConfiguration, dataset: Dataset, result: 
         initialisation=initialisation_of(configuration),
         knows=knowledge_of(configuration),
         seed=recipe.seed,
-        rel_mse=validation.rel_mse,
-        rel_mae=validation.rel_mae,
-        test_rel_mse=_finite(test.rel_mse),
-        test_rel_mae=_finite(test.rel_mae),
+        **{name: errors[name] for name in REPEATED},
         training_seconds=result.seconds,
         training=write(configuration),
     )
-
-
-def _finite(error: float) -> float | None:
-    """None for a model that runs away on a trajectory of the test set, though on none of the validation set."""
-    return error if math.isfinite(error) else None
 
 
 def trained_range(data: DatasetConfiguration) -> TrainedRange:
@@ -343,13 +313,3 @@ def _row(progress: Progress) -> list[str]:
 def _is_whole(row: list[str]) -> bool:
     """Whether it is a line of an epoch; a run that was killed may leave half of one."""
     return len(row) == len(LOG_FIELDS) and row[0].isdigit() and row[-1] != ""
-
-
-def _check_repeats(info: PresetInfo, validation: RelativeError, test: RelativeError, output: Path) -> None:
-    stored = (info.rel_mse, info.rel_mae, info.test_rel_mse, info.test_rel_mae)
-    again = (validation.rel_mse, validation.rel_mae, _finite(test.rel_mse), _finite(test.rel_mae))
-    for before, after in zip(stored, again, strict=True):
-        if before is None and after is None:
-            continue
-        if before is None or after is None or not math.isclose(before, after, rel_tol=REPEAT_TOLERANCE):
-            raise RuntimeError(f"{output}: measures {after} where the trained model had {before}; train it again")

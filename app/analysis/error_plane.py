@@ -128,7 +128,7 @@ def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
     @torch.inference_mode()
     def errors(plucks: list[Pluck], job: Job) -> Array:
         initial = project(torch.stack([pluck.displacement(info.grid_points) for pluck in plucks]), info.modes)
-        state = model.release((initial / info.scale_m).float())
+        state = model.encode((initial / info.scale_m).float())
         true_state = truth.start(initial)
         sums, first = ErrorSums(info.horizon_steps), 0
         while first < info.horizon_steps:

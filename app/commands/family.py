@@ -106,7 +106,7 @@ def evaluate(
     """Errors on held-out strings, inside the family and beyond it."""
     import torch
 
-    from training.family.errors import Player, by_cell, by_rise, knowing_physics, measure, player
+    from training.family.errors import Player, by_cell, by_rise, measure, player
 
     torch.set_num_threads(1)
     if tenth > strings:
@@ -117,7 +117,10 @@ def evaluate(
         check_format(picture)
     loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
-    players |= knowing_physics() if baselines else {}
+    if baselines:
+        from training.research.players import knowing_physics
+
+        players |= knowing_physics()
     players |= _trained(runs) if runs else {}
     own: list[Any] = []  # errors of the preset, both columns
     with progress("family evaluate") as report:
@@ -232,9 +235,9 @@ def baseline(
     """
     import torch
 
-    from training.family.baselines import BASELINES, baseline_player
-    from training.family.fit_baseline import FRAMES, ROWS, checkpoint_file, fit_baseline
     from training.family.preset import read_configuration
+    from training.research.baselines import BASELINES, baseline_player
+    from training.research.fit_baseline import FRAMES, ROWS, checkpoint_file, fit_baseline
     from training.run import default_runs
 
     torch.set_num_threads(1)
@@ -305,8 +308,8 @@ def _measured(
 
 def _trained(runs: Path) -> dict[str, Any]:
     """Players of the baselines that were trained in a folder."""
-    from training.family.baselines import BASELINES, baseline_player
-    from training.family.fit_baseline import checkpoint_file, trained_baseline
+    from training.research.baselines import BASELINES, baseline_player
+    from training.research.fit_baseline import checkpoint_file, trained_baseline
 
     files = {name: checkpoint_file(runs, name) for name in BASELINES}
     found = {name: baseline_player(trained_baseline(file).model) for name, file in files.items() if file.exists()}

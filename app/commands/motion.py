@@ -75,7 +75,6 @@ def simulate(
             "only the fast solver of the nonlinear string has sub-steps", param_hint="--substeps"
         )
     from app.commands import arrays
-    from engine import bounds
     from engine.presets.of_string import HIGHEST_HZ
 
     initial = arrays.read_displacements(u0)
@@ -91,7 +90,7 @@ def simulate(
         )
     arrays.check_result_size(len(initial), steps + 1, points)
     try:
-        bounds.check_motion(parameters, modes, points, rate, tension_modulated)
+        parameters.check_motion(modes, points, rate, tension_modulated)
     except ValueError as error:
         raise Failure(f"{string}: {error}") from error
     resonator = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=points)

@@ -19,7 +19,7 @@ _TEMPORARY = "learned-strings-kernels"
 
 
 def _sources() -> list[Path]:
-    """Of all compiled functions, which call one another across files."""
+    """Of all functions that sound and pictures are made with, which call one another across files."""
     engine = Path(__file__).parents[1]
     return sorted([*(engine / "kernels").glob("*.py"), *engine.glob("*/_*kernel.py")])
 

@@ -72,14 +72,13 @@ def models() -> None:
     readout = listening_weights(torch.tensor([0.3]), INFO.grid_points).float()
     with torch.inference_mode():
         for name, sizes in (
-            ("koopman_integrated", LATENTS),
             ("koopman_tension", ONE_TENSION),
             ("s5", {"grid_points": INFO.grid_points}),
             ("fgru", {"grid_points": INFO.grid_points}),
             ("frnn", {"grid_points": INFO.grid_points}),
         ):
             model = _model(name, sizes)
-            _, state = model.advance(model.release((_initial_m()[None] / INFO.scale_m).float()), 2)
+            _, state = model.advance(model.encode((_initial_m()[None] / INFO.scale_m).float()), 2)
             model.advance(state, 2, readout)
     truth = TruthSource(INFO)
     truth.advance(truth.start(_initial_m()[None]), 2)

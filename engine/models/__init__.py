@@ -16,7 +16,7 @@ from engine.models.koopman_tension import KoopmanTension, KoopmanTensionConfigur
 from engine.models.koopman_var import KoopmanVar, KoopmanVarConfiguration
 from engine.models.lru import LRU, LRUConfiguration
 from engine.models.s5 import S5, S5Configuration
-from engine.schema import SchemaError, read
+from engine.schema import SchemaError, read, without_retired
 
 # name in presets and on the command line -> (class, configuration). Defaults are the paper's sizes, and our own for
 # models that the paper does not have: `koopman_integrated`, `koopman_tension`.
@@ -33,6 +33,12 @@ MODELS: dict[str, tuple[type[StringModel[Any]], type]] = {
 }
 
 
+# sizes of earlier versions, and the only value that they ever had in a model that was kept
+RETIRED: dict[str, dict[str, Any]] = {
+    "koopman_integrated": {"multiplier_widths": [], "decoder_widths": [], "rate_unit": 1e-3, "gain_limit_db": 6.0}
+}
+
+
 def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> StringModel[Any]:
     """The model of a name with its weights not yet set; `configuration` as plain data, None or {} the defaults.
 
@@ -44,12 +50,12 @@ def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> St
 
 
 def read_model_configuration(name: str, data: object, where: str) -> Any:
-    """The configuration of a model from plain data, its sizes within `engine.bounds`.
+    """The configuration of a model from plain data, of this version or an earlier one, its sizes within `bounds`.
 
     Raises:
         SchemaError, KeyError: as `build_model`.
     """
-    configuration: Any = read(MODELS[name][1], data, where)
+    configuration: Any = read(MODELS[name][1], without_retired(data, RETIRED.get(name, {}), where), where)
     try:
         bounds.check_sizes(configuration)
     except ValueError as error:

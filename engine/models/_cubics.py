@@ -35,12 +35,3 @@ def hermite(count: int, like: Tensor) -> Tensor:
     square, cube = share**2, share**3
     right = 3 * square - 2 * cube
     return torch.stack([1 - right, right, share - 2 * square + cube, cube - square], dim=1).to(like)
-
-
-def differences(count: int) -> Tensor:
-    """As `hermite`, weights (4, 4) of the value at 0 and of the first three differences at spacing 1/count."""
-    slope = torch.tensor([0, 0, 1, 0], dtype=torch.float64) / count
-    bend = torch.tensor([-3, 3, -2, -1], dtype=torch.float64) / count**2
-    cube = torch.tensor([2, -2, 1, 1], dtype=torch.float64) / count**3
-    value = torch.tensor([1, 0, 0, 0], dtype=torch.float64)
-    return torch.stack([value, slope + bend + cube, 2 * bend + 6 * cube, 6 * cube])

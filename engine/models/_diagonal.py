@@ -37,16 +37,8 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
         """λᵏ for k in `frames` (frames,): complex128 (frames, state_size)."""
 
     @abstractmethod
-    def synthesise(self, modulated: Tensor, readout: Tensor | None = None) -> Tensor:
-        """Displacement (..., points) of modulated latents (..., state_size)."""
-
-    def modulated(self, latents: Tensor) -> Tensor:
-        """Latents (..., state_size) as the decoder takes them: as they are, but for Koopman_var."""
-        return latents
-
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
-        return self.synthesise(self.modulated(latents), readout)
 
     @abstractmethod
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:

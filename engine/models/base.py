@@ -114,13 +114,9 @@ class StringModel(nn.Module, ABC, Generic[State]):
         A model that learned one string holds none: its weights are all there is of it.
         """
 
-    def release(self, displacement: Tensor) -> State:
-        """As `encode`, by the name of what happens to the string."""
-        return self.encode(displacement)
-
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
         """Frames 1 … steps after a release from `displacement` (batch, grid_points): (batch, steps, points)."""
-        return self.advance(self.release(displacement), steps, readout)[0]
+        return self.advance(self.encode(displacement), steps, readout)[0]
 
 
 class AnyFrameModel(StringModel[State]):

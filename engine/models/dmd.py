@@ -51,7 +51,8 @@ class DMDConfiguration:
 class DMD(DiagonalModel):
     """See the module. What was fitted are the parameters; the encoder follows from them and is a buffer.
 
-    Eigenvalues are float64: phases are exact at any frame. One may lie outside the unit circle: see `unstable`.
+    Eigenvalues are float64: phases are exact at any frame. One may lie outside the unit circle: a fit
+    to noisy or non-linear motion may find a mode that grows.
     """
 
     initialisations: ClassVar = {"physics": LINEAR_STRING}
@@ -90,11 +91,6 @@ class DMD(DiagonalModel):
         model._store(*_exact_dmd(trajectories, c))
         return model
 
-    @property
-    def unstable(self) -> bool:
-        """Whether a mode grows, |λ| > 1: a fit to noisy or non-linear motion may find one."""
-        return bool((self.magnitude_log > 0).any())
-
     def encode(self, displacement: Tensor) -> KoopmanState:
         """The amplitudes b of a string at rest that agree best, in least squares: Φ b = u₀ and Φ (b log λ) = 0.
 
@@ -107,9 +103,9 @@ class DMD(DiagonalModel):
     def powers(self, frames: Tensor) -> Tensor:
         return eigenvalues.powers(torch.complex(self.magnitude_log.double(), self.angle.double()), frames)
 
-    def synthesise(self, modulated: Tensor, readout: Tensor | None = None) -> Tensor:
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         real, imaginary = read_weight(self.modes, readout).chunk(2, dim=-1)
-        return dense(modulated, torch.cat([real, -imaginary], dim=-1))
+        return dense(latents, torch.cat([real, -imaginary], dim=-1))
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         return self.decode(self.successive_latents(origin, first, count), readout)

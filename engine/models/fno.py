@@ -11,8 +11,7 @@ with the same map of each point from the initial displacement to h and from h to
 
 The modules are the definition. Where a gradient is wanted, roll-outs compute the same with fewer and larger products
 (`_fno_rollout`); where none is, on the CPU in single precision, a compiled kernel does (`_fno_kernel`). A listening
-point costs what the grid costs: the recurrence needs the whole field. A training may set out from weights that are
-a string already (`_fno_wiring`).
+point costs what the grid costs: the recurrence needs the whole field.
 """
 
 from __future__ import annotations
@@ -27,9 +26,7 @@ from torch.utils.checkpoint import checkpoint
 
 from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
 from engine.models._fno_transform import transform_matrices
-from engine.models._fno_wiring import Kernels, Wiring, wire_fgru, wire_frnn
 from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
-from engine.models.string_modes import StartsFromModes, StringModes
 
 if TYPE_CHECKING:
     from engine.models import _fno_kernel as kernel
@@ -108,7 +105,7 @@ class FourierConvolution(nn.Module):
         nn.init.uniform_(self.bias, 0, 1 / width, generator=generator)
 
 
-class _FourierRecurrent(StringModel[FieldState], StartsFromModes):
+class _FourierRecurrent(StringModel[FieldState]):
     """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
 
     initialisations: ClassVar = {"paper": ""}
@@ -177,16 +174,6 @@ class _FourierRecurrent(StringModel[FieldState], StartsFromModes):
         self._render(fields.numpy(), frames.numpy())
         return frames, fields
 
-    def _store(self, wiring: Wiring, layers: dict[FourierConvolution, Kernels]) -> None:
-        for layer, kernels in layers.items():
-            kernels.store(layer.weight, layer.bias)
-        with torch.no_grad():
-            self.in_mapping.weight.zero_()
-            self.in_mapping.weight[:, 0] = wiring.weight_in
-            self.in_mapping.bias.copy_(wiring.bias_in)
-            self.out_mapping.weight[0] = wiring.weight_out
-            self.out_mapping.bias.fill_(wiring.bias_out)
-
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 
@@ -208,7 +195,6 @@ class FGRU(_FourierRecurrent):
     """See the module."""
 
     kept_fields = 8
-    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width)
@@ -222,12 +208,6 @@ class FGRU(_FourierRecurrent):
         z = torch.sigmoid(self.z_layer(hidden))
         r = torch.sigmoid(self.r_layer(hidden))
         return (1 - z) * hidden + z * torch.tanh(self.h_layer(r * hidden))
-
-    def store_modes(self, modes: StringModes) -> None:
-        """See `_fno_wiring`."""
-        wiring = wire_fgru(modes, self.configuration.width)
-        layers = self.z_layer, self.r_layer, self.h_layer
-        self._store(wiring, dict(zip(layers, wiring.layers, strict=True)))
 
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
         z, r, candidate = (channel_matrices(layer.weight) for layer in (self.z_layer, self.r_layer, self.h_layer))
@@ -248,8 +228,6 @@ class FGRU(_FourierRecurrent):
 class FRNN(_FourierRecurrent):
     """See the module. Nothing bounds it: it may blow up, more so before it is trained."""
 
-    holds_coupling: ClassVar = False
-
     def __init__(self, configuration: FRNNConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
@@ -264,15 +242,6 @@ class FRNN(_FourierRecurrent):
         for convolve, pointwise in zip(self.fourier_layers, self.pointwise_layers, strict=True):
             hidden = torch.relu(convolve(hidden)) + pointwise(hidden)
         return hidden
-
-    def store_modes(self, modes: StringModes) -> None:
-        """As a linear string: its frequencies follow nothing. See `_fno_wiring`."""
-        wiring = wire_frnn(modes, self.configuration.width, self.configuration.depth)
-        self._store(wiring, dict(zip(self._convolutions, wiring.layers, strict=True)))
-        with torch.no_grad():
-            for layer in self._pointwise:
-                layer.weight.zero_()
-                layer.bias.zero_()
 
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
         matrices = torch.stack([channel_matrices(layer.weight) for layer in self._convolutions])

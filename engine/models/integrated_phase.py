@@ -29,7 +29,7 @@ after the start: κ = Im K q² is taken of the amplitudes that the actions E mea
 and A_out, real, the exponents have ± log(1 + 4|A q²|)/4 beside M z².
 
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
-parameter a latent never exceeds e^b (`gain_limit_db`) times its start and decays to zero. f may still change the
+parameter a latent never exceeds e^b (`GAIN_LIMIT`) times its start and decays to zero. f may still change the
 decay either way: the eigenvalue at time t is -σ_n + iω_n + Re f_n sech²(Re I_n / b) + i Im f_n, which is -σ + iω + f
 while the change is small against b. And f(0) = 0: a quiet string is the linear one, so σ and ω are its own.
 
@@ -41,7 +41,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import pairwise
 from typing import ClassVar, NamedTuple
 
@@ -56,7 +55,7 @@ from engine.models._averaging import (
     averaged_modulation,
     stiffening,
 )
-from engine.models._cubics import differences, hermite, integrate_parabolas
+from engine.models._cubics import hermite, integrate_parabolas
 from engine.models._diagonal import (
     dense_layers,
     initialise_orthogonal,
@@ -67,13 +66,13 @@ from engine.models._diagonal import (
 )
 from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
 from engine.models.eigenvalues import pack
-from engine.models.string_modes import StartsFromModes, StringModes
+from engine.models.string_modes import StringModes
 
+GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
+RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
-SETTLED = 16  # node spacings after which a listening point's segments may be as long as those
-MOST_PRODUCTS = 1024  # frames of a listening point's segment: rounding grows with their cube, to 1e-7
+SETTLED = 16  # node spacings after which the segments of a sample may be as long as those
 MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
-LISTENING_POINTS = 8  # at most: more are better read off with matrix products
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
 
@@ -86,43 +85,30 @@ class IntegratedPhaseConfiguration:
         state_size: number n of complex eigenvalues: one for each mode, or more to spare.
         encoder_widths: hidden widths of the MLP that is added to the linear encoder.
         eigenvalue_widths: hidden widths of g.
-        multiplier_widths: hidden widths of Koopman_var's multiplier, 1 + MLP(|z|²). Evaluated at every frame.
-        decoder_widths: hidden widths of an MLP that is added to the linear decoder. Evaluated at every frame.
         modulation: whether there are M_in and M_out. Evaluated at every frame.
         adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out, too, which need
             the modulation.
         node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
-        rate_unit: unit of K E and of g in radians and nepers a sample. A weight of 1 turns a phase by one radian in
-            1/rate_unit samples, the order of a training horizon, so that an optimiser's usual steps suit.
         physical_units: K, g and M are told the tension that each mode adds, as a share of that at rest, instead of
             the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
             which an optimiser and a network need. A start from the physics fills the units in.
         second_order: whether g counts by Σ E_m.
-        gain_limit_db: b, the largest change of level that Re f can add up to.
     """
 
     grid_points: int = 101
     state_size: int = 25
     encoder_widths: tuple[int, ...] = (128, 128)
     eigenvalue_widths: tuple[int, ...] = (128, 128)
-    multiplier_widths: tuple[int, ...] = ()
-    decoder_widths: tuple[int, ...] = ()
     modulation: bool = False
     adiabatic: bool = False
     node_spacing: int = 40
-    rate_unit: float = 1e-3
     physical_units: bool = False
     second_order: bool = False
-    gain_limit_db: float = 6.0
 
     def __post_init__(self) -> None:
-        widths = ("encoder_widths", "eigenvalue_widths", "multiplier_widths", "decoder_widths")
-        check_sizes(self, "grid_points", "state_size", *widths, "node_spacing")
+        check_sizes(self, "grid_points", "state_size", "encoder_widths", "eigenvalue_widths", "node_spacing")
         if self.adiabatic and not self.modulation:
             raise ValueError("adiabatic needs modulation = true")
-        for name in ("rate_unit", "gain_limit_db"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -131,13 +117,13 @@ class IntegratedPhaseState:
 
     Attributes:
         origin: z(0), complex (batch, state_size).
-        time: samples of the trained rate since then. A fraction, so that thirds of a sample add up exactly.
+        time: samples since then.
         integral: ∫ f(E) - K E from 0 to the node before the last one that `time` has reached, float64
             (batch, 2 state_size) with the real parts first.
     """
 
     origin: Tensor
-    time: Fraction
+    time: int
     integral: Tensor
 
 
@@ -172,7 +158,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
+class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     """See the module."""
 
     initialisations: ClassVar = {
@@ -182,7 +168,6 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
     }
     eigenvalue_parameters: ClassVar = eigenvalues.STORED
     coupling_parameters: ClassVar = frozenset({"K"})
-    holds_coupling: ClassVar = True
 
     def __init__(self, configuration: IntegratedPhaseConfiguration) -> None:
         super().__init__()
@@ -197,13 +182,11 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
         self.energy_units: Tensor | None
         self.rate_units: Tensor | None
-        units = [torch.full((n,), unit, dtype=torch.float64) for unit in (1.0, c.rate_unit)]
+        units = [torch.full((n,), unit, dtype=torch.float64) for unit in (1.0, RATE_UNIT)]
         self.register_buffer("energy_units", units[0] if c.physical_units else None)  # 1/(normalised displacement)²
         self.register_buffer("rate_units", units[1] if c.physical_units else None)  # 1/samples
         self.g = _mlp(n, c.eigenvalue_widths, 2 * n, last_bias=False)  # g(0) is subtracted: it would cancel
-        self.multiplier = _mlp(n, c.multiplier_widths, 2 * n)
         self.decoder = nn.Linear(2 * n, c.grid_points)
-        self.decoder_residual = _mlp(2 * n, c.decoder_widths, c.grid_points)
         self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None  # real parts first
         self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None
         self.A_in = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
@@ -219,41 +202,27 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         return _at_rest(pack(z))
 
     def advance(
-        self,
-        state: IntegratedPhaseState,
-        steps: int,
-        readout: Tensor | None = None,
-        step_size: Fraction | int = 1,
+        self, state: IntegratedPhaseState, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, IntegratedPhaseState]:
-        """See the contract.
-
-        Args:
-            step_size: samples of the trained rate in a frame: Fraction(16_000, 48_000) renders a model trained at
-                16 kHz at 48 kHz. Exact over any number of frames.
-
-        Raises:
-            ValueError: a step size that is not above 0.
-        """
-        if not step_size > 0:
-            raise ValueError(f"step_size must be above 0, not {step_size}")
-        rates, step = self._rates(), Fraction(step_size)
+        rates = self._rates()
         most = max(1, NUMBERS_AT_ONCE // self.configuration.state_size)
-        blocks, done = [], 0
-        while done < steps:
-            if readout is not None and self._can_listen(state, readout):
-                block, state = self._listen(state, rates, min(SEGMENT * most, steps - done), step, readout)
-            else:
-                block, state = self._render(state, rates, min(most, steps - done), step, readout)
+        blocks = []
+        for done in range(0, steps, most):
+            block, state = self._render(state, rates, min(most, steps - done), readout)
             blocks.append(block)
-            done += block.shape[1]
         return torch.cat(blocks, dim=1), state
 
     def sample(
         self, state: IntegratedPhaseState, frames: Tensor, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, IntegratedPhaseState]:
-        """See the contract. Segments are as long as in `_listen`: here too their ends are what costs."""
+        """See the contract.
+
+        Segments are longer once t ≥ 16h. What changes f on a time scale of h has faded by then: of the energies'
+        decay at any rate σ at most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and where a segment lies between two
+        nodes the network's integral is a cubic itself.
+        """
         rates, spacing = self._rates(), self.configuration.node_spacing
-        early = min(steps, max(0, math.ceil(SETTLED * spacing - state.time)))
+        early = min(steps, max(0, SETTLED * spacing - state.time))
         blocks, done = [], 0
         for count, samples in ((early, SEGMENT), (steps - early, spacing)):
             if count:
@@ -263,19 +232,12 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
                 done += count
         return torch.cat(blocks, dim=1), state
 
-    def at(self, state: IntegratedPhaseState, times: Tensor, readout: Tensor | None = None) -> Tensor:
-        """Displacement (batch, times, points) at `times` (times,), in samples from the state's own time.
-
-        Raises:
-            ValueError: a time before the state's.
-        """
-        if bool((times < 0).any()):
-            raise ValueError("times must not be before the state's own; encode again, or keep an earlier state")
-        return self.decode(self._latents_at(state, times), readout)
-
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z of any frames ≥ 0 (whole or not, any order), complex (batch, frames, state_size)."""
-        return self._latents_at(_at_rest(origin), frames)
+        rates, times = self._rates(), frames.double()
+        motion, _ = self._move(_at_rest(origin), rates, times, 0)
+        factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
+        return (origin[:, None] * factor).to(origin.dtype)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
@@ -289,16 +251,8 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
             coupling = coupling * self.energy_units[:, None]
         return _Rates(sigma, self.theta_log.exp(), coupling * self._rate_units)
 
-    def _latents_at(self, state: IntegratedPhaseState, ahead: Tensor) -> Tensor:
-        """z at times (times,) after the state's, complex (batch, times, state_size)."""
-        rates = self._rates()
-        times = ahead.double() + float(state.time)
-        motion, _ = self._move(state, rates, times, state.time)
-        factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
-        return (state.origin[:, None] * factor).to(state.origin.dtype)
-
     def _render(
-        self, state: IntegratedPhaseState, rates: _Rates, count: int, step: Fraction, readout: Tensor | None
+        self, state: IntegratedPhaseState, rates: _Rates, count: int, readout: Tensor | None
     ) -> tuple[Tensor, IntegratedPhaseState]:
         """The next `count` frames and the state after them.
 
@@ -306,14 +260,13 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         in between (Hermite), which leaves errors of the order of h|f| (2σh)³/384 for segments of h samples: a frame
         costs a sine, a cosine and an exponential a latent.
         """
-        length = self._segment_length(SEGMENT, step)
-        segments, later = self._segments(state, rates, count, step, length)
-        alive = self._decoded(segments)
-        ends = segments.ends[..., alive].to(self.decoder.weight.dtype)
+        length = min(SEGMENT, self.configuration.node_spacing)
+        segments, later = self._segments(state, rates, count, length)
+        ends = segments.ends[..., segments.alive].to(self.decoder.weight.dtype)
         # (frames of a segment, batch, segments, state_size): so all segments are one matrix product
         log_radius, phase = (hermite(length, ends) @ ends.flatten(1)).view(length, *ends.shape[1:]).unbind(1)
         radius = torch.exp(log_radius)
-        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive)
+        frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, segments.alive)
         frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
         return frames[:, segments.begin : segments.begin + count], later
 
@@ -327,10 +280,9 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         readout: Tensor | None,
     ) -> tuple[Tensor, IntegratedPhaseState]:
         """Some of the next `count` frames, from segments of at most `samples`, and the state after all of them."""
-        step = Fraction(1)
-        length = self._segment_length(samples, step)
-        segments, later = self._segments(state, rates, count, step, length)
-        alive = self._decoded(segments)
+        length = min(samples, self.configuration.node_spacing)
+        segments, later = self._segments(state, rates, count, length)
+        alive = segments.alive
         number, offset = (segments.begin + frames - 1) // length, (segments.begin + frames - 1) % length
         basis = hermite(length, segments.ends)[offset]
         log_radius, phase = torch.einsum("fk,kpbfn->pbfn", basis, segments.ends[..., alive][:, :, :, number])
@@ -338,57 +290,8 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         radius, phase = torch.exp(log_radius.to(dtype)), torch.remainder(phase, 2 * math.pi).to(dtype)
         return self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive), later
 
-    def _decoded(self, segments: _Segments) -> Tensor:
-        """The latents that a decoder is given: those that count, or all where networks take them."""
-        if self.multiplier is None and self.decoder_residual is None:
-            return segments.alive
-        return torch.arange(self.configuration.state_size, device=segments.alive.device)
-
-    def _can_listen(self, state: IntegratedPhaseState, readout: Tensor) -> bool:
-        """Whether `_listen` applies: a linear decoder at a few points, on a processor, and no gradients asked for."""
-        return (
-            self._has_linear_decoder
-            and readout.shape[-1] <= LISTENING_POINTS
-            and state.origin.device.type == "cpu"
-            and not torch.is_grad_enabled()
-        )
-
-    def _listen(
-        self, state: IntegratedPhaseState, rates: _Rates, most: int, step: Fraction, readout: Tensor
-    ) -> tuple[Tensor, IntegratedPhaseState]:
-        """As `_render`, of at most `most` frames, with the sum over latents in a compiled kernel.
-
-        The kernel advances the exponential of a cubic by products, so that the segments' ends are what costs; they
-        lie further apart once t ≥ 16h. What changes f on a time scale of h has faded by then: of the energies' decay
-        at any rate σ at most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and where a segment lies between two nodes
-        the network's integral is a cubic itself.
-        """
-        from engine.models._diagonal_kernel import listen  # Numba only when it is needed
-
-        spacing = self.configuration.node_spacing
-        ahead = math.ceil(SETTLED * spacing / step) - (state.time // step + 1)  # frames of short segments
-        length = min(self._segment_length(SEGMENT if ahead > 0 else spacing, step), MOST_PRODUCTS)
-        count = min(most, ahead) if ahead > 0 else most
-        segments, later = self._segments(state, rates, count, step, length)
-        log_radius, phase = (
-            (differences(length).to(segments.ends) @ segments.ends.flatten(1)).view_as(segments.ends).unbind(1)
-        )
-        radius = torch.exp(log_radius[..., segments.alive])
-        phase = phase[..., segments.alive]
-        factors = torch.stack([radius * torch.cos(phase), radius * torch.sin(phase)])
-        weight, bias = read_layer(self.decoder, readout)
-        weights = torch.stack(weight.double().chunk(2, dim=-1))[..., segments.alive]
-        frames = factors.new_empty(*factors.shape[2:4], length, len(bias))
-        listen(factors.numpy(), weights.contiguous().numpy(), frames.numpy())
-        frames = frames.flatten(1, 2)[:, segments.begin : segments.begin + count]
-        return frames.to(bias.dtype) + bias, later
-
-    def _segment_length(self, samples: int, step: Fraction) -> int:
-        """Frames in a segment of at most so many samples."""
-        return max(1, int(min(samples, self.configuration.node_spacing) // step))
-
     def _segments(
-        self, state: IntegratedPhaseState, rates: _Rates, count: int, step: Fraction, length: int
+        self, state: IntegratedPhaseState, rates: _Rates, count: int, length: int
     ) -> tuple[_Segments, IntegratedPhaseState]:
         """The segments of `length` frames that hold the next `count` frames, and the state after those.
 
@@ -396,11 +299,9 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         change by more than b in a segment, which no string does, has its slope held there: so within a segment no
         gain exceeds b by more than 8/27 of it.
         """
-        frames_done, offset = divmod(state.time, step)
-        first, last = (frames_done + 1) // length, (frames_done + count) // length
-        width = float(length * step)
-        times = torch.arange(first, last + 2, device=state.origin.device).double() * width + float(offset)
-        end = state.time + count * step
+        first, last = (state.time + 1) // length, (state.time + count) // length
+        times = torch.arange(first, last + 2, device=state.origin.device).double() * length
+        end = state.time + count
         motion, integral = self._move(state, rates, times, end)
 
         start = state.origin.to(torch.complex128)[:, None]
@@ -410,15 +311,13 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         alive = (level.detach().amax((0, 1)) > SILENCE).nonzero()[:, 0]
         left = torch.stack([level[:, :-1], torch.remainder(motion.phase[:, :-1] + angle, 2 * math.pi)])
         right = left + torch.stack([level.diff(dim=1), motion.phase.diff(dim=1)])
-        held = (motion.gain_rate * width).clamp(-self._gain_limit, self._gain_limit)
-        slopes = torch.stack([held - rates.sigma * width, motion.phase_rate * width])
+        held = (motion.gain_rate * length).clamp(-GAIN_LIMIT, GAIN_LIMIT)
+        slopes = torch.stack([held - rates.sigma * length, motion.phase_rate * length])
         ends = torch.stack([left, right, slopes[:, :, :-1], slopes[:, :, 1:]])
-        segments = _Segments(ends, alive, frames_done + 1 - first * length)
+        segments = _Segments(ends, alive, state.time + 1 - first * length)
         return segments, IntegratedPhaseState(state.origin, end, integral)
 
-    def _move(
-        self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: Fraction
-    ) -> tuple[_Motion, Tensor]:
+    def _move(self, state: IntegratedPhaseState, rates: _Rates, times: Tensor, end: int) -> tuple[_Motion, Tensor]:
         """Gain and phase at `times` (times,) since frame 0, and the `integral` of a state at the time `end`.
 
         Everything is float64: what adds up over millions of samples keeps its last digits.
@@ -436,10 +335,9 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
             integral_at_end = integral_at_end + to_end
         growth, turn = integral.chunk(2, dim=-1)
         growth_rate, turn_rate = f.chunk(2, dim=-1)
-        limit = self._gain_limit
-        saturated = torch.tanh((growth / limit).to(self.K.dtype)).double()
+        saturated = torch.tanh((growth / GAIN_LIMIT).to(self.K.dtype)).double()
         motion = _Motion(
-            limit * saturated,
+            GAIN_LIMIT * saturated,
             rates.omega * times[:, None] + turn,
             growth_rate * (1 - saturated.square()),
             rates.omega + turn_rate,
@@ -447,7 +345,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         return motion, integral_at_end
 
     def _integrate_higher_orders(
-        self, state: IntegratedPhaseState, rates: _Rates, energy: Tensor, times: Tensor, end: Fraction
+        self, state: IntegratedPhaseState, rates: _Rates, energy: Tensor, times: Tensor, end: int
     ) -> tuple[Tensor, Tensor, Tensor]:
         """What f has beside K E, integrated from where the state's integral ends.
 
@@ -481,35 +379,20 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         return f
 
     @property
-    def _has_linear_decoder(self) -> bool:
-        return self.multiplier is None and self.decoder_residual is None and self.M_out is None
-
-    @property
-    def _rate_units(self) -> Tensor | float:
-        """Of f, in radians and nepers a sample: (2 state_size,), or one for all."""
-        return self.configuration.rate_unit if self.rate_units is None else self.rate_units.repeat(2)
-
-    @property
-    def _gain_limit(self) -> float:
-        """b in nepers."""
-        return self.configuration.gain_limit_db * math.log(10) / 20
+    def _rate_units(self) -> Tensor:
+        """Of f, in radians and nepers a sample, float64 (2 state_size,)."""
+        if self.rate_units is None:
+            return self.nu_log.new_full((2 * self.configuration.state_size,), RATE_UNIT, dtype=torch.float64)
+        return self.rate_units.repeat(2)
 
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
         """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
         if self.M_out is not None:
             real, imag = self._modulate(self.M_out, self.A_out, real, imag, alive)
-        if self.multiplier is not None:
-            a, b = self.multiplier(real.square() + imag.square()).chunk(2, dim=-1)
-            real, imag = real + a * real - b * imag, imag + a * imag + b * real
         weight, bias = read_layer(self.decoder, readout)
         of_real, of_imag = weight.chunk(2, dim=-1)
         found = nn.functional.linear(real, of_real[:, alive], bias)
-        found = found + nn.functional.linear(imag, of_imag[:, alive])
-        if self.decoder_residual is not None:
-            hidden, last = self.decoder_residual[:-1], dense_layers(self.decoder_residual)[-1]
-            parts = torch.cat([real, imag], dim=-1)
-            found = found + nn.functional.linear(hidden(parts), *read_layer(last, readout))
-        return found
+        return found + nn.functional.linear(imag, of_imag[:, alive])
 
     def _modulate(
         self, matrix: Tensor, adiabatic: Tensor | None, real: Tensor, imag: Tensor, alive: Tensor | slice
@@ -523,7 +406,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         if adiabatic is not None:
             weight = (adiabatic * self._modulation_units[..., :n])[alive][:, alive]
             growth = growth + adiabatic_change(real.square() + imag.square(), weight)
-        gain = torch.exp(self._gain_limit * torch.tanh(growth / self._gain_limit))
+        gain = torch.exp(GAIN_LIMIT * torch.tanh(growth / GAIN_LIMIT))
         cosine, sine = gain * torch.cos(turn), gain * torch.sin(turn)
         return real * cosine - imag * sine, real * sine + imag * cosine
 
@@ -555,7 +438,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         """
         check_initialisation(self, how)
         with torch.no_grad():
-            for network in (self.encoder_residual, self.g, self.multiplier, self.decoder_residual):
+            for network in (self.encoder_residual, self.g):
                 if network is not None:
                     _initialise_mlp(network, generator)
             for linear in (self.encoder, self.decoder):
@@ -594,8 +477,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
             self.rate_units[:count] = omega
             self.energy_units[:count] = (coupling / omega[:, None]).abs().median(0).values
             coupling = coupling / self.energy_units[:count]
-        rate_units = self._rate_units[:count, None] if isinstance(self._rate_units, Tensor) else self._rate_units
-        self.K[n : n + count, :count] = (coupling / rate_units).to(self.K.dtype)
+        self.K[n : n + count, :count] = (coupling / self._rate_units[:count, None]).to(self.K.dtype)
 
     def _initialise_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes
@@ -631,14 +513,14 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState], StartsFromModes):
         self.decoder.weight[:, :modes] = physics.resonator.shapes.T.to(self.decoder.weight)
 
 
-def _integrated_nodes(time: Fraction, spacing: int) -> int:
+def _integrated_nodes(time: int, spacing: int) -> int:
     """The node at which the integral of a state ends: one is kept back for the segment that `time` lies in."""
     return max(0, time // spacing - 1)
 
 
 def _at_rest(origin: Tensor) -> IntegratedPhaseState:
     batch, n = origin.shape
-    return IntegratedPhaseState(origin, Fraction(0), origin.real.new_zeros(batch, 2 * n, dtype=torch.float64))
+    return IntegratedPhaseState(origin, 0, origin.real.new_zeros(batch, 2 * n, dtype=torch.float64))
 
 
 def _mlp(values: int, widths: tuple[int, ...], outputs: int, last_bias: bool = True) -> nn.Sequential | None:

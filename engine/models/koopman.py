@@ -86,11 +86,11 @@ class Koopman(DiagonalModel):
     def powers(self, frames: Tensor) -> Tensor:
         return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
 
-    def synthesise(self, modulated: Tensor, readout: Tensor | None = None) -> Tensor:
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         first, *others = dense_layers(self.decoder)
         if not others:
-            return dense(modulated, *read_layer(first, readout))
-        hidden = dense(modulated, first.weight, first.bias)
+            return dense(latents, *read_layer(first, readout))
+        hidden = dense(latents, first.weight, first.bias)
         for layer in others[:-1]:
             hidden = layer(nn.functional.selu(hidden))
         return linear(nn.functional.selu(hidden), *read_layer(others[-1], readout))

@@ -91,11 +91,8 @@ class KoopmanVar(DiagonalModel):
     def powers(self, frames: Tensor) -> Tensor:
         return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
 
-    def modulated(self, latents: Tensor) -> Tensor:
-        return latents * self._multipliers(latents)
-
-    def synthesise(self, modulated: Tensor, readout: Tensor | None = None) -> Tensor:
-        return dense(modulated, *read_layer(self.decoder, readout))
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+        return dense(latents * self._multipliers(latents), *read_layer(self.decoder, readout))
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         if not self._interpolates() or count <= SHORT:

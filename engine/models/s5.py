@@ -3,7 +3,7 @@
 Source: the paper, §3.2, after Smith et al. 2023; its start as in the paper's own code (rodrigodzf/physmodjax). With
 the step Δ = exp(log_step) learned for every state and zero-order hold, λ = exp(ΛΔ) and B̄ = (λ - 1) Λ⁻¹ B. One state
 of each conjugate pair is kept; the output is 2 Re(C x). The real part of Λ is not bounded: a trained model may have
-|λ| > 1, which `unstable` lists.
+|λ| > 1, and then grow.
 """
 
 from __future__ import annotations

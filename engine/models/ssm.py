@@ -333,7 +333,7 @@ class SSMState:
 
 
 class SSMString(StringModel[SSMState], ABC):
-    """A first layer from the initial condition or an excitation, then blocks."""
+    """A first layer from the initial condition, then blocks."""
 
     initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
 
@@ -344,38 +344,10 @@ class SSMString(StringModel[SSMState], ABC):
         self.layers = nn.ModuleList([Block(seq, grid_points) for seq in blocks])
         self._folded: tuple[list[Weight], list[FoldedBlock]] = [], []
 
-    def initial_state(self, batch: int) -> SSMState:
-        """The state of `batch` strings at rest."""
-        ssms = self._ssms()
-        return SSMState(
-            tuple(torch.zeros(batch, s.B.shape[0], dtype=torch.complex128, device=s.B.device) for s in ssms)
-        )
-
     def encode(self, displacement: Tensor) -> SSMState:
         origin = self.first_layer.input(displacement, self.first_layer.input_matrix()).to(torch.complex128)
-        return SSMState((origin, *self.initial_state(displacement.shape[0]).latents[1:]))
-
-    def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
-        return self._run(state, steps, None, readout)
-
-    def excite(self, state: SSMState, excitation: Tensor, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
-        """Like `advance`, with any excitation: §3.2 with u_k for every k in place of u_k δ_k.
-
-        An impulse at k = 0 from `initial_state` is `encode` and `advance` of the same displacement; zeros are
-        `advance`.
-
-        Args:
-            excitation: (batch, steps, grid_points), what the string is given at the present frame, at the next …, in
-                normalised units. It is heard from the frame after on.
-        """
-        return self._run(state, excitation.shape[1], excitation.transpose(0, 1), readout)
-
-    @property
-    def unstable(self) -> tuple[complex, ...]:
-        """Every eigenvalue with |λ| > 1, of all layers: with one of them the motion may grow without bound."""
-        with torch.no_grad():
-            eigenvalues = torch.cat([ssm.log_eigenvalues() for ssm in self._ssms()])
-        return tuple(eigenvalues[eigenvalues.real > 0].exp().tolist())
+        of_blocks = (ssm.B.shape[0] for ssm in self._ssms()[1:])
+        return SSMState((origin, *(origin.new_zeros(len(origin), states) for states in of_blocks)))
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
@@ -432,9 +404,7 @@ class SSMString(StringModel[SSMState], ABC):
                 self._folded = weights, folded
         return folded
 
-    def _run(
-        self, state: SSMState, steps: int, excitation: Tensor | None, readout: Tensor | None
-    ) -> tuple[Tensor, SSMState]:
+    def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
         # batch statistics need the whole time at once
         at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
         rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
@@ -442,25 +412,14 @@ class SSMString(StringModel[SSMState], ABC):
         blocks: Sequence[Block | FoldedBlock] = self._folded_blocks() if rendering else list(layers)
         parts = []
         for done in range(0, steps, at_once):
-            count = min(at_once, steps - done)
-            given = None if excitation is None else excitation[done : done + count]
-            part, state = self._stretch(blocks, state, count, given)
+            part, state = self._stretch(blocks, state, min(at_once, steps - done))
             parts.append(part if readout is None else part @ readout.to(part))
         return torch.cat(parts).transpose(0, 1), state
 
-    def _stretch(
-        self, blocks: Sequence[Block | FoldedBlock], state: SSMState, steps: int, excitation: Tensor | None
-    ) -> tuple[Tensor, SSMState]:
+    def _stretch(self, blocks: Sequence[Block | FoldedBlock], state: SSMState, steps: int) -> tuple[Tensor, SSMState]:
         """Frames, time-major, and the state after them."""
         first = self.first_layer
-        if excitation is None:
-            dtype = first.B.dtype.to_complex()
-            states, last = evolve(first.log_eigenvalues(), state.latents[0], steps, dtype)
-        else:
-            # y is one sample late: x_{k+1} = λ (x_k + B̄ u_k)
-            log_eigenvalues = first.log_eigenvalues()
-            matrix = scale_rows(first.input_matrix(), log_eigenvalues.exp())
-            states, last = recur(first.input(excitation, matrix), log_eigenvalues, state.latents[0])
+        states, last = evolve(first.log_eigenvalues(), state.latents[0], steps, first.B.dtype.to_complex())
         frames, latents = first.output(states), [last]
         for block, latent in zip(blocks, state.latents[1:], strict=True):
             frames, last = block(frames, latent)

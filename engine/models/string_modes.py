@@ -5,9 +5,7 @@ Where they come from is the caller's: `training.fitting.phases` finds them in di
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 import torch
 from torch import Tensor
@@ -43,22 +41,3 @@ class StringModes:
     def drift(self) -> Tensor:
         """The typical Σ κ_m q_m², (modes,)."""
         return self.coupling @ self.squares.mean(0)
-
-
-class StartsFromModes(ABC):
-    """A model that can be made a string of given modes.
-
-    Attributes:
-        holds_coupling: whether its frequencies can follow the energies; else its modes are the linear ones that come
-            nearest.
-    """
-
-    holds_coupling: ClassVar[bool]
-
-    @abstractmethod
-    def store_modes(self, modes: StringModes) -> None:
-        """Makes it a string of these modes, as far as its form can be one.
-
-        Raises:
-            ValueError: it has too few latents, channels or points for them.
-        """

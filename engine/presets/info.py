@@ -84,7 +84,7 @@ class PresetInfo:
                 raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
         bounds.check("horizon_steps", self.horizon_steps, (1, bounds.MOST_FRAMES))
         bounds.check("scale_m", self.scale_m, (1e-12, 1e3), "m")
-        bounds.check_motion(self.string, self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
+        self.string.check_motion(self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
 
     @property
     def horizon_s(self) -> float:

@@ -11,17 +11,15 @@ where the sum is the stretch, whose tension acts on all alike (the paper's Eq. 3
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
 
-OWN = ("omega", "sigma", "coupling", "stretch", "tension_rise")  # of a row; shapes and symmetry are a batch's
-
 
 @dataclass(frozen=True)
 class Resonator:
-    """One resonator, or a batch of them: then each tensor but the shapes has an axis (rows,) in front.
+    """One resonator.
 
     Attributes:
         omega: undamped angular frequencies ω in rad/s, ascending, float64 (modes,).
@@ -53,16 +51,12 @@ class Resonator:
             value = getattr(self, field.name)
             if value is None:
                 continue
-            expected = {"shapes": (modes, points), "analysis": (points, modes), "mirror": (modes,)}.get(
-                field.name, self.tension_rise.shape if field.name == "tension_rise" else (*self.rows, modes)
-            )
-            if tuple(value.shape) != tuple(expected):
-                raise ValueError(f"resonator: {field.name} has the shape {tuple(value.shape)}, not {tuple(expected)}")
+            others = {"shapes": (modes, points), "analysis": (points, modes), "tension_rise": ()}
+            if tuple(value.shape) != (expected := others.get(field.name, (modes,))):
+                raise ValueError(f"resonator: {field.name} has the shape {tuple(value.shape)}, not {expected}")
             if not bool(torch.isfinite(value).all()):
                 raise ValueError(f"resonator: {field.name} holds a number that is not finite")
-        if tuple(self.tension_rise.shape) != self.rows:
-            raise ValueError(f"resonator: tension_rise has {self.tension_rise.ndim} axes, not {len(self.rows)}")
-        if bool((self.omega.diff(dim=-1) < 0).any()):
+        if bool((self.omega.diff() < 0).any()):
             raise ValueError("resonator: omega must not fall from one mode to the next")
 
     @property
@@ -75,34 +69,9 @@ class Resonator:
         return self.shapes.shape[1]
 
     @property
-    def rows(self) -> tuple[int, ...]:
-        """(rows,) of a batch, () of one."""
-        return tuple(self.omega.shape[:-1])
-
-    @property
     def tension_modulated(self) -> bool:
         """Whether any amplitude moves another mode's frequency."""
         return bool(self.coupling.any())
-
-    def row(self, index: int) -> Resonator:
-        """One of a batch."""
-        return replace(self, **{name: getattr(self, name)[index] for name in OWN})
-
-    def each(self) -> list[Resonator]:
-        """Those of a batch; empty where it is one."""
-        return [self.row(index) for count in self.rows for index in range(count)]
-
-    @classmethod
-    def stacked(cls, resonators: list[Resonator]) -> Resonator:
-        """A batch of single ones whose shapes are the same.
-
-        Raises:
-            ValueError: they are not.
-        """
-        first = resonators[0]
-        if any(not torch.equal(first.shapes, each.shapes) for each in resonators):
-            raise ValueError("resonators of one batch must have the same modes on the same grid")
-        return replace(first, **{name: torch.stack([getattr(each, name) for each in resonators]) for name in OWN})
 
     def eigenvalues(self) -> Tensor:
         """Continuous-time eigenvalues -σ + i√(ω² - σ²) at rest, complex128 (modes,).
@@ -112,7 +81,7 @@ class Resonator:
         """
         squared = self.omega**2 - self.sigma**2
         if bool((squared <= 0).any()):
-            first = int((squared <= 0).nonzero()[0, -1]) + 1
+            first = int((squared <= 0).nonzero()[0]) + 1
             raise ValueError(f"mode {first} is overdamped: lower its damping, or keep fewer modes")
         return torch.complex(-self.sigma, squared.sqrt())
 

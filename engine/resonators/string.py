@@ -115,3 +115,39 @@ class StringParameters:
         while self.undamped_frequency(count + 1) < omega:
             count += 1
         return count
+
+    def check_motion(self, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool) -> None:
+        """Checks that its motion can be computed in ordinary memory and time, in closed form.
+
+        Raises:
+            ValueError: it cannot, or a mode does not oscillate; the message names the fields.
+        """
+        bounds.check("rate_hz", rate_hz, (1, bounds.HIGHEST_RATE_HZ), "Hz")
+        bounds.check("grid_points", grid_points, (3, bounds.SIZES["grid_points"][1]))
+        if not 1 <= modes <= grid_points - 2:
+            raise ValueError(f"a grid of {grid_points} points cannot hold {bounds.brief(modes)} modes")
+        if modes * grid_points > bounds.MOST_MATRIX_NUMBERS:
+            raise ValueError(
+                f"modes times grid_points must be at most {bounds.MOST_MATRIX_NUMBERS}, "
+                f"not {modes} times {grid_points}"
+            )
+        if grid_points * rate_hz > bounds.MOST_NUMBERS_A_SECOND:
+            raise ValueError(
+                f"grid_points times rate_hz must be at most {bounds.MOST_NUMBERS_A_SECOND}, "
+                f"not {grid_points} times {rate_hz:g}"
+            )
+        # σ² < ω² is a quadratic in η² that is not above 0 at η = 0: it holds for all modes if for first and last
+        for mode in (1, modes):
+            if not self.decay_rate(mode) < self.undamped_frequency(mode):
+                raise ValueError(f"mode {mode} is overdamped: lower its damping, or keep fewer modes")
+        if not tension_modulated:
+            return
+        highest_hz = self.undamped_frequency(modes) / (2 * math.pi)
+        substeps = math.ceil(bounds.SUBSTEPS_IN_A_PERIOD * highest_hz / rate_hz)
+        if substeps > bounds.MOST_SUBSTEPS:
+            raise ValueError(
+                f"mode {modes} at {highest_hz:.3g} Hz is too high for a rate_hz of {rate_hz:g}: the truth would take"
+                f" {substeps:.3g} sub-steps, at most {bounds.MOST_SUBSTEPS}; keep fewer modes"
+            )
+        if modes * min(modes, substeps) > bounds.MOST_FLOWS:
+            raise ValueError(f"{modes} modes with {substeps} sub-steps of the truth are too many; keep fewer modes")

@@ -12,13 +12,11 @@ from engine.truth.state import ModalState
 def damped_rotation(eigenvalues: Tensor, time_s: Tensor) -> Tensor:
     """The exact flow of q̈ + 2σq̇ + ω²q = 0 over `time_s` (...): float64 (..., 2, 2, modes).
 
-    `eigenvalues`: -σ + i√(ω² - σ²), complex128 (modes,), or (rows, modes) for times (rows, ...).
+    `eigenvalues`: -σ + i√(ω² - σ²), complex128 (modes,).
 
     Entry [i, j] maps component j of (amplitude, velocity) to component i.
     """
     t = time_s.to(torch.float64)[..., None]
-    if eigenvalues.ndim == 2:
-        eigenvalues = eigenvalues.reshape(len(eigenvalues), *(1,) * (t.ndim - 2), -1)
     sigma, omega = -eigenvalues.real, eigenvalues.imag
     decay, cos, sin = torch.exp(-sigma * t), torch.cos(omega * t), torch.sin(omega * t) / omega
     rows = [
@@ -30,7 +28,5 @@ def damped_rotation(eigenvalues: Tensor, time_s: Tensor) -> Tensor:
 
 def solve_linear(resonator: Resonator, state: ModalState, times_s: Tensor) -> Tensor:
     """Modal amplitudes at `times_s` (times,) without any coupling: float64 (batch, times, modes)."""
-    eigenvalues = resonator.eigenvalues()
-    flow = damped_rotation(eigenvalues, times_s.expand(*eigenvalues.shape[:-1], -1))
-    flow = flow if eigenvalues.ndim == 2 else flow[None]
-    return state.amplitude[:, None] * flow[:, :, 0, 0] + state.velocity[:, None] * flow[:, :, 0, 1]
+    flow = damped_rotation(resonator.eigenvalues(), times_s)
+    return state.amplitude[:, None] * flow[:, 0, 0] + state.velocity[:, None] * flow[:, 0, 1]

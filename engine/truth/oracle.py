@@ -27,10 +27,6 @@ def solve_dop853(
     """
     from scipy.integrate import solve_ivp  # slow to load, and only the oracle needs it
 
-    if resonator.rows:
-        rows = [ModalState(q[None], v[None]) for q, v in zip(state.amplitude, state.velocity, strict=True)]
-        pairs = zip(resonator.each(), rows, strict=True)
-        return torch.cat([solve_dop853(one, row, rate_hz, steps, rtol=rtol, atol=atol) for one, row in pairs])
     modes = resonator.modes
     stiffness, friction = resonator.omega.square().numpy(), 2 * resonator.sigma.numpy()
     eta_squared, coupling = resonator.stretch.numpy(), resonator.coupling.numpy()

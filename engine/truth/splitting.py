@@ -42,7 +42,7 @@ def default_substeps(resonator: Resonator, rate_hz: float) -> int:
 
 
 class SplittingSolver:
-    """A resonator at a sample rate, or a batch of them, one for each row. It is immutable: the state is passed.
+    """A resonator at a sample rate. It is immutable: the state is passed.
 
     Args:
         substeps: integration steps per sample; None takes `default_substeps`. What is linear needs one.
@@ -73,12 +73,6 @@ class SplittingSolver:
         self.substeps = (substeps or default_substeps(resonator, rate_hz)) if tension_modulated else 1
         self.device = torch.device(device)
         self._silence = silence
-        self._rows = [
-            SplittingSolver(one, rate_hz, substeps=substeps, silence=silence, device=device)
-            for one in resonator.each()
-        ]
-        if self._rows:
-            return
         omega = resonator.omega
         self._inverse_omega_squared = omega.pow(-2)
         # sub-steps by how many modes move, and what depends on them, once for each number that there is
@@ -112,8 +106,6 @@ class SplittingSolver:
         """
         if state.modes != self.modes:
             raise ValueError(f"the solver holds {self.modes} modes, the state {state.modes}")
-        if self._rows:
-            return self._sample_rows(state, frames, steps)
         q = state.amplitude.to(self.device, torch.float64).clone().contiguous()
         v = state.velocity.to(self.device, torch.float64).clone().contiguous()
         if self.device.type == "cpu":
@@ -123,22 +115,6 @@ class SplittingSolver:
         every = q.new_empty(q.shape[0], steps, self.modes)
         self._advance_tensors(q, v, every)
         return every if len(frames) == steps else every[:, frames - 1], ModalState(q, v)
-
-    def _sample_rows(self, state: ModalState, frames: Tensor, steps: int) -> tuple[Tensor, ModalState]:
-        """Each row by its own solver."""
-        if len(state.amplitude) != len(self._rows):
-            raise ValueError(f"the solver holds {len(self._rows)} resonators, the state {len(state.amplitude)} rows")
-
-        def run(row: int) -> tuple[Tensor, ModalState]:
-            own = ModalState(state.amplitude[row : row + 1], state.velocity[row : row + 1])
-            return self._rows[row].sample(own, frames, steps)
-
-        workers = min(torch.get_num_threads(), os.cpu_count() or 1, len(self._rows))
-        with ThreadPoolExecutor(workers) as pool:
-            done = list(pool.map(run, range(len(self._rows))))
-        ends = [end for _, end in done]
-        end = ModalState(torch.cat([e.amplitude for e in ends]), torch.cat([e.velocity for e in ends]))
-        return torch.cat([kept for kept, _ in done]), end
 
     def solve(self, state: ModalState, steps: int) -> Tensor:
         """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes)."""

@@ -22,7 +22,7 @@ from engine.kernels import layout as at
 from engine.kernels.modes import TOO_HIGH
 from engine.models.base import StringModel
 from engine.models.dmd import DMD
-from engine.models.integrated_phase import SETTLED, KoopmanIntegrated
+from engine.models.integrated_phase import GAIN_LIMIT, SETTLED, KoopmanIntegrated
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetInfo
@@ -103,17 +103,13 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
 @bank_program.register
 @torch.no_grad()
 def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int) -> Program | None:
-    """None where a network stands behind the latents, or more than the kernel holds."""
+    """None where there are more latents or layers than the kernel holds."""
     c, n = model.configuration, model.configuration.state_size
     widths = (n, *c.eigenvalue_widths)
-    plain = model.multiplier is None and model.decoder_residual is None
-    if not plain or max(widths) > at.MOST_MODES or len(widths) > 7:
+    if max(widths) > at.MOST_MODES or len(widths) > 7:
         return None
     rates = model._rates()
     units = model.energy_units if model.energy_units is not None else torch.ones(n, dtype=torch.float64)
-    rate_units = model._rate_units
-    if not isinstance(rate_units, Tensor):
-        rate_units = torch.full((2 * n,), float(rate_units), dtype=torch.float64)
     network, at_zero, sizes = np.zeros(0, np.float32), torch.zeros(2 * n), [0]
     if model.g is not None:
         at_zero = model.g(torch.zeros(n))
@@ -133,7 +129,7 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
     header = {
         at.P_RATIO: ratio,
         at.P_SPACING: float(c.node_spacing),
-        at.P_LIMIT: model._gain_limit,
+        at.P_LIMIT: GAIN_LIMIT,
         at.P_LOUDNESS: math.log(info.scale_m / FULL_SCALE_M),
     }
     counts = {
@@ -153,7 +149,7 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
         rates.coupling.abs().amax(1),
         turn / rates.omega,
         units,
-        rate_units.double(),
+        model._rate_units,
         at_zero.double(),
         torch.from_numpy(np.pad(network, (0, len(network) % 2)).view(np.float64)),
         modulation,
@@ -165,7 +161,7 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
 
     def start(displacement_m: Tensor) -> tuple[Array, Array]:
         with torch.inference_mode():
-            z = model.release((displacement_m[None] / info.scale_m).float()).origin[0].to(torch.complex128)
+            z = model.encode((displacement_m[None] / info.scale_m).float()).origin[0].to(torch.complex128)
         return z.abs().clamp(min=1e-300).log().numpy(), z.angle().numpy()
 
     if rate_hz != info.rate_hz:
@@ -205,7 +201,7 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program | None:
 
     def start(displacement_m: Tensor) -> tuple[Array, Array]:
         with torch.inference_mode():
-            z = model.release((displacement_m[None] / info.scale_m).float()).origin[0, present].to(torch.complex128)
+            z = model.encode((displacement_m[None] / info.scale_m).float()).origin[0, present].to(torch.complex128)
         return z.abs().clamp(min=1e-300).log().numpy(), z.angle().numpy()
 
     def read(weights: Tensor) -> tuple[Array, Array]:

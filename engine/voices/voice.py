@@ -11,7 +11,7 @@ from torch import Tensor
 
 from engine.kernels import layout as at
 from engine.kernels.memory import publish
-from engine.pluck import FULL_SCALE_M
+from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
 from engine.voices.programs import Program
@@ -21,8 +21,6 @@ FADE_S = 0.020  # another source, another gain
 END_FADE_S = 0.25  # of a model that hums on where its string has long been silent
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
-BELIEVED = 20.0  # times its initial peak: a string let go never exceeds about that
-LEAST_PEAK_M = 1e-4  # of these
 LONGEST_S = 1e9  # of a voice that never ends
 BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
@@ -62,7 +60,7 @@ class Voice:
         counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         memory[at.PEAK] = peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
-        memory[at.LIMIT] = BELIEVED * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
+        memory[at.LIMIT] = RUNAWAY_FACTOR * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second

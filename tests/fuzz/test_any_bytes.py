@@ -108,7 +108,7 @@ def test_a_string_within_bounds_can_be_computed(
     plain = {name: value * by for (name, value), by in zip(write(StringParameters()).items(), factors, strict=True)}
     try:
         string = StringParameters(**plain)
-        bounds.check_motion(string, modes, points, rate_hz, tension_modulated=True)
+        string.check_motion(modes, points, rate_hz, tension_modulated=True)
     except ValueError as error:
         assert str(error).isprintable()
         return

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from engine.models import build_model
 from engine.schema import SchemaError, write
 from training.cell import Cell, configuration_of
 from training.configuration import read_configuration
@@ -45,8 +46,22 @@ def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> Non
     now = configuration_of(CELL)
     plain = write(now)
     plain["recipe"]["random_start"] = False
+    plain["recipe"]["koopman_terms"] = "text"
     plain["model_configuration"]["input"] = "displacement"
     assert read_configuration(plain, "a preset") == now
     plain["recipe"]["random_start"] = True
     with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it anew"):
+        read_configuration(plain, "a preset")
+
+
+def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_the_value_that_they_had() -> None:
+    now = configuration_of(Cell("koopman_integrated", True, "gaussian", 16_000))
+    assert now.digest in {row.digest for row in read_results(RESULTS)}
+    gone = {"multiplier_widths": [], "decoder_widths": [], "rate_unit": 1e-3, "gain_limit_db": 6.0}
+    plain = write(now)
+    plain["model_configuration"] |= gone
+    assert read_configuration(plain, "a preset").digest == now.digest
+    assert build_model(now.model, gone).configuration == build_model(now.model).configuration
+    plain["model_configuration"]["gain_limit_db"] = 3.0
+    with pytest.raises(SchemaError, match=r"model_configuration\.gain_limit_db: 3\.0 is of an earlier version"):
         read_configuration(plain, "a preset")

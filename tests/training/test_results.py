@@ -10,8 +10,8 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError
-from training.knowledge import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT
 from training.results import COLUMNS, Row, add_rows, read_results
+from training.start import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT
 
 
 def row(digest: str = "a", **changes: Any) -> Row:
@@ -143,7 +143,7 @@ def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.M
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     with monkeypatch.context() as patched:
-        patched.setattr("training.results.csv.writer", FullDisk)
+        patched.setattr("engine.table.csv.writer", FullDisk)
         with pytest.raises(OSError, match="No space left"):
             add_rows(path, [row("b")])
     assert path.read_bytes() == before

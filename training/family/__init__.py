@@ -4,7 +4,5 @@ strings     which strings there are, and plucks of them
 motions     their true motions, cached
 fit         the curves of `koopman_tension`, by least squares
 errors      of any model of many strings, by string
-baselines   models by others, made to take any string
-fit_baseline   their training
 preset      a run as a whole: configuration to preset
 """

@@ -13,8 +13,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from engine.averaging import slow_flow
-from engine.models import StringModel, build_model
+from engine.models import StringModel
 from engine.models.base import Physics
 from training.family.motions import solve
 from training.family.strings import Column, PluckedString, displacement_m, draw_string
@@ -109,71 +108,14 @@ def player(model: StringModel[Any]) -> Player:
 
     def play(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
         own = model.tuned(Physics(plucked.resonator, rate_hz, SCALE_M))
-        return _played(own, plucked, steps)
+        return rollout(own, plucked, steps)
 
     return play
 
 
-def linear_string(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-    """The string without tension modulation: what all errors are large beside."""
-    times = torch.arange(1, steps + 1, dtype=torch.float64)[:, None] / rate_hz
-    eigenvalues = plucked.resonator.eigenvalues()
-    sine = -eigenvalues.real / eigenvalues.imag
-    angle = times * eigenvalues.imag
-    return plucked.amplitudes_m * torch.exp(times * eigenvalues.real) * (angle.cos() + sine * angle.sin())
-
-
-def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-    """`koopman_integrated` as averaging over a period starts it, without networks and without training."""
-    sizes = {
-        "state_size": plucked.resonator.modes,
-        "encoder_widths": (),
-        "eigenvalue_widths": (),
-        "node_spacing": 160,
-        "modulation": True,
-        "adiabatic": True,
-        "physical_units": True,
-        "second_order": True,
-    }
-    return _played(_started("koopman_integrated", sizes, "averaging", plucked, rate_hz), plucked, steps)
-
-
-def averaged_flow(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-    """`engine.averaging.slow_flow`: averaging to third order, in which modes trade energy."""
-    return slow_flow(plucked.resonator, plucked.amplitudes_m, rate_hz, steps)
-
-
-def untrained(how: str) -> Player:
-    """`koopman_tension` as its start of this name leaves it."""
-
-    def play(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-        return _played(
-            _started("koopman_tension", {"modes": plucked.resonator.modes}, how, plucked, rate_hz), plucked, steps
-        )
-
-    return play
-
-
-def knowing_physics() -> dict[str, Player]:
-    """By name what is untrained: it knows the string, and more or less of what its tension does."""
-    return {
-        "kicks without corrections": untrained("kicks"),
-        "backward error analysis (1/12)": untrained("series"),
-        "slow flow, third order": averaged_flow,
-        "averaging": averaging,
-        "linear string": linear_string,
-    }
-
-
-def _started(name: str, sizes: dict[str, Any], how: str, plucked: PluckedString, rate_hz: int) -> StringModel[Any]:
-    model = build_model(name, sizes)
-    model.initialise(how, Physics(plucked.resonator, rate_hz, SCALE_M), torch.Generator().manual_seed(0))
-    return model.eval()
-
-
-def _played(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tensor:
+def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tensor:
     displacement = (displacement_m(plucked)[None] / SCALE_M).to(torch.get_default_dtype())
-    state, blocks, done = model.release(displacement), [], 0
+    state, blocks, done = model.encode(displacement), [], 0
     while done < steps:
         count = min(4_800, steps - done)
         frames, state = model.advance(state, count)

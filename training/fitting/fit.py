@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +19,8 @@ from torch import Tensor
 from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from engine.bounds import LARGEST_HEADER_BYTES, LARGEST_PRESET_BYTES
 from engine.metrics import RelativeError
-from engine.models import DMD, MODELS, StringModel, build_model
-from engine.models.base import Physics
+from engine.models import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
 from training.configuration import Recipe, TrainingConfiguration, read_configuration
@@ -31,11 +29,8 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import training_loss
-from training.fitting.modes import found_modes
-from training.fitting.phases import start_from_phases
-from training.fitting.pursuit import LatentFit, pursue
 from training.fitting.soap import SOAP
-from training.knowledge import own_start
+from training.start import LEAST_SQUARES, begin, initialisation_of
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 TELL_EVERY_S = 5.0  # within an epoch
@@ -109,8 +104,8 @@ def fit(
         Diverged: the loss became infinite or not a number, or no validation error was ever a number.
         ValueError: the checkpoint there is damaged or of another configuration.
     """
-    if configuration.model == "dmd":
-        return _fit_dmd(configuration, dataset, report)
+    if initialisation_of(configuration) == LEAST_SQUARES:
+        return _fit_at_once(configuration, dataset, report)
     begun = time.monotonic()
     run = _Run(configuration, dataset, torch.device(device))
     path = run_folder / "checkpoint.safetensors"
@@ -141,33 +136,6 @@ def fit(
     return run.result()
 
 
-def new_model(
-    configuration: TrainingConfiguration, scale_m: float, found: Mapping[str, int] | None = None
-) -> StringModel[Any]:
-    """The untrained model of a run, initialised from its seed.
-
-    Args:
-        scale_m: its data set's.
-        found: sizes that its data have set.
-    """
-    data = configuration.data
-    model = build_model(configuration.model, {**configuration.model_configuration, **(found or {})})
-    if model.grid_points != data.grid_points:
-        raise ValueError(f"model_configuration.grid_points is {model.grid_points}, the data's are {data.grid_points}")
-    size = LARGEST_HEADER_BYTES + sum(part.nbytes for part in model.state_dict().values())
-    if size > LARGEST_PRESET_BYTES:
-        raise ValueError(
-            f"model_configuration makes a model of {size / 2**20:.0f} MiB, and a preset may have "
-            f"{LARGEST_PRESET_BYTES / 2**20:g}; lower its widths"
-        )
-    model.initialise(
-        own_start(configuration),
-        Physics(data.resonator, data.rate_hz, scale_m),
-        torch.Generator().manual_seed(configuration.recipe.seed),
-    )
-    return model
-
-
 def learning_rate_at(recipe: Recipe, share: float) -> float:
     """Constant, or one cycle: a linear warm-up to the peak, then a cosine to zero. `share`: of the run, 0 … 1."""
     if recipe.schedule == "constant":
@@ -192,20 +160,8 @@ class _Run:
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
         self._configuration, self._recipe, self._dataset = configuration, recipe, dataset
-        self._latents: LatentFit | None = None
-        if recipe.latent_epochs:
-            self._model = new_model(configuration, dataset.scale_m)
-            generator = torch.Generator().manual_seed(recipe.seed)
-            latents = pursue(self._model, dataset, configuration.steps, generator, recipe.blind)
-            self._latents = latents.to(device)
-        elif recipe.blind:
-            modes = found_modes(dataset, configuration.steps)
-            each = recipe.latents_per_mode
-            found = {"state_size": each * len(modes.shapes)} if each else None
-            self._model = new_model(configuration, dataset.scale_m, found)
-            start_from_phases(self._model, modes, recipe.seed)
-        else:
-            self._model = new_model(configuration, dataset.scale_m)
+        self._model, latents = begin(configuration, dataset)
+        self._latents = latents.to(device) if latents else None
         self._model.to(device)
         self._data = TrainingData(dataset, device)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
@@ -373,19 +329,20 @@ class _Run:
         return self._model if self._average is None else cast("StringModel[Any]", self._average.module)
 
 
-def _fit_dmd(configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[Progress], None]) -> FitResult:
+def _fit_at_once(
+    configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[Progress], None]
+) -> FitResult:
+    """Of a model whose start is all there is."""
     started = time.monotonic()
-    c = dataset.configuration
-    sizes: Any = read(MODELS["dmd"][1], configuration.model_configuration, "model_configuration")
-    synthesis = (c.resonator.shapes / dataset.scale_m).float()
-    truth = dataset.split("train")[:, : configuration.steps + 1] @ synthesis
-    model = DMD.fit(truth, sizes)
+    model, _ = begin(configuration, dataset)
     error = evaluate_model(model, dataset, "validation", configuration.steps).total()
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
+    synthesis = (dataset.configuration.resonator.shapes / dataset.scale_m).float()
+    truth = dataset.split("train")[:100, : configuration.steps + 1] @ synthesis
     with torch.no_grad():
-        loss = float((model(truth[:100, 0], configuration.steps) - truth[:100, 1:]).square().mean())
+        loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
     report(Progress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
     return FitResult(model.eval(), error, 1, 1, seconds)
 

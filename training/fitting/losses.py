@@ -4,21 +4,19 @@ Koopman models are trained on prediction, encoding and consistency (§4.2); the 
 models on its logarithm. All take any selection of frames: a Koopman rollout needs no recursion, the others run up to
 the last of them.
 
-Where the paper's text and its authors' code (rodrigodzf/physmodjax, `lindyn_loss`) differ, a recipe's
-`koopman_terms` chooses. "text", the default: consistency is of Λᵏ φ(u₀), encoding of frame 0, decoded as any other
-frame. The text sums over grid points and latents where means are taken here: with 101 points and 128 latents that
-counts consistency 0.79 times as much. "code": φ(u_k) is compared with Koopman_var's multiplied states, as a mean over
-real and imaginary parts, half of that over latents; the encoding is of all frames, past the multiplier.
+They follow the paper's text; its authors' code (rodrigodzf/physmodjax, `lindyn_loss`) compares φ(u_k) with
+Koopman_var's multiplied states, and encodes all frames. The text sums over grid points and latents where means are
+taken here: with 101 points and 128 latents that counts consistency 0.79 times as much.
 """
 
 from __future__ import annotations
 
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
 
-from engine.models import DiagonalModel, StringModel
+from engine.models import StringModel
 from training.configuration import Recipe
 from training.data.batches import Batch
 
@@ -39,8 +37,6 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
 
     A term of weight 0 costs nothing. Consistency compares with the encoded truth.
     """
-    if recipe.koopman_terms == "code":
-        return _loss_of_code(cast("DiagonalModel", model), batch, recipe)
     if not isinstance(model, KoopmanModel):
         loss, prediction = _prediction(_predicted(model, batch), batch.target, recipe)
         return recipe.prediction_weight * loss, prediction
@@ -54,20 +50,6 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
         consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()
         loss = loss + recipe.consistency_weight * consistency
-    return loss, prediction
-
-
-def _loss_of_code(model: DiagonalModel, batch: Batch, recipe: Recipe) -> tuple[Tensor, Tensor]:
-    frames = torch.cat([batch.initial[:, None], batch.target], dim=1)
-    encoded = model.encode(frames.flatten(0, 1)).origin.unflatten(0, frames.shape[:2])
-    modulated = model.modulated(model.latents(encoded[:, 0], batch.frames))
-    loss, prediction = _prediction(model.synthesise(modulated), batch.target, recipe)
-    loss = recipe.prediction_weight * loss
-    if recipe.encoding_weight:
-        loss = loss + recipe.encoding_weight * _mean_square(model.synthesise(encoded), frames)
-    if recipe.consistency_weight:
-        difference = torch.view_as_real(modulated - encoded[:, 1:])
-        loss = loss + recipe.consistency_weight * difference.square().mean()
     return loss, prediction
 
 

@@ -21,10 +21,11 @@ import torch
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from engine.models import StringModel
-from engine.models.string_modes import StartsFromModes, StringModes
+from engine.models import FGRU, FRNN, KoopmanIntegrated, StringModel
+from engine.models.string_modes import StringModes
 from training.configuration import FROM_PHASES
 from training.fitting.modes import SLOWEST, Modes
+from training.research.fourier_wiring import store_in_fgru, store_in_frnn
 
 FIRST_FRAMES = 12
 MORE_FRAMES = 1.4  # times as many in each further fit
@@ -37,14 +38,19 @@ Floats = NDArray[np.float64]
 def start_from_phases(model: StringModel, modes: Modes, seed: int) -> None:
     """Gives a model what the motions of the modes that were found show.
 
-    A model whose start is a linear string is given each mode's mean motion (`mean_motions`).
+    FRNN, whose frequencies follow nothing, is given each mode's mean motion (`mean_motions`).
 
     Raises:
         ValueError: the model has no such start, or cannot hold as many modes.
     """
-    if not isinstance(model, StartsFromModes):
+    if isinstance(model, KoopmanIntegrated):
+        model.store_modes(fit_phases(modes, seed))
+    elif isinstance(model, FGRU):
+        store_in_fgru(model, fit_phases(modes, seed))
+    elif isinstance(model, FRNN):
+        store_in_frnn(model, mean_motions(modes))
+    else:
         raise ValueError(f"blind without latent_epochs needs one of the models {', '.join(FROM_PHASES)}")
-    model.store_modes(fit_phases(modes, seed) if model.holds_coupling else mean_motions(modes))
 
 
 def fit_phases(modes: Modes, seed: int) -> StringModes:

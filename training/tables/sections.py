@@ -12,8 +12,8 @@ from engine.schema import SchemaError
 from training.by_name import load
 from training.cell import HORIZON
 from training.configuration import TrainingConfiguration
-from training.knowledge import hints_of
 from training.results import SHORT_HORIZON, Row
+from training.start import hints_of
 from training.tables.paper import (
     COLUMNS,
     HORIZONS,

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
+from engine.table import columns_of, texts_of
 from training.results import Row
 from training.tables.paper import COLUMNS, METRICS, Column, mark
 from training.tables.sections import NOT_RUN, Entry, Line, RecipeChoice, Section, sections
@@ -64,14 +65,13 @@ def as_csv(rows: Sequence[Row], recipe: RecipeChoice = "all") -> str:
     """All tables as tidy data: a line for every cell, run or not; see `Record`."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([field.name for field in fields(Record)])
+    writer.writerow(columns_of(Record))
     for section in sections(rows, recipe):
         for model in section.models:
             lines: list[Line | None] = [line for line in section.lines if line.model == model]
             for line in lines or [None]:
                 for column in COLUMNS:
-                    record = _record(section, model, line, column)
-                    writer.writerow(["" if value is None else value for value in astuple(record)])
+                    writer.writerow(texts_of(_record(section, model, line, column)))
     return file.getvalue()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.commands.console import number
-from training.family import fit_baseline
+from training.research import fit_baseline
 
 
 def test_evaluate_tells_the_map_and_draws_it(run, folder: Path) -> None:

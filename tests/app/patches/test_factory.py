@@ -13,7 +13,6 @@ from app.instrument.strings import KeyString, Strings, pitch_hz_of
 from app.patches.library import SHIPPED, file_stem, list_patches
 from app.patches.patch import CATEGORIES, Patch
 from app.patches.tuning import Tuning
-from engine import bounds
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED as PRESETS
 from engine.resonators.base import Resonator
@@ -75,7 +74,7 @@ def test_every_key_is_a_string_that_the_model_knows(patch: Patch) -> None:
         assert pitch_hz_of(string.parameters) == pytest.approx(tuning.hz(string.key), rel=1e-6), told
         assert inharmonicity(string.parameters) <= MOST_INHARMONIC, told
         assert T60_RANGE_S[0] <= math.log(1000) / string.parameters.decay_rate(1) <= T60_RANGE_S[1], told
-        bounds.check_motion(string.parameters, string.modes, GRID_POINTS, 48_000, tension_modulated=True)
+        string.parameters.check_motion(string.modes, GRID_POINTS, 48_000, tension_modulated=True)
 
 
 @pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.name)

@@ -64,9 +64,13 @@ def test_at_any_rate_it_is_the_model_at_those_times(
     found = rung(rate_hz, strike(name, pluck, rate_hz, STEREO), attack=False)
     frames = torch.arange(0, rate_hz, 11)
     with torch.inference_mode():
-        state = preset.model.release((initial_m(preset.info, pluck)[None] / preset.info.scale_m).float())
+        state = preset.model.encode((initial_m(preset.info, pluck)[None] / preset.info.scale_m).float())
         times, weights = frames.double() * preset.info.rate_hz / rate_hz, STEREO.weights(preset.info.grid_points)
-        expected = preset.model.at(state, times, weights)[0].double().numpy() * preset.info.scale_m / FULL_SCALE_M
+        expected = (
+            preset.model.decode(preset.model.latents(state.origin, times), weights)[0].double().numpy()
+            * preset.info.scale_m
+            / FULL_SCALE_M
+        )
     assert relative(found[frames.numpy()], expected) < 3e-5
 
 
@@ -127,7 +131,7 @@ def test_what_was_silent_at_one_place_is_whole_at_another(name: str, ear: Ear, s
 def test_what_is_no_bank_has_no_program(shipped: Shipped, model: torch.nn.Module) -> None:
     preset = shipped(KNOWING)
     assert bank_program(model, preset.info, 48_000) is None  # Koopman_var: its multiplier sees every frame
-    c = replace(preset.model.configuration, decoder_widths=(4,))
+    c = replace(preset.model.configuration, eigenvalue_widths=(at.MOST_MODES + 1,))
     assert bank_program(KoopmanIntegrated(c), preset.info, 48_000) is None
 
 

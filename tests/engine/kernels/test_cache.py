@@ -28,9 +28,9 @@ def test_it_is_told_without_the_compiler() -> None:
 
 def test_all_compiled_functions_are_kept_in_one_folder() -> None:
     code = (
-        "from engine.models._diagonal_kernel import listen; from engine.truth._splitting_kernel import advance;"
+        "from engine.models._ssm_kernel import stream; from engine.truth._splitting_kernel import advance;"
         "from engine.kernels import cache;"
-        "print(all(str(cache.folder()) in f._cache.cache_path for f in (listen, advance)))"
+        "print(all(str(cache.folder()) in f._cache.cache_path for f in (stream, advance)))"
     )
     assert told(code) == "True"
 

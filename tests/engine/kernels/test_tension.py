@@ -38,7 +38,7 @@ def test_a_voice_is_the_model_and_the_string(
     preset = of_string(shipped("studio_any_string"), rate_hz=rate_hz)
     info = preset.info
     let_go_m = initial_m(info, pluck)
-    _, state = preset.model.advance(preset.model.release((let_go_m[None] / info.scale_m).float()), 1)
+    _, state = preset.model.advance(preset.model.encode((let_go_m[None] / info.scale_m).float()), 1)
     assert state.nodes.tolist() == [nodes]
     program = bank_program(preset.model, info, rate_hz)
     assert program is not None

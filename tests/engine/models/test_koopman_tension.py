@@ -97,7 +97,7 @@ def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
     steps = rate_hz // 20
     truth = true_motion(NYLON, displacement, 25, rate_hz, steps)
     with torch.inference_mode():
-        state = model.release((displacement / 1e-3).float())
+        state = model.encode((displacement / 1e-3).float())
         found, _ = model.advance(state, steps, step_size=Fraction(48_000, rate_hz))
     error = (found.double() * 1e-3 - truth).square().sum() / truth.square().sum()
     assert float(error) < 1e-8
@@ -106,9 +106,9 @@ def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
 def test_the_compiled_loop_is_the_definition() -> None:
     displacement = (pluck_m(NYLON, 25, 0.4) / 1e-3).float()
     model = made(NYLON, 25, "series")
-    plain, _ = model.advance(model.release(displacement), 300)
+    plain, _ = model.advance(model.encode(displacement), 300)
     with torch.no_grad():
-        compiled, _ = model.advance(model.release(displacement), 300)
+        compiled, _ = model.advance(model.encode(displacement), 300)
     torch.testing.assert_close(compiled, plain.detach(), rtol=0, atol=1e-6)
 
 
@@ -136,11 +136,11 @@ def test_soft_and_hard_plucks_go_together(compiled: bool) -> None:
     plucks = torch.cat([modes_alike_m(0.5), pluck_m(NYLON, 25, 0.1), modes_alike_m(0.2), pluck_m(NYLON, 25, 0.01)])
     released = (plucks / 1e-3).float()
     with torch.set_grad_enabled(not compiled):
-        together, middle = model.advance(model.release(released), 30)
+        together, middle = model.advance(model.encode(released), 30)
         rest, state = model.advance(middle, 20)
         alone = torch.cat([model(one[None], 50) for one in released])
     with torch.no_grad():
-        amplitudes = model.amplitudes(model.release(released), 50)
+        amplitudes = model.amplitudes(model.encode(released), 50)
     torch.testing.assert_close(torch.cat([together, rest], dim=1).detach(), alone.detach(), rtol=0, atol=1e-5)
     torch.testing.assert_close(amplitudes @ model.shapes, alone.detach(), rtol=0, atol=1e-5)
     assert state.nodes is not None
@@ -233,7 +233,7 @@ def test_the_precision_is_the_models_own(double_by_default: None) -> None:
 
 def test_gradients_reach_every_curve() -> None:
     model = made(NYLON, 25, "series")
-    motion, _ = model.advance(model.release((pluck_m(NYLON, 25, 0.4) / 1e-3).float()), 50)
+    motion, _ = model.advance(model.encode((pluck_m(NYLON, 25, 0.4) / 1e-3).float()), 50)
     motion.square().sum().backward()
     for curve in (model.A, model.r, model.p):
         assert curve.grad is not None
@@ -249,7 +249,7 @@ def test_any_weights_stay_bounded_and_fall_silent(seed: int) -> None:
             curve.copy_(10.0 ** torch.randint(-2, 30, (), generator=generator) * torch.randn(4, generator=generator))
     displacement = (pluck_m(NYLON, 25, 0.5) / 1e-3).float()
     with torch.inference_mode():
-        state = model.release(displacement)
+        state = model.encode(displacement)
         frames, state = model.advance(state, 40_000)
         assert bool(torch.isfinite(frames).all())
         assert float(frames.abs().max()) < 20 * float(displacement.abs().max())
@@ -262,7 +262,7 @@ def test_phases_are_kept_where_the_curves_were_learned() -> None:
     model = made(NYLON, 57, "series")
     for size in (Fraction(1), Fraction(3), Fraction(12), Fraction(160, 147)):
         with torch.no_grad():
-            _, state = model.advance(model.release(torch.zeros(1, 101)), 1, step_size=size)
+            _, state = model.advance(model.encode(torch.zeros(1, 101)), 1, step_size=size)
         assert state.nodes is not None
         phases = float(size) / int(state.nodes) * model.theta_log.exp()
         assert float(phases[0]) <= model.configuration.node_phase + 1e-12
@@ -279,7 +279,7 @@ def test_the_series_are_twelfths() -> None:
 def test_another_step_size_amid_a_motion_is_refused() -> None:
     model = made(NYLON, 25, "series")
     with torch.inference_mode():
-        _, state = model.advance(model.release((pluck_m(NYLON, 25, 0.1) / 1e-3).float()), 3)
+        _, state = model.advance(model.encode((pluck_m(NYLON, 25, 0.1) / 1e-3).float()), 3)
         with pytest.raises(ValueError, match="step_size"):
             model.advance(state, 3, step_size=2)
 

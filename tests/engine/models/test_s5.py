@@ -131,13 +131,12 @@ def test_the_papers_code_counts_the_outputs_in_the_fan_in_and_begins_with_shorte
 
 
 @torch.no_grad()
-def test_an_eigenvalue_outside_the_unit_circle_is_told() -> None:
+def test_an_eigenvalue_may_lie_outside_the_unit_circle() -> None:
     model = drawn_model()
-    assert model.unstable == ()
     assert torch.isfinite(model(torch.ones(1, 21), 20_000)).all()
     model.layers[1].seq.Lambda_re[2] = 0.3
-    (eigenvalue,) = model.unstable
-    assert abs(eigenvalue) > 1
+    growing = torch.cat(model.log_eigenvalues()).real > 0
+    assert int(growing.sum()) == 2  # a pair
 
 
 @pytest.mark.parametrize("sizes", [{"grid_points": 2}, {"state_size": 0}, {"hippo_blocks": 0}, {"layers": -1}])

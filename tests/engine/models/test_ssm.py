@@ -126,39 +126,6 @@ def test_listening_is_the_grid_at_that_point(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 @torch.no_grad()
-def test_an_impulse_is_an_initial_condition(name: str) -> None:
-    model = small_model(name).double()
-    impulse = torch.zeros(2, 200, 21, dtype=torch.float64)
-    impulse[:, 0] = initial().double()
-    driven, state = model.excite(model.initial_state(2), impulse)
-    plucked, other = model.advance(model.encode(impulse[:, 0]), 200)
-    torch.testing.assert_close(driven, plucked, rtol=0, atol=1e-11)
-    for mine, theirs in zip(state.latents, other.latents, strict=True):
-        torch.testing.assert_close(mine, theirs, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("name", NAMES)
-@torch.no_grad()
-def test_an_excitation_adds_to_the_motion(name: str) -> None:
-    """Silence advances; the first layer superposes; any splitting is the same motion."""
-    model = small_model(name)
-    state = model.encode(initial())
-    silent, _ = model.excite(state, torch.zeros(2, 70, 21))
-    torch.testing.assert_close(silent, model.advance(state, 70)[0], rtol=1e-4, atol=1e-5)
-    excitation = torch.randn(2, 300, 21, generator=torch.Generator().manual_seed(4))
-    whole, last = model.excite(state, excitation)
-    first, state = model.excite(state, excitation[:, :77])
-    second, state = model.excite(state, excitation[:, 77:])
-    torch.testing.assert_close(torch.cat([first, second], 1), whole, rtol=1e-4, atol=1e-4)
-    superposed = model.encode(excitation[:, 0] + excitation[:, 1]).latents[0]
-    torch.testing.assert_close(
-        superposed, model.encode(excitation[:, 0]).latents[0] + model.encode(excitation[:, 1]).latents[0]
-    )
-    assert last.latents[0].shape == superposed.shape
-
-
-@pytest.mark.parametrize("name", NAMES)
-@torch.no_grad()
 def test_physics_initialisation_is_the_linear_string(name: str) -> None:
     model = small_model(name, how="physics")
     amplitudes = torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2))

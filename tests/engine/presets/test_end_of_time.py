@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -25,7 +24,7 @@ def test_silence_at_the_end_of_time(path: Path) -> None:
     state = source.start(project(Pluck(position=0.4, amplitude_mm=4.0).displacement(points), preset.info.modes)[None])
     frame = 3600 * rate_hz
     if hasattr(state.inner, "time"):
-        state = replace(state, inner=replace(state.inner, time=Fraction(frame)), frame=frame)
+        state = replace(state, inner=replace(state.inner, time=frame), frame=frame)
     elif hasattr(state.inner, "step"):
         state = replace(state, inner=replace(state.inner, step=frame), frame=frame)
     else:  # a recurrence cannot jump: finite, or told

@@ -111,24 +111,6 @@ def test_averaging_follows_the_stiffening_of_a_membrane() -> None:
     assert errors["averaging"] < 0.5 * errors["physics"]
 
 
-def test_each_row_of_a_batch_is_a_resonator_of_its_own() -> None:
-    strings = [StringParameters(tension_n=tension_n) for tension_n in (50.0, 60.97, 72.0)]
-    batch = Resonator.stacked([string.resonator(10) for string in strings])
-    amplitudes = 2e-3 * torch.rand(3, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
-    state = ModalState.at_rest(amplitudes / torch.arange(1, 11) ** 2)
-    for solve in (
-        lambda r, s: SplittingSolver(r, RATE_HZ).solve(s, 300),
-        lambda r, s: solve_linear(r, s, torch.arange(301, dtype=torch.float64) / RATE_HZ),
-        lambda r, s: solve_dop853(r, s, RATE_HZ, 20),
-    ):
-        together = solve(batch, state)
-        for row, string in enumerate(strings):
-            own = ModalState(state.amplitude[row : row + 1], state.velocity[row : row + 1])
-            torch.testing.assert_close(together[row : row + 1], solve(string.resonator(10), own), rtol=1e-12, atol=0)
-    rises = torch.stack([string.resonator(10).relative_tension_rise(amplitudes) for string in strings])
-    torch.testing.assert_close(batch.row(1).relative_tension_rise(amplitudes), rises[1])
-
-
 def test_what_does_not_go_together_is_refused() -> None:
     string = StringParameters().resonator(5, grid_points=9)
     with pytest.raises(ValueError, match="coupling has the shape"):
@@ -137,8 +119,3 @@ def test_what_does_not_go_together_is_refused() -> None:
         replace(string, sigma=torch.full((5,), math.nan, dtype=torch.float64))
     with pytest.raises(ValueError, match="omega must not fall"):
         replace(string, omega=string.omega.flip(0))
-    with pytest.raises(ValueError, match="same modes on the same grid"):
-        Resonator.stacked([string, StringParameters().resonator(5, grid_points=11)])
-    with pytest.raises(ValueError, match="3 resonators, the state 2 rows"):
-        solver = SplittingSolver(Resonator.stacked([string] * 3), RATE_HZ)
-        solver.advance(ModalState.at_rest(torch.zeros(2, 5)), 1)

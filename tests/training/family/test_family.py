@@ -18,6 +18,7 @@ from training.family.fit import Case, errors, fit_curves, geometric_mean
 from training.family.motions import solve, true_motion
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
 from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
+from training.research import players as players_of_physics
 
 RATE_HZ, STEPS = 48_000, 1_200
 
@@ -111,11 +112,11 @@ def test_a_motion_is_kept_and_a_damaged_one_named(tmp_path: Path) -> None:
 
 def test_players_are_as_good_as_they_should_be() -> None:
     players = {
-        "series": family_errors.untrained("series"),
-        "kicks": family_errors.untrained("kicks"),
-        "slow flow": family_errors.averaged_flow,
-        "averaging": family_errors.averaging,
-        "linear": family_errors.linear_string,
+        "series": players_of_physics.untrained("series"),
+        "kicks": players_of_physics.untrained("kicks"),
+        "slow flow": players_of_physics.averaged_flow,
+        "averaging": players_of_physics.averaging,
+        "linear": players_of_physics.linear_string,
     }
     found = family_errors.measure(players, "inside", "test", 2, RATE_HZ, (0.0, 0.05))
     means = [found[name].geometric_mean for name in players]
@@ -149,7 +150,7 @@ def test_a_map_has_every_string_once() -> None:
 
 def test_a_string_that_has_fallen_silent_says_so() -> None:
     """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all that is told."""
-    players = {"linear": family_errors.linear_string}
+    players = {"linear": players_of_physics.linear_string}
     early, late = (
         family_errors.measure(players, "inside", "test", 3, 8_000, seconds)["linear"].strings
         for seconds in ((0.0, 0.05), (9.0, 9.05))

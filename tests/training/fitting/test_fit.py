@@ -20,6 +20,7 @@ from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
 from training.fitting.fit import Diverged, Progress, fit, horizon_at, learning_rate_at
 from training.fitting.losses import training_loss
+from training.start import new_model
 
 DATA = {"count": 20, "steps": 450, "modes": 5}
 QUICK = {"epochs": 4, "validate_every": 1, "batch_size": 8, "first_horizon": 20, "steps_per_batch": 16}
@@ -279,11 +280,11 @@ def test_a_relative_loss_counts_soft_strings_as_loud_ones() -> None:
 def test_a_coupling_without_a_rate_stays(small_dataset: Dataset, runs: Path) -> None:
     kept = fit(small("koopman_integrated", coupling_rate=0.0), small_dataset, runs / "kept").model
     moved = fit(small("koopman_integrated", coupling_rate=1.0), small_dataset, runs / "moved").model
-    start = module.new_model(small("koopman_integrated"), small_dataset.scale_m)
+    start = new_model(small("koopman_integrated"), small_dataset.scale_m)
     assert torch.equal(kept.K, start.K) and not torch.equal(moved.K, start.K)
 
 
 def test_a_model_that_no_preset_can_hold_is_refused_before_it_is_trained(small_dataset: Dataset) -> None:
     configuration = replace(small("koopman"), model_configuration={"encoder_widths": [4096, 4096]})
     with pytest.raises(ValueError, match="lower its widths"):
-        module.new_model(configuration, small_dataset.scale_m)
+        new_model(configuration, small_dataset.scale_m)

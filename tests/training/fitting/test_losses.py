@@ -1,7 +1,4 @@
-"""The terms of the Koopman loss, by the paper's text and by its authors' code, written out."""
-
-from dataclasses import replace
-from typing import Literal
+"""The terms of the Koopman loss, written out."""
 
 import pytest
 import torch
@@ -9,7 +6,7 @@ import torch
 from engine.models import KoopmanVar, KoopmanVarConfiguration, build_model
 from engine.models.base import Physics
 from engine.resonators.string import StringParameters
-from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.configuration import Recipe
 from training.data.batches import Batch
 from training.fitting.losses import training_loss
 
@@ -29,10 +26,9 @@ def mean_square(values: torch.Tensor) -> float:
     return float(values.detach().square().mean())
 
 
-@pytest.mark.parametrize("terms", ["text", "code"])
-def test_the_loss_is_the_weighted_sum_of_its_terms(terms: Literal["text", "code"]) -> None:
+def test_the_loss_is_the_weighted_sum_of_its_terms() -> None:
     model, batch = model_and_batch()
-    loss, prediction = training_loss(model, batch, replace(RECIPE, koopman_terms=terms))
+    loss, prediction = training_loss(model, batch, RECIPE)
 
     eigenvalues = torch.exp(torch.complex(-model.nu_log.exp(), model.theta_log.exp()))
     origin = model.encode(batch.initial).origin
@@ -48,22 +44,9 @@ def test_the_loss_is_the_weighted_sum_of_its_terms(terms: Literal["text", "code"
     wanted = mean_square(decoded(multiplied(latents)) - batch.target)
     assert float(prediction) == pytest.approx(wanted, rel=1e-9)
     encoded = model.encode(batch.target.flatten(0, 1)).origin.unflatten(0, (2, 3))
-    if terms == "text":
-        encoding = mean_square(decoded(multiplied(origin)) - batch.initial)
-        consistency = float((encoded - latents).detach().abs().square().mean())
-    else:
-        every = torch.cat([origin[:, None], encoded], dim=1)
-        encoding = mean_square(decoded(every) - torch.cat([batch.initial[:, None], batch.target], dim=1))
-        consistency = mean_square(torch.view_as_real(multiplied(latents) - encoded))
+    encoding = mean_square(decoded(multiplied(origin)) - batch.initial)
+    consistency = float((encoded - latents).detach().abs().square().mean())
     assert float(loss.detach()) == pytest.approx(0.7 * wanted + 0.9 * encoding + 0.3 * consistency, rel=1e-9)
-
-
-def test_terms_of_the_code_need_a_koopman_model() -> None:
-    data = DatasetConfiguration("gaussian", 4_000, 10)
-    recipe = Recipe(epochs=1, koopman_terms="code")
-    TrainingConfiguration("", "koopman_var", data, recipe)
-    with pytest.raises(ValueError, match="koopman_terms 'code' needs a Koopman model, not 'lru'"):
-        TrainingConfiguration("", "lru", data, recipe)
 
 
 def test_frames_that_were_drawn_twice_are_compared_with_themselves() -> None:

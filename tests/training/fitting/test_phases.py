@@ -18,7 +18,7 @@ from training.evaluate import evaluate_model
 from training.fitting.fit import fit
 from training.fitting.modes import Modes, found_modes
 from training.fitting.phases import _Motion, _upright, fit_phases, mean_motions, start_from_phases
-from training.knowledge import COUNT, PHASES, SYMMETRIES, initialisation_of, knowledge_of
+from training.start import COUNT, PHASES, SYMMETRIES, initialisation_of, knowledge_of
 
 STEPS = 450
 

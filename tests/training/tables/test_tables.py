@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from training.cell import Cell, configuration_of
-from training.knowledge import PHASES
 from training.results import Row
+from training.start import PHASES
 from training.tables.markdown import as_markdown
 from training.tables.paper import COLUMNS, Column, Figure
 from training.tables.sections import sections

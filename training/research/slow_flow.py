@@ -72,17 +72,17 @@ def slow_flow(
     """Modal amplitudes in m of frames 1 … steps after a release at rest, float64 (steps, modes), without learning.
 
     Args:
-        resonator: one, whose coupling is a multiple of its stretch.
+        resonator: its coupling is a multiple of its stretch.
         amplitudes_m: at frame 0, (modes,).
         node_s: time between the nodes of the integration, s.
         triads: whether modes trade energy; without it each keeps its own.
 
     Raises:
-        ValueError: a batch, a coupling without an energy, modes too close to each other, or impossible sizes.
+        ValueError: a coupling without an energy, modes too close to each other, or impossible sizes.
         ArithmeticError: no averaged motion starts there: the tension rises too much.
     """
     # compiles, or loads what it compiled earlier: only when it is needed
-    from engine.averaging import _slow_flow_kernel as kernel
+    from training.research import _slow_flow_kernel as kernel
 
     for name, value in (("rate_hz", rate_hz), ("node_s", node_s)):
         if not value > 0:
@@ -108,8 +108,6 @@ def resonant_triads(frequencies: Array) -> NDArray[np.int32]:
 
 
 def _modes(resonator: Resonator) -> _Modes:
-    if resonator.rows:
-        raise ValueError("the slow flow takes one resonator, not a batch: take its rows")
     stretch, coupling = (np.ascontiguousarray(t.numpy()) for t in (resonator.stretch, resonator.coupling))
     c = float(coupling.sum() / stretch.sum()) if stretch.any() else 0.0
     if not np.allclose(coupling, c * stretch, rtol=1e-9, atol=0):
@@ -124,7 +122,7 @@ def _modes(resonator: Resonator) -> _Modes:
 
 def _averaged_start(modes: _Modes, amplitudes_m: Array) -> Array:
     """z of the averaged motion whose displacement is at rest at `amplitudes_m`, (2, modes)."""
-    from engine.averaging import _slow_flow_kernel as kernel
+    from training.research import _slow_flow_kernel as kernel
 
     c, frequencies, decays, stiffening, stretch = modes
     squares = stretch * amplitudes_m**2

@@ -18,14 +18,51 @@ copies is a square; their sum, at one point, reaches each mode's r by the lag be
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
+from engine.models.fno import FGRU, FRNN, FourierConvolution
 from engine.models.string_modes import StringModes
 
 ENDS = 2  # modes a channel that is read from the ends
+
+
+def store_in_fgru(model: FGRU, modes: StringModes) -> None:
+    """Sets its weights to those of a string of these modes, whose frequencies follow the squares.
+
+    Raises:
+        ValueError: see `wire_fgru`.
+    """
+    _store(model, wire_fgru(modes, model.configuration.width), (model.z_layer, model.r_layer, model.h_layer))
+
+
+def store_in_frnn(model: FRNN, modes: StringModes) -> None:
+    """Sets its weights to those of a linear string: its frequencies follow nothing.
+
+    Raises:
+        ValueError: see `wire_frnn`.
+    """
+    c = model.configuration
+    _store(
+        model, wire_frnn(modes, c.width, c.depth), [m for m in model.modules() if isinstance(m, FourierConvolution)]
+    )
+    with torch.no_grad():
+        for parameter in model.pointwise_layers.parameters():
+            parameter.zero_()
+
+
+def _store(model: FGRU | FRNN, wiring: Wiring, layers: Sequence[FourierConvolution]) -> None:
+    for layer, kernels in zip(layers, wiring.layers, strict=True):
+        kernels.store(layer.weight, layer.bias)
+    with torch.no_grad():
+        model.in_mapping.weight.zero_()
+        model.in_mapping.weight[:, 0] = wiring.weight_in
+        model.in_mapping.bias.copy_(wiring.bias_in)
+        model.out_mapping.weight[0] = wiring.weight_out
+        model.out_mapping.bias.fill_(wiring.bias_out)
 
 
 @dataclass(frozen=True)

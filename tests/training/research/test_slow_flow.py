@@ -9,11 +9,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from engine.averaging import slow_flow
 from engine.excitation import gaussian
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver, solve_linear
+from training.research.slow_flow import slow_flow
 
 RATE_HZ = 48_000.0
 STEEL_E4 = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 220e9, 8e-6, 1.4e-6, 72.2016)
@@ -115,8 +115,6 @@ def test_what_it_cannot_do_is_told() -> None:
         slow_flow(replace(resonator, coupling=resonator.coupling.flip(0)), amplitudes, RATE_HZ, 10)
     with pytest.raises(ValueError, match="two have nearly the same frequency"):
         slow_flow(replace(resonator, omega=resonator.omega[[0, 1, 1]]), amplitudes, RATE_HZ, 10)
-    with pytest.raises(ValueError, match="not a batch"):
-        slow_flow(Resonator.stacked([resonator, resonator]), amplitudes, RATE_HZ, 10)
     with pytest.raises(ValueError, match=r"shape \(3,\), not \(2,\)"):
         slow_flow(resonator, amplitudes[:2], RATE_HZ, 10)
     with pytest.raises(ValueError, match="node_s must be above 0"):

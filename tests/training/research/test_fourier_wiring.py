@@ -4,9 +4,10 @@ import pytest
 import torch
 
 from engine.models import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
-from engine.models._fno_wiring import Kernels, StringModes, shared_coupling
 from engine.models.fno import FourierConvolution
+from engine.models.string_modes import StringModes
 from engine.resonators.sine_transform import synthesis_matrix
+from training.research.fourier_wiring import Kernels, shared_coupling, store_in_fgru, store_in_frnn
 
 POINTS = 31
 
@@ -41,13 +42,13 @@ def relative_error(model: FGRU | FRNN, string: StringModes, steps: int, skipped:
 
 def fgru(string: StringModes, points: int = POINTS, width: int = 24) -> FGRU:
     model = FGRU(FGRUConfiguration(points, width))
-    model.store_modes(string)
+    store_in_fgru(model, string)
     return model
 
 
 def frnn(string: StringModes, width: int = 8, depth: int = 3) -> FRNN:
     model = FRNN(FRNNConfiguration(POINTS, width, depth))
-    model.store_modes(string)
+    store_in_frnn(model, string)
     return model
 
 

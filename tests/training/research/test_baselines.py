@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 import torch
 
-from training.family import fit_baseline as fitting
-from training.family.baselines import BASELINES, ModalSynthesis, baseline_player, in_own_units, units
-from training.family.errors import linear_string
-from training.family.fit_baseline import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
 from training.family.preset import FamilyConfiguration
 from training.family.strings import PluckedString, draw_string
 from training.fitting.checkpoint import Checkpoint
+from training.research import fit_baseline as fitting
+from training.research.baselines import BASELINES, ModalSynthesis, baseline_player, in_own_units, units
+from training.research.fit_baseline import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
+from training.research.players import linear_string
 
 RATE_HZ = 48_000
 SMALL = FamilyConfiguration("Two", "", 25, strings=2, validation_strings=1, rate_hz=8_000)
