@@ -116,16 +116,6 @@ def scrolled(part: QWidget) -> QScrollArea:
     return area
 
 
-def scrolled(part: QWidget) -> QScrollArea:
-    """A part as wide as its place, which scrolls where it is higher."""
-    area = QScrollArea(widgetResizable=True)
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setWidget(part)
-    return area
-
-
 def read_only_text(name: str, text: str = "") -> QPlainTextEdit:
     """Lines that can be selected; `name` is what a screen reader says."""
     box = QPlainTextEdit(text, readOnly=True)
