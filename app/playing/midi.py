@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from app.instrument.events import Controller, Event, NoteOn
+from app.instrument.events import Controller, Event, NoteOn, fixed_function
 from app.playing.keyboard import Reach
 from app.session.choices import SECONDS_RANGE, SPEED_RANGE, VOLUME_RANGE_DB
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
@@ -55,7 +55,8 @@ class MidiChoices(BaseModel):
     Attributes:
         port: the input's name; "": none.
         notes: whether a note plays a pitch of the patch, sets the pluck position, or selects the preset.
-        controllers: field -> number of the controller that is assigned to it; other fields are absent.
+        controllers: field -> number of the controller that is assigned to it; other fields are absent. Those with a
+            function of their own are left out, which earlier versions let be assigned.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -64,8 +65,13 @@ class MidiChoices(BaseModel):
     notes: NoteMode = "pitch"
     controllers: dict[TurnedField, ControllerNumber] = {}
 
+    @field_validator("controllers")
+    @classmethod
+    def _leave_fixed(cls, controllers: dict[TurnedField, ControllerNumber]) -> dict[TurnedField, ControllerNumber]:
+        return {field: number for field, number in controllers.items() if not fixed_function(number)}
+
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """These choices with `controller` assigned to `field`, and to no other."""
+        """These choices with `controller`, which has no `fixed_function`, assigned to `field`, and to no other."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 

@@ -40,9 +40,9 @@ def test_notes_choose_presets_where_the_user_wants_that() -> None:
 
 def test_a_taught_controller_goes_through_all_of_its_field() -> None:
     choices = MidiChoices()
-    for number, field in enumerate(TURNED):
+    for number, field in enumerate(TURNED, 16):
         choices = choices.learned(field, number)
-    for number, (field, turned) in enumerate(TURNED.items()):
+    for number, (field, turned) in enumerate(TURNED.items(), 16):
         for value, expected in ((0, turned.low), (127, turned.high)):
             meaning = meaning_of(Controller(number, value), choices, REACH, PRESETS)
             assert meaning == Meaning({field: pytest.approx(expected)})
