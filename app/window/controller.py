@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication
 
 from app.analysis.abx.record import material_of
 from app.audio.problems import AudioProblem
@@ -117,7 +118,7 @@ class Controller(QObject):
         for slot, name in missing_presets(self.session.choices, self.library).items():
             self.session.update(**{slot: "model" if slot == "a" else "truth"})
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
-        self.history = History(self.session)
+        self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._connect_history()
         self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike, self._handle)
         self.instruments.played.connect(self.performance.follow)
