@@ -49,6 +49,7 @@ class Row:
         seconds: of training, what it starts from among it; in rows without start_… the optimiser alone.
         commit: of the code, "" where it is not known.
         finished: UTC, ISO 8601.
+        message: why a run failed; of one that is done, what limits its figures, as code that was never published.
     """
 
     digest: str

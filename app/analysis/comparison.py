@@ -58,7 +58,7 @@ class ComparedRow:
 
 
 @dataclass(frozen=True)
-class Trial:
+class Basis:
     """What the presets are compared on.
 
     Attributes:
@@ -72,12 +72,12 @@ class Trial:
     string: StringParameters | None = None
 
 
-def compare(entries: list[PresetEntry], trial: Trial, job: Job) -> None:
+def compare(entries: list[PresetEntry], basis: Basis, job: Job) -> None:
     """Reports a `ComparedRow` for each preset, one after the other. A preset that fails has a row that says why."""
-    truths = _Truths(trial)
+    truths = _Truths(basis)
     for done, entry in enumerate(entries):
         try:
-            row = _compare_one(entry, trial, truths, done / len(entries), 1 / len(entries), job)
+            row = _compare_one(entry, basis, truths, done / len(entries), 1 / len(entries), job)
         except Cancelled:
             raise
         except Exception as error:  # the other presets are still compared
@@ -93,8 +93,8 @@ def same_string(info: PresetInfo, other: PresetInfo) -> bool:
 class _Truths:
     """The true motion of the pluck as modal amplitudes, once for each string and rate."""
 
-    def __init__(self, trial: Trial) -> None:
-        self._trial = trial
+    def __init__(self, basis: Basis) -> None:
+        self._basis = basis
         self._known: dict[tuple[object, ...], Tensor] = {}
 
     def amplitudes(self, info: PresetInfo, job: Job) -> Tensor:
@@ -102,28 +102,28 @@ class _Truths:
         key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
         if key not in self._known:
             blocks = []
-            for block, _ in _frames(TruthSource(info), self._trial, info, job):
+            for block, _ in _frames(TruthSource(info), self._basis, info, job):
                 blocks.append(to_modes(block[0], info.modes).float())
             self._known[key] = torch.cat(blocks)
         return self._known[key]
 
 
 def _compare_one(
-    entry: PresetEntry, trial: Trial, truths: _Truths, before: float, share: float, job: Job
+    entry: PresetEntry, basis: Basis, truths: _Truths, before: float, share: float, job: Job
 ) -> ComparedRow:
-    preset = load_subject(entry.path if trial.string is None else StringOf(entry.path, trial.string))
+    preset = load_subject(entry.path if basis.string is None else StringOf(entry.path, basis.string))
     info = preset.info
     source = ModelSource(preset)
     job.check()
     true = truths.amplitudes(info, job)
     synthesis = synthesis_matrix(info.grid_points, info.modes).float()
-    ear = listening_weights(torch.tensor([trial.listen]), info.grid_points).float()
+    ear = listening_weights(torch.tensor([basis.listen]), info.grid_points).float()
     steps = len(true)
     string, sound = ErrorSums(steps), ErrorSums(steps)
     first, work_s, note = 0, 0.0, ""
     try:
-        _warm_up(source, trial, info)
-        for predicted, spent_s in _frames(source, trial, info, job):
+        _warm_up(source, basis, info)
+        for predicted, spent_s in _frames(source, basis, info, job):
             block = (true[first : first + predicted.shape[1]] @ synthesis)[None]
             string.add(predicted.float(), block, first)
             sound.add(predicted.float() @ ear, block @ ear, first)
@@ -145,16 +145,16 @@ def _compare_one(
         mae=windows[0].rel_mae,
         past_mse=past.rel_mse if past else None,
         past_mae=past.rel_mae if past else None,
-        null_db=None if null_db == NULL_FLOOR_DB and trial.pluck.amplitude_mm == 0 else null_db,
+        null_db=None if null_db == NULL_FLOOR_DB and basis.pluck.amplitude_mm == 0 else null_db,
         real_time=first / info.rate_hz / work_s if work_s > 0 else None,
         note=note,
     )
 
 
-def _frames(source: StringSource, trial: Trial, info: PresetInfo, job: Job) -> Iterator[tuple[Tensor, float]]:
+def _frames(source: StringSource, basis: Basis, info: PresetInfo, job: Job) -> Iterator[tuple[Tensor, float]]:
     """Blocks (1, frames, grid_points) in m, and the processor seconds that each took."""
-    state = source.start(_initial(trial, info))
-    steps = max(1, round(trial.seconds * info.rate_hz))
+    state = source.start(_initial(basis, info))
+    steps = max(1, round(basis.seconds * info.rate_hz))
     for first in range(0, steps, FRAMES_AT_ONCE):
         started_s = time.thread_time()  # of this thread alone
         block, state = source.advance(state, min(FRAMES_AT_ONCE, steps - first))
@@ -162,9 +162,9 @@ def _frames(source: StringSource, trial: Trial, info: PresetInfo, job: Job) -> I
         job.check()
 
 
-def _warm_up(source: StringSource, trial: Trial, info: PresetInfo) -> None:
-    source.advance(source.start(_initial(trial, info)), WARM_UP_FRAMES)
+def _warm_up(source: StringSource, basis: Basis, info: PresetInfo) -> None:
+    source.advance(source.start(_initial(basis, info)), WARM_UP_FRAMES)
 
 
-def _initial(trial: Trial, info: PresetInfo) -> Tensor:
-    return project(trial.pluck.displacement(info.grid_points), info.modes)[None]
+def _initial(basis: Basis, info: PresetInfo) -> Tensor:
+    return project(basis.pluck.displacement(info.grid_points), info.modes)[None]

@@ -3,18 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.analysis.heard import HeardMotion
-from app.analysis.string_frame import Band, StringFrame
 from app.rendering import Take
 
 BLUR_S = 1 / 60  # exposure of the blur: one picture of the screen
 ENVELOPE_S = 1.0  # the time before the playhead whose range of motion is shown
 ENVELOPE_BLOCK_S = 0.1
 MM = np.float32(1000)
+
+
+Band = tuple[NDArray[np.float32], NDArray[np.float32]]  # lowest and highest displacement, (points,) each
+
+
+@dataclass(frozen=True)
+class StringFrame:
+    """The string at one moment; displacements (points,) in mm.
+
+    Attributes:
+        shapes: by source.
+        lowest, highest: by source, the extremes within `BLUR_S`: the blur of the motion in real time.
+        caption: the time, and the slow motion's speed.
+        past_horizon: whether the model is past the end of its training.
+        envelopes: by source, the extremes within `ENVELOPE_S`; empty where they are not shown.
+    """
+
+    shapes: dict[str, NDArray[np.float32]]
+    lowest: dict[str, NDArray[np.float32]]
+    highest: dict[str, NDArray[np.float32]]
+    caption: str = ""
+    past_horizon: bool = False
+    envelopes: Mapping[str, Band] = field(default_factory=dict)
+
+    def largest_mm(self) -> float:
+        """The largest displacement, in mm, of the motion without its envelopes; 0 where nothing is drawn yet."""
+        bands = [*self.lowest.values(), *self.highest.values()]
+        return max((float(np.abs(band).max()) for band in bands), default=0.0)
 
 
 class Envelope:

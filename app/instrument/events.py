@@ -11,6 +11,12 @@ SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 12
 VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
 REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
 PEDAL_DOWN = 64  # from this value on
+_PARAMETER = "chooses or sets a parameter, as the range of bends"
+_FIXED = {  # functions of controllers that no patch changes; those from 120 on are MIDI's channel mode messages
+    SUSTAIN: "is the sustain pedal",
+    **dict.fromkeys((VALUE, FINE_VALUE, REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
+    **dict.fromkeys(range(SOUND_OFF, 128), "stops or resets what is played"),
+}
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
 
 
@@ -53,6 +59,11 @@ class PatchTurned:
     """A knob was turned, or another patch chosen."""
 
     patch: Patch
+
+
+def fixed_function(number: int) -> str:
+    """What a controller does whatever the patch, as "is the sustain pedal"; "" for one that may be assigned."""
+    return _FIXED.get(number, "")
 
 
 def moves_effects(event: object, patch: Patch) -> bool:

@@ -77,9 +77,9 @@ def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | N
         turned = ((begins * point) @ within.T).ravel()
         sound = turned.real if ear.pickup == "displacement" else turned.imag
         if response is not None:
-            frames = len(sound)
-            points = 2 ** math.ceil(math.log2(frames + len(response.impulse)))
-            sound = np.fft.irfft(np.fft.rfft(sound, points) * np.fft.rfft(response.impulse, points))[:frames]
+            frames, impulse = len(sound), response.impulse[: len(sound)]  # later ones are heard after it
+            points = 2 ** math.ceil(math.log2(frames + len(impulse)))
+            sound = np.fft.irfft(np.fft.rfft(sound, points) * np.fft.rfft(impulse, points))[:frames]
         sounds.append(float(np.abs(sound).max()))
     highest = max(sounds)
     return 20 * float(np.log10(highest)) if highest > 0 else -float("inf")

@@ -22,7 +22,7 @@ from app.instrument.events import (
 from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
-from engine.kernels.layout import AHEAD
+from engine.kernels.layout import AHEAD, QUANTUM
 from engine.presets import Preset
 from engine.voices import Ear, Mixer
 
@@ -58,8 +58,8 @@ class _Stage:
         self._struck.append(struck)
         self.mixer.add(*struck.voices.values())
 
-    def handle(self, event: Event) -> None:
-        self.player.handle(event)
+    def handle(self, event: Event, frame: int) -> None:
+        self.player.handle(event, frame)
         if moves_effects(event, self.player.patch):
             self._set_effects()
 
@@ -97,7 +97,7 @@ def render_events(
 ) -> Iterator[NDArray[np.float32]]:
     """The sound of a patch that plays events, in blocks (frames, channels), ±1 being full scale. Deterministic.
 
-    An event counts from the next quantum of 64 frames on.
+    A note begins at its very frame; all else counts within a quantum of 64 frames after its own.
 
     Args:
         source: "model", "truth", or "difference": model minus truth with its gain, without body and room.
@@ -126,8 +126,9 @@ def render_events(
     for each in events:
         if seconds is not None and each.time_s >= seconds:
             break
-        yield from blocks_until(round(each.time_s * rate_hz))
-        stage.handle(each.event)
+        frame = round(each.time_s * rate_hz)
+        yield from blocks_until(frame // QUANTUM * QUANTUM)
+        stage.handle(each.event, frame)
     if seconds is not None:
         yield from blocks_until(round(seconds * rate_hz) + (AHEAD if limited else 0))
         return

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from app.instrument import events
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
 from app.instrument.hands import GUITAR_STRINGS, Hands
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
@@ -47,10 +48,12 @@ class Key:
     """What a key sounds with. It is kept, so that a strike computes no physics.
 
     Attributes:
+        patch: that it is a key of.
         gain: the factor that makes it as loud as the other keys.
         programs: by source.
     """
 
+    patch: Patch
     string: KeyString
     resonator: Resonator
     gain: float
@@ -101,18 +104,21 @@ class Struck:
         """Whether the frame for which it was struck is still to come."""
         return self.begin_frame > 0 and all(voice.waits for voice in self.voices.values())
 
-    def retune(self, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
-        """Lets the voices glide to the modes of other parameters, from a frame of the mixer on."""
-        self.parameters = parameters
+    def resonator_of(self, parameters: StringParameters) -> Resonator:
+        """With as many modes as its voices have."""
         own = self.key.resonator
         modes = own.modes
-        resonator = replace(
+        return replace(
             own,
             omega=parameters.undamped_frequencies(modes),
             sigma=parameters.decay_rates(modes),
             coupling=parameters.tension_coupling(modes) if own.tension_modulated else own.coupling,
             stretch=parameters.wavenumbers(modes).square(),
         )
+
+    def retune(self, parameters: StringParameters, resonator: Resonator, seconds: float, frame: int = 0) -> None:
+        """Lets the voices glide to the modes of other parameters, which `resonator_of` gives, from a frame on."""
+        self.parameters = parameters
         for voice in self.voices.values():
             voice.retune(resonator, seconds, frame)
 
@@ -125,6 +131,7 @@ class Player:
         rate_hz: of the voices.
         deliver: is called with what was struck, whose voices no mixer has yet; in the thread of the event.
         sources: which of "model" and "truth" get voices.
+        ear: where strings are heard; None: at the patch's own points.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -137,6 +144,7 @@ class Player:
         rate_hz: int,
         deliver: Callable[[Struck], None],
         sources: Sequence[str] = SOURCES,
+        ear: Ear | None = None,
     ) -> None:
         if not isinstance(preset.model, KoopmanTension):
             raise ValueError(
@@ -149,15 +157,19 @@ class Player:
         self._hands = Hands()
         self._ringing: dict[Place, Struck] = {}
         self._all: list[Struck] = []  # with those whose place was struck again, until they are over
-        self._listens: Ear | None = None
         self._frame = 0  # at which the event counts that is being handled
-        self._take(patch)
+        self._take(self.loud_keys(patch, ear))
 
     # What is played
 
     @property
     def patch(self) -> Patch:
         return self._patch
+
+    @property
+    def ear(self) -> Ear:
+        """Where strings are heard that are struck now."""
+        return self._ear
 
     @property
     def heard_through(self) -> Patch:
@@ -174,28 +186,52 @@ class Player:
     def preset(self) -> Preset:
         return self._preset
 
-    def set_patch(self, patch: Patch) -> None:
+    def set_patch(self, patch: Patch, ear: Ear | None = None) -> None:
         """Plays another patch, or the same with a knob turned; strings that ring glide to it.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
 
+        Args:
+            ear: where strings are heard that are struck from now on; None: at the patch's own points.
+
         Raises:
             ValueError: the tuning is impossible; nothing has changed then.
         """
+        self.take(self.loud_keys(patch, ear))
+        self.glide()
+
+    def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys:
+        """What `take` needs of a patch. It takes milliseconds, in which keys are played. Raises as `set_patch`.
+
+        Args:
+            nearly: whether body and peaks may be those of the present patch, for which it takes no time.
+        """
+        heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
+        return LoudKeys(patch, heard, self._model.configuration.grid_points, self._keys if nearly else None)
+
+    def take(self, keys: LoudKeys) -> None:
+        """Plays these keys from now on; strings that ring follow with `glide`."""
         with self._lock:
             before = self._patch
-            self._take(patch)
-            if is_another(patch, before):
+            self._take(keys)
+            if is_another(keys.patch, before):
                 self._hands.rest()
-            for struck in self._sounding():
-                self._retune(struck, KNOB_S)
 
-    def listen(self, ear: Ear) -> None:
-        """Sets where strings are heard, instead of the patch's points; what rings stays as it is."""
-        with self._lock:
-            if ear != self._ear:
-                self._listens = ear
-                self._take(self._patch)
+    def glide(self, frame: int = 0) -> None:
+        """Lets the strings that ring glide to the patch. The lock is held for moments: keys are played meanwhile."""
+        for struck in self.sounding():
+            with suppress(ValueError):  # no such string: it stays as it is
+                self._key(struck.event.key, self._on(struck))  # it is known then, where the lock is held
+            with self._lock:
+                parameters = self._with_hands(struck)
+            if parameters == struck.parameters:
+                continue
+            resonator = struck.resonator_of(parameters)
+            with self._lock:
+                if self._with_hands(struck) == parameters:
+                    struck.retune(parameters, resonator, KNOB_S, frame)
+                else:  # a wheel or a damper has moved meanwhile
+                    self._retune(struck, KNOB_S)
 
     @property
     def rate_hz(self) -> int:
@@ -208,7 +244,7 @@ class Player:
                 self._rate_hz = rate_hz
                 self._ringing.clear()
                 self._all.clear()
-                self._take(self._patch)
+                self._take(self._keys)
 
     def prepare(self, keys: Sequence[int] | None = None) -> None:
         """Computes what keys sound with, so that a strike need not. None: all keys of the patch."""
@@ -232,6 +268,10 @@ class Player:
         Raises:
             ValueError: a key has no possible string.
         """
+        if isinstance(event, PatchTurned):
+            self.take(self.loud_keys(event.patch))
+            self.glide(frame)
+            return None
         with self._lock:
             self._frame = frame
             try:
@@ -277,10 +317,8 @@ class Player:
 
     # How it is done
 
-    def _take(self, patch: Patch) -> None:
-        ear = self._listens or Ear(tuple(patch.pickup.points), patch.pickup.kind)
+    def _take(self, keys: LoudKeys) -> None:
         rate_hz, model = self._rate_hz, self._model
-        keys = LoudKeys(patch, ear, model.configuration.grid_points)
 
         @lru_cache(maxsize=KEPT_KEYS)
         def key_of(key: int, string: int | None) -> Key | None:
@@ -294,16 +332,16 @@ class Player:
                     if source == "truth"
                     else tension_program(model, found.resonator, rate_hz)
                 )
-            return Key(found.string, found.resonator, found.gain, programs)
+            return Key(keys.patch, found.string, found.resonator, found.gain, programs)
 
-        self._patch, self._ear, self._key = patch, ear, key_of
+        self._keys, self._patch, self._ear, self._key = keys, keys.patch, keys.ear, key_of
 
     def _sounding(self) -> list[Struck]:
         self._all = [struck for struck in self._all if not struck.over]
         self._ringing = {place: struck for place, struck in self._ringing.items() if not struck.over}
         return list(self._ringing.values())
 
-    def _play(self, event: Event) -> Struck | None:
+    def _play(self, event: NoteOn | NoteOff | Bend | Controller) -> Struck | None:
         if isinstance(event, NoteOn):
             return self._note_on(event)
         if isinstance(event, NoteOff):
@@ -311,10 +349,8 @@ class Player:
         elif isinstance(event, Bend):
             self._hands.of(event.channel).bend = min(max(event.value, -1.0), 1.0)
             self._follow_bend(event.channel)
-        elif isinstance(event, Controller):
-            self._controller(event)
         else:
-            self.set_patch(event.patch)
+            self._controller(event)
         return None
 
     def _note_on(self, event: NoteOn) -> Struck | None:
@@ -347,7 +383,7 @@ class Player:
         struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own, self._frame)
         parameters = self._with_hands(struck)
         if parameters != own:
-            struck.retune(parameters, 0.0)
+            struck.retune(parameters, struck.resonator_of(parameters), 0.0)
         self._sounding()
         self._ringing[place] = struck
         self._all.append(struck)
@@ -481,7 +517,7 @@ class Player:
     def _retune(self, struck: Struck, seconds: float) -> None:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
-            struck.retune(parameters, seconds, self._frame)
+            struck.retune(parameters, struck.resonator_of(parameters), seconds, self._frame)
 
 
 def is_another(patch: Patch, than: Patch) -> bool:

@@ -6,6 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from app.instrument.effects import body_problem, effects_of
@@ -18,7 +19,7 @@ from app.instrument.events import (
     moves_effects,
     still_down,
 )
-from app.instrument.player import SOURCES, Player, Struck
+from app.instrument.player import SOURCES, Player, Struck, is_another
 from app.patches.patch import Patch, Pickup
 from app.playing.due import Due
 from app.playing.notes import Note, Notes
@@ -38,8 +39,19 @@ FULL = (
 )
 
 
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """What keys are to play, and where it is heard."""
+
+    patch: Patch
+    ear: Ear
+
+
 class Live:
     """Every public method may be called from any thread.
+
+    A key waits for no knob. A turned patch is played at once, with the body's loudness and the peaks of the patch
+    before; its own are computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
         find: the path of a preset by its name; None where there is none.
@@ -59,20 +71,18 @@ class Live:
         self._notes, self._sources, self._find, self._report = notes, sources, find, report
         self._lock = threading.RLock()
         self._player: Player | None = None
-        self._wanted: Patch | None = None
+        self._wanted: _Wanted | None = None
+        self._completed: _Wanted | None = None  # the latest wish for which all is computed, or tried
         self._path = Path()
-        self._ear: Ear | None = None
         self._struck_s = 0.0
         self._made: tuple[Struck, Note] | None = None
         self._due: Due | None = None  # of the event that is being handled
         self._recorded: list[TimedEvent] | None = None
         self._recording_began_s = 0.0
         self._told_full = False
-        self._wished: object = None
         self._effects: Effects | None = None  # as set
         self._dry = False
         self._told_body = ""  # the fault of the body that was reported last
-        self._preparing: object = None
         self._struck: Struck | None = None  # the last one
         self.seconds = 4.0  # how long the motion of a note is shown
 
@@ -87,38 +97,41 @@ class Live:
         Another preset is loaded in the background; until then keys are silent. None: no patch.
         """
         with self._lock:
-            self._ear = ear
             player = self._player
-            self._wanted = patch
-            if patch is None:
+            if patch is None or (player is not None and player.patch.preset != patch.preset):
                 self._player = None
-                self._wish_effects(None)
-                return
-            self._note_down_patch(patch)
-            if player is not None and player.patch.preset == patch.preset:
-                try:
-                    player.set_patch(patch)
-                    player.listen(ear)
-                except ValueError as error:
-                    self._report(str(error), "")
-                    return
-                self._wish_effects(player.heard_through)
-                self._prepare(player)
-                return
-            self._player = None
-        self._notes.in_background(lambda: self._begin(patch))  # before the effects: keys should sound soon
-        with self._lock:
-            self._wish_effects(patch)
+            self._wanted = None if patch is None else _Wanted(patch, ear)
+        self._follow_wish()
 
     def listen(self, ear: Ear) -> None:
         """Where keys are heard from now on."""
         with self._lock:
-            self._ear, player = ear, self._player
-            if player is not None:
-                self._note_down_patch(player.patch)
-        if player is not None:
-            player.listen(ear)
-            self._prepare(player)
+            if self._wanted is None:
+                return
+            self._wanted = _Wanted(self._wanted.patch, ear)
+            if self._player is None:  # it is being loaded, or cannot be
+                return
+        self._follow_wish()
+
+    def _follow_wish(self) -> None:
+        """Plays what is wanted; what takes milliseconds of it, in the background."""
+        wanted, player = self._wanted, self._player
+        if wanted is not None and player is not None:
+            self._bring(player, wanted, nearly=not is_another(wanted.patch, player.patch))
+        self._notes.in_background(self._complete)
+
+    def _complete(self) -> None:
+        """All that keys need to play what is wanted now. In the background."""
+        wanted, player = self._wanted, self._player
+        if wanted is not None and wanted is not self._completed:
+            self._completed = wanted
+            if player is None:
+                self._begin(wanted)
+            else:
+                player.glide()
+                self._bring(player, wanted)
+        self._set_present_effects()
+        self._prepare()
 
     def handle(self, event: Event, due: Due | None = None) -> tuple[Struck, Note] | None:
         """Plays an event, at once or when it is due; what it struck, and the note. None where it struck nothing."""
@@ -136,7 +149,7 @@ class Live:
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
             if isinstance(event, Controller) and moves_effects(event, player.patch):
-                self._wish_effects(player.heard_through)
+                self._refresh_effects()
             return self._made
 
     def cancel(self) -> None:
@@ -177,42 +190,39 @@ class Live:
 
     def hear_dry(self, dry: bool) -> None:
         """Whether body and room are left out, as while models are compared with the truth."""
-        with self._lock:
-            self._dry = dry
-            if self._player is not None:
-                self._wish_effects(self._player.heard_through)
+        self._dry = dry
+        self._refresh_effects()
 
-    def _wish_effects(self, patch: Patch | None) -> None:
-        """Sets body and room in the background: an impulse response takes milliseconds. The latest call counts."""
-        wish = self._wished = object()
-        dry = self._dry
+    def _refresh_effects(self) -> None:
+        """Sets body and room in the background: an impulse response takes milliseconds."""
+        self._notes.in_background(self._set_present_effects)
 
-        def work() -> None:
-            if wish is not self._wished:
+    def _set_present_effects(self) -> None:
+        """Body and room of what is played now. In the background."""
+        player, wanted = self._player, self._wanted
+        if player is not None:
+            patch: Patch | None = player.heard_through
+        else:
+            patch = None if wanted is None else wanted.patch
+        effects = None if self._dry or patch is None else effects_of(patch)
+        if effects != self._effects:
+            self._effects = effects
+            self._set_effects(effects)
+        problem, told = body_problem(patch) if patch is not None else "", self._told_body
+        self._told_body = problem
+        if problem and problem != told:
+            self._report(problem, "")
+
+    def _prepare(self) -> None:
+        """Computes keys before they are struck, until something else is wanted. In the background."""
+        wanted, player = self._wanted, self._player
+        if player is None:
+            return
+        low, high = player.patch.range
+        for key in range(low, high + 1):
+            if wanted is not self._wanted:
                 return
-            effects = None if dry or patch is None else effects_of(patch)
-            if effects != self._effects:
-                self._effects = effects
-                self._set_effects(effects)
-            problem, told = body_problem(patch) if patch is not None else "", self._told_body
-            self._told_body = problem
-            if problem and problem != told:
-                self._report(problem, "")
-
-        self._notes.in_background(work)
-
-    def _prepare(self, player: Player) -> None:
-        """Computes keys in the background, before they are struck; the latest call counts."""
-        wish = self._preparing = object()
-
-        def work() -> None:
-            low, high = player.patch.range
-            for key in range(low, high + 1):
-                if wish is not self._preparing:
-                    return
-                player.prepare([key])
-
-        self._notes.in_background(work)
+            player.prepare([key])
 
     # Recording
 
@@ -225,7 +235,7 @@ class Live:
         with self._lock:
             self._recorded, self._recording_began_s, self._told_full = [], time.monotonic(), False
             if self._player is not None:
-                self._note_down_patch(self._player.patch)
+                self._note_down_patch(self._player)
                 for event in self._player.at_hand:
                     self._note_down(event, time.monotonic())
 
@@ -244,12 +254,10 @@ class Live:
             return []
         return [TimedEvent(max(0.0, each.time_s - first), each.event) for each in events]
 
-    def _note_down_patch(self, patch: Patch) -> None:
+    def _note_down_patch(self, player: Player) -> None:
         """With the pick-up through which it is heard, which is not its own where keys choose places."""
-        if self._ear is not None:
-            pickup = Pickup(points=self._ear.points, kind=self._ear.pickup)
-            patch = patch.model_copy(update={"pickup": pickup})
-        self._note_down(PatchTurned(patch), time.monotonic())
+        pickup = Pickup(points=player.ear.points, kind=player.ear.pickup)
+        self._note_down(PatchTurned(player.patch.model_copy(update={"pickup": pickup})), time.monotonic())
 
     def _note_down(self, event: Event, time_s: float) -> None:
         if self._recorded is None:
@@ -262,26 +270,43 @@ class Live:
 
     # How it is done
 
-    def _begin(self, patch: Patch) -> None:
-        """Loads a patch's preset, unless another patch is wanted by now, or none."""
-        if patch is not self._wanted:
+    def _bring(self, player: Player, wanted: _Wanted, nearly: bool = False) -> None:
+        """Lets keys play what is wanted, unless something else is by now. `nearly`: as in `Player.loud_keys`."""
+        try:
+            keys = player.loud_keys(wanted.patch, wanted.ear, nearly)
+        except ValueError as error:
+            with self._lock:
+                if wanted is self._wanted:  # what is played stays
+                    self._wanted = self._completed = _Wanted(player.patch, player.ear)
+            self._report(str(error), "")
             return
-        path = self._find(patch.preset)
+        with self._lock:
+            if wanted is self._wanted and player is self._player:
+                turned = (player.patch, player.ear) != (wanted.patch, wanted.ear)
+                player.take(keys)
+                if turned:
+                    self._note_down_patch(player)
+
+    def _begin(self, wanted: _Wanted) -> None:
+        """Loads the preset of what is wanted."""
+        patch, path = wanted.patch, self._find(wanted.patch.preset)
         if path is None:
             self._report(f"{patch.name} is played by the preset {patch.preset}, which was not found.", "")
             return
         try:
-            player = Player(patch, self._sources.load(path).preset, self._notes.rate_hz, self._deliver, SOURCES)
+            preset, rate_hz = self._sources.load(path).preset, self._notes.rate_hz
+            player = Player(patch, preset, rate_hz, self._deliver, SOURCES, wanted.ear)
         except (ValueError, PresetError) as error:
             self._report(str(error), "")
             return
         with self._lock:
-            if patch is not self._wanted:
+            now = self._wanted
+            if now is None or now.patch is not patch:
                 return
-            if self._ear is not None:
-                player.listen(self._ear)
             self._path, self._player = path, player
-        self._prepare(player)
+            self._note_down_patch(player)
+        if now is not wanted:  # it is heard elsewhere by now
+            self._bring(player, now)
 
     def _deliver(self, struck: Struck) -> None:
         """In the event's thread, within `handle`."""

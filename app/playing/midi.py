@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
-from app.instrument.events import Controller, Event, NoteOn
+from app.instrument.events import Controller, Event, NoteOn, fixed_function
 from app.playing.keyboard import Reach
 from app.shared.parameters import OF_CHOICES
 
@@ -33,7 +33,8 @@ class MidiChoices(BaseModel):
     Attributes:
         port: the input's name; "": none.
         notes: whether a note plays a pitch of the patch, sets the pluck position, or selects the preset.
-        controllers: field -> number of the controller that is assigned to it; other fields are absent.
+        controllers: field -> number of the controller that is assigned to it; other fields are absent. Those with a
+            function of their own are left out, which earlier versions let be assigned.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,8 +43,13 @@ class MidiChoices(BaseModel):
     notes: NoteMode = "pitch"
     controllers: dict[Annotated[str, AfterValidator(_learnable)], ControllerNumber] = {}
 
+    @field_validator("controllers")
+    @classmethod
+    def _leave_fixed(cls, controllers: dict[str, int]) -> dict[str, int]:
+        return {field: number for field, number in controllers.items() if not fixed_function(number)}
+
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """These choices with `controller` assigned to `field`, and to no other."""
+        """These choices with `controller`, which has no `fixed_function`, assigned to `field`, and to no other."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 

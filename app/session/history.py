@@ -26,10 +26,22 @@ Values = dict[str, Any]  # of recorded fields
 
 
 class History:
-    """Records the changes of a session from now on. `now_s`: a clock, replaced in tests."""
+    """Records the changes of a session from now on.
 
-    def __init__(self, session: Session, now_s: Callable[[], float] = time.monotonic) -> None:
+    Args:
+        now_s: a clock, replaced in tests.
+        held: whether a gesture that has begun may still be under way: its `let_go` may never come, as where a dialog
+            or another window takes the mouse.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        now_s: Callable[[], float] = time.monotonic,
+        held: Callable[[], bool] = lambda: True,
+    ) -> None:
         self._session = session
+        self._still_held = held
         self._now_s = now_s
         self._undo: deque[Values] = deque(maxlen=LARGEST_STEPS)
         self._redo: list[Values] = []
@@ -101,6 +113,8 @@ class History:
         if "keys_play" in names and fields <= set(EARS):  # these came with the patch that keys play now
             self._present = values
             return
+        if self._held and not self._still_held():
+            self.let_go()
         now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
         soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):

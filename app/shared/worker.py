@@ -118,9 +118,13 @@ class Worker:
         if self._job is not None:
             self._job.cancel()
 
-    def close(self, seconds: float | None = 10.0) -> None:
-        """Cancels and ends the thread, waiting so long for it (None: as long as it takes); may be called again."""
-        self.cancel()
+    def close(self, seconds: float | None = 10.0, *, cancel: bool = True) -> None:
+        """Ends the thread, waiting so long for it (None: as long as it takes); may be called again.
+
+        `cancel`: whether a job under way is cancelled, and not waited for to its end.
+        """
+        if cancel:
+            self.cancel()
         with self._mailbox:
             self._closing = True
             self._mailbox.notify()

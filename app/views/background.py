@@ -54,10 +54,10 @@ class Background(QObject):
         self._worker.cancel()
         self._job = None
 
-    def close(self, seconds: float | None = 10.0) -> None:
-        """Abandons the job and ends the thread, waiting so long for it; may be called again."""
-        self.cancel()
-        self._worker.close(seconds)
+    def close(self, seconds: float | None = 10.0, *, cancel: bool = True) -> None:
+        """Abandons the job and ends the thread, as `Worker.close`; may be called again."""
+        self._job = None
+        self._worker.close(seconds, cancel=cancel)
 
     @Slot(object, str, tuple)
     def _pass_on(self, job: Job, what: str, told: tuple[object, ...]) -> None:

@@ -15,8 +15,9 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication
 
-from app.analysis.abx.record import subject_of
+from app.analysis.abx.record import material_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn
@@ -117,7 +118,7 @@ class Controller(QObject):
         for slot, name in missing_presets(self.session.choices, self.library).items():
             self.session.update(**{slot: "model" if slot == "a" else "truth"})
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
-        self.history = History(self.session)
+        self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._connect_history()
         self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike, self._handle)
         self.instruments.played.connect(self.performance.follow)
@@ -268,14 +269,14 @@ class Controller(QObject):
             self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
-            subject = subject_of(entry, self.session.choices)
+            material = material_of(entry, self.session.choices)
         except PresetError as error:
             self.window.notices.tell(str(error))
             return
         self.performance.stop()
         render = partial(self.performance.render_sound, self.session.choices)
         self.performance.hear_dry(True)
-        self._abx = AbxDialog(self.sound, subject, self._settings.abx, render, self.window)
+        self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)
         self._abx.open()
 

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.audio.impulse_file import ImpulseError
+from app.audio.impulse_file import ImpulseError, cut_words
 from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
 from app.presets.install import SUFFIX, InstallError, install_preset
@@ -34,9 +34,9 @@ def receive(file: Path, library: Library) -> Dropped:
         if ending == ".wav":
             return _recipe(file, library)
         if ending in ENDINGS:
-            return Dropped(body=install_body(file))
+            return _body(file)
     except NoRecipe:
-        return _body(file)
+        return _other_sound(file)
     except (InstallError, RecipeError, ImpulseError, WriteError) as error:
         return Dropped(notice=str(error))
     kinds = f"a preset ({SUFFIX}), a patch, a string, a scale, a MIDI file, an exported WAV, an impulse response"
@@ -44,9 +44,14 @@ def receive(file: Path, library: Library) -> Dropped:
 
 
 def _body(file: Path) -> Dropped:
+    """Raises ImpulseError or WriteError: it cannot be one."""
+    return Dropped(body=install_body(file), notice=cut_words(file))
+
+
+def _other_sound(file: Path) -> Dropped:
     """A WAV without a recipe: an impulse response."""
     try:
-        return Dropped(body=install_body(file))
+        return _body(file)
     except (ImpulseError, WriteError) as error:
         return Dropped(notice=f"{error}. It has no recipe either")
 

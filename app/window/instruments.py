@@ -101,15 +101,14 @@ class Instruments(QObject):
 
     def play(self, event: Event, due: Due | None = None) -> bool:
         """Plays an event through the patch, at once or when it is due. Any thread. False where no patch is chosen."""
-        choices = self._session.choices
-        if choices.patch is None:
+        if self._session.choices.patch is None:
             return False
         struck = self._handle(event, due)
         if struck is not None:
-            self.latest = choices.patch, struck
+            self.latest = struck.key.patch, struck
             self.latest_key = struck.event.key, struck.string
             changes = {
-                "preset": choices.patch.preset,
+                "preset": struck.key.patch.preset,
                 "string": PhysicalString(**asdict(struck.key.string.parameters)),
                 "position": struck.pluck.position,
                 "amplitude_mm": struck.pluck.amplitude_mm,

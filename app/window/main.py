@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.patches.library import SHIPPED, PatchError, read_patch
 from app.session.instrument import choices_of
-from app.shared.heap import collect_between_events, return_large_blocks
+from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
 from app.views.theme import apply_theme
 from app.window.display import check_display
@@ -99,6 +99,7 @@ class _Start(QObject):
 
     def _failed(self, error: Exception) -> None:
         """Shows the error in a dialog; the window stays until its user closes it."""
+        collect_anywhere()
         self._window.show_failed()
         self._faults.tell(log_fault(error, "while the engine was loaded"), CANNOT_START)
 
@@ -134,9 +135,9 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
         NoDisplay: there is no screen.
         Exception: why the engine could not be loaded, after the window was closed.
     """
-    gc.disable()  # until `collect_between_events`: there is hardly any garbage before
-    return_large_blocks()
     check_display()
+    gc.disable()  # until `collect_between_events`, or until loading fails: there is hardly any garbage before
+    return_large_blocks()
     path = settings_file()
     settings, notice = load_settings(path)
     settings = with_patch(settings)

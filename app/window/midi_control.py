@@ -12,7 +12,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
-from app.instrument.events import Controller, Event, NoteOn
+from app.instrument.events import Controller, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
 from app.playing.keyboard import Reach
 from app.playing.midi import TURNED, MidiChoices, meaning_of
@@ -136,6 +136,8 @@ class MidiControl(QObject):
     def _learn(self, field: str) -> None:
         """Assigns the next controller that moves to `field`; "", or the same field again: ends waiting for one."""
         self._learning = field if field and field != self._learning else None
+        if self._dialog is not None and self._learning is not None:
+            self._dialog.show_problem("")
         self._show_choices()
 
     def _remember(self, choices: MidiChoices) -> None:
@@ -145,22 +147,33 @@ class MidiControl(QObject):
     # Messages
 
     def _receive(self, event: Event) -> None:
-        """In mido's thread. Notes are played at once; an assigned controller waits for the window's thread."""
+        """In mido's thread. Notes are played at once; an assigned controller waits for the window's thread.
+
+        While a controller is waited for, one with a function of its own goes both ways.
+        """
         if isinstance(event, Controller) and (
             self._learning is not None or event.number in self.choices.controllers.values()
         ):
             self._received.emit(event)
-        elif self.choices.notes == "pitch" and self._handle(event):
+            if not fixed_function(event.number):
+                return
+        if self.choices.notes == "pitch" and self._handle(event):
             return
-        elif isinstance(event, NoteOn):
+        if isinstance(event, NoteOn):
             self._play(meaning_of(event, self.choices, self._reach(), self._presets()).changes)
 
     def _answer(self, event: Event) -> None:
         """In the window's thread: assigns a controller that is waited for, and applies its value."""
         if self._learning is not None and isinstance(event, Controller):
+            if does := fixed_function(event.number):
+                if self._dialog is not None:
+                    self._dialog.show_problem(f"Controller {event.number} {does}: move another control.")
+                return
             field, self._learning = self._learning, None
             self._remember(self.choices.learned(field, event.number))
-            self.input.let_go()  # it may be the pedal, whose release would no longer be played
+            if self._dialog is not None:
+                self._dialog.show_problem("")
+            self.input.let_go()  # it may be the modulation wheel, whose way back would no longer be played
         meaning = meaning_of(event, self.choices, self._reach(), self._presets())
         if meaning.changes:
             self.performed.emit(meaning.changes)

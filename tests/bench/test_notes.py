@@ -72,16 +72,16 @@ def test_what_is_rendered_is_as_it_should_be(patch: Patch, piece: Piece, sound: 
     assert (found.holes, found.fades, found.clicks) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("stops", [True, False])
+@pytest.mark.parametrize(("stops", "allowed"), [(True, 0.5), (False, 1.5)])
 def test_soft_strikes_of_a_loud_string_are_judged_by_what_the_patch_says(
-    patch: Patch, piece: Piece, stops: bool
+    patch: Patch, piece: Piece, stops: bool, allowed: float
 ) -> None:
-    """A patch that is played by the other rule is found out."""
+    """A patch that is played by the other rule is found out. What is added may be out of phase."""
     pedal = {name: piece[name] for name in ("melody", "chords", "repeats", "pedal")}
     said = Patch.model_validate({**dict(patch), "pluck": patch.pluck.model_copy(update={"stops": stops})})
     played = Patch.model_validate({**dict(patch), "pluck": patch.pluck.model_copy(update={"stops": not stops})})
     right, wrong = (judged(pedal, said, rendered(pedal, each)).restrike_db for each in (said, played))
-    assert right is not None and right < 0.5
+    assert right is not None and right < allowed
     assert wrong is not None and wrong > 2
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import subprocess
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +11,10 @@ import pytest
 from filelock import FileLock
 
 from engine.schema import SchemaError
-from training.results import COLUMNS, Row, add_rows, read_results
+from training.results import COLUMNS, RESULTS, Row, add_rows, read_results
 from training.start import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT
+
+UNPUBLISHED = "code of an unpublished commit"
 
 
 def row(digest: str = "a", **changes: Any) -> Row:
@@ -55,6 +58,23 @@ def test_rows_come_back_as_they_were(path: Path) -> None:
     assert add_rows(path, rows) == rows
     assert read_results(path) == rows
     assert path.read_text(encoding="utf-8").splitlines()[0] == ",".join(COLUMNS)
+
+
+def git(*words: str) -> str:
+    return subprocess.run(["git", *words], cwd=RESULTS.parent, capture_output=True, text=True, check=True).stdout
+
+
+def test_every_row_is_of_a_commit_of_the_history_or_says_that_it_is_not() -> None:
+    try:
+        if git("rev-parse", "--is-shallow-repository").strip() != "false":
+            pytest.skip("the history is not whole")
+        history = git("log", "--format=%H").split()
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("there is no history here")
+    known = {row.commit.rstrip("+") for row in read_results(RESULTS)}
+    lost = {commit for commit in known if not any(whole.startswith(commit) for whole in history)}
+    unsaid = [r.name for r in read_results(RESULTS) if r.commit.rstrip("+") in lost and UNPUBLISHED not in r.message]
+    assert unsaid == []
 
 
 def test_a_float_keeps_all_its_digits(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
@@ -56,7 +57,7 @@ def as_markdown(rows: Sequence[Row], recipe: RecipeChoice = "all", listing: bool
             "a trial, or made by a recipe that has changed since."
         )
     if listing:
-        parts += ["## Runs", _markdown_table(*_listing(used))]
+        parts += ["## Runs", _markdown_table(*_listing(used)), *_remarks(used)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -160,6 +161,13 @@ def _listing(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
         ]
         for row in rows
     ]
+
+
+def _remarks(rows: Sequence[Row]) -> list[str]:
+    """What rows that are done say of themselves, by their commit."""
+    said = Counter((row.commit or NONE, row.message) for row in rows if row.status == "done" and row.message)
+    lines = [f"- {commit} ({count} runs): {message}." for (commit, message), count in said.items()]
+    return ["\n".join(lines)] if lines else []
 
 
 def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

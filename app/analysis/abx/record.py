@@ -53,7 +53,7 @@ class Candidate(BaseModel):
 
 
 @dataclass(frozen=True)
-class Subject:
+class Material:
     """What is compared.
 
     Attributes:
@@ -67,7 +67,7 @@ class Subject:
     volume_db: float
 
 
-def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
+def material_of(entry: PresetEntry, choices: Choices) -> Material:
     """Model and truth of a preset, plucked and heard as chosen.
 
     Raises:
@@ -76,14 +76,14 @@ def subject_of(entry: PresetEntry, choices: Choices) -> Subject:
     made = {"preset": entry.name, "preset_sha256": preset_digest(entry.path)}
     candidates = tuple(Candidate(source=name, label=name.capitalize(), **made) for name in ("model", "truth"))
     fields = PLUCK_FIELDS | ({"listen_right"} if choices.stereo else set())
-    return Subject(candidates, choices.model_dump(mode="json", include=fields), choices.volume_db)
+    return Material(candidates, choices.model_dump(mode="json", include=fields), choices.volume_db)
 
 
 class AbxRecord(BaseModel):
     """The result.
 
     Attributes:
-        pluck: see `Subject`.
+        pluck: see `Material`.
         through: the sound device, and how it was played.
         trials: those that were answered, in order.
         remark: why the test is not complete, if that is known.

@@ -9,8 +9,9 @@ from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLineEd
 from app.playing.keyboard import KeyPress, place_of, semitone_of
 from app.views.controls.browser import open_browser
 
-LEAVE_MS = 20  # by which `released` is delayed: X11 repeats a key that is held by releases and presses
-REPEAT_MS = 5  # between such a release and its press, at most
+X11 = "xcb"  # Qt's name: there a held key is repeated by releases and presses, most of which Qt does not mark so
+LEAVE_MS = 2  # by which `released` is delayed there: by then the press of a repetition has arrived
+REPEAT_MS = 5  # between such a release and its press on the server's clock, at most
 _WRITING = (QLineEdit, QAbstractSpinBox, QPlainTextEdit, QTextEdit)
 _HELD = (
     Qt.KeyboardModifier.ControlModifier
@@ -28,6 +29,9 @@ class PlayingKeys(QObject):
     Keys that are notes are taken before the focused widget gets them; other keys only where it does not take them (a
     knob takes digits). Each `pressed` is followed by a `released`, at the latest when the window loses the focus.
 
+    Args:
+        platform: Qt's name of it; default the present one.
+
     Attributes:
         piano: whether notes are the two rows of a piano, or one row of ten places.
     """
@@ -35,15 +39,14 @@ class PlayingKeys(QObject):
     pressed = Signal(object)  # a `KeyPress`
     released = Signal(object)
 
-    def __init__(self, window: QWidget) -> None:
+    def __init__(self, window: QWidget, platform: str = "") -> None:
         super().__init__(window)
+        self._holds_back = (platform or QApplication.platformName()) == X11
         self._window = window
         self._watched: QWidget | None = None
         self.piano = False
         self._down: dict[int, KeyPress] = {}  # by Qt's key, or the platform's code
-        self._leaving: dict[int, int] = {}  # keys released just now -> when, in ms of the platform's clock
-        self._leave = QTimer(self, interval=LEAVE_MS, singleShot=True)
-        self._leave.timeout.connect(self._let_go)
+        self._leaving: dict[int, int] = {}  # keys whose release is held back -> when, in ms of the platform's clock
         window.installEventFilter(self)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
@@ -64,8 +67,7 @@ class PlayingKeys(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.WindowDeactivate:
-            self._leaving = dict.fromkeys(self._down, 0)
-            self._let_go()
+            self._let_go(*self._down)
             return False
         if not isinstance(event, QKeyEvent):
             return False
@@ -86,26 +88,39 @@ class PlayingKeys(QObject):
             event.accept()
             return notes
         if not event.isAutoRepeat():
-            self._let_go()
+            self._let_go(*self._leaving)
             self._down[number] = press
             self.pressed.emit(press)
         event.accept()
         return notes
 
-    def _let_go(self) -> None:
-        """Releases the keys that were not pressed again within LEAVE_MS."""
-        leaving, self._leaving = self._leaving, {}
-        for number in leaving:
+    def _let_go(self, *numbers: int) -> None:
+        """Releases keys."""
+        for number in numbers:
+            self._leaving.pop(number, None)
             if (press := self._down.pop(number, None)) is not None:
                 self.released.emit(press)
 
     def _release(self, event: QKeyEvent) -> bool:
-        press = self._down.get(_number(event))
+        number, time_ms = _number(event), event.timestamp()
+        press = self._down.get(number)
         if press is None:
             return False
-        self._leaving[_number(event)] = event.timestamp()
-        self._leave.start()
+        if self._holds_back:
+            self._leaving[number] = time_ms
+            QTimer.singleShot(LEAVE_MS, self, lambda: self._leave(number, time_ms))
+        else:
+            self._let_go(number)
         return (semitone_of(press) if self.piano else place_of(press)) is not None
+
+    def _leave(self, number: int, time_ms: int) -> None:
+        """Releases a key that was not pressed again, once the events that have come meanwhile are taken."""
+
+        def leave() -> None:
+            if self._leaving.get(number) == time_ms:
+                self._let_go(number)
+
+        QTimer.singleShot(0, self, leave)
 
 
 def _number(event: QKeyEvent) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
 
-from app.analysis.abx.record import AbxRecord, Subject, default_folder, save_record
+from app.analysis.abx.record import AbxRecord, Material, default_folder, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
 from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound, new_seed
 from app.audio.sound import Sound as SoundOutput
@@ -53,7 +53,7 @@ class AbxDialog(QDialog):
     def __init__(
         self,
         output: SoundOutput,
-        subject: Subject,
+        material: Material,
         choices: AbxChoices,
         render: Render,
         parent: QWidget | None = None,
@@ -62,7 +62,7 @@ class AbxDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
         self.resize(680, 470)
-        self._output, self._subject, self._seed, self._render = output, subject, seed, render
+        self._output, self._material, self._seed, self._render = output, material, seed, render
         self._rendering: Future[Mapping[str, NDArray[np.float32]]] | None = None
         self._rate_hz = 0  # at which it is, or was, rendered
         self._pair: Pair | None = None
@@ -74,7 +74,7 @@ class AbxDialog(QDialog):
         self._through: dict[str, object] | None = None  # the device, and how it is played, during the test
         self._record: AbxRecord | None = None
         folder = Path(choices.folder) if choices.folder else default_folder()
-        self._setup = SetupPage(subject.candidates, choices.trials, choices.restart, folder)
+        self._setup = SetupPage(material.candidates, choices.trials, choices.restart, folder)
         self._trial, self._result = TrialPage(), ResultPage()
         self._pages = QStackedWidget()
         for page in (self._setup, self._trial, self._result):
@@ -135,7 +135,7 @@ class AbxDialog(QDialog):
         if rendering is not None and rendering.done() and self._rate_hz == self._output.rate_hz:
             sources = [candidate.source for candidate in self._setup.pair]
             try:
-                made = make_stimuli(rendering.result(), self._rate_hz, sources, self._subject.volume_db)
+                made = make_stimuli(rendering.result(), self._rate_hz, sources, self._material.volume_db)
             except Exception as error:  # a model that ran away, or silence
                 self._silence = str(error)
             else:
@@ -168,7 +168,7 @@ class AbxDialog(QDialog):
         if self._obstacle(status) or status.device is None:
             return
         self._through = _device_of(status) | {
-            "volume_db": self._subject.volume_db,
+            "volume_db": self._material.volume_db,
             "restart_at_switch": self._setup.restart,
         }
         self._run = Run(self._seed(), self._setup.trials)
@@ -209,7 +209,7 @@ class AbxDialog(QDialog):
         self._record = AbxRecord(
             a=a,
             b=b,
-            pluck=self._subject.pluck,
+            pluck=self._material.pluck,
             through=self._through,
             planned_trials=run.planned,
             seed=run.seed,

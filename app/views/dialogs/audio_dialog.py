@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
-from app.views.controls.parts import combo_box
+from app.views.controls.parts import combo_box, label
 from app.views.controls.plain import Label
 
 RATES = {0: "Device default", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
@@ -65,12 +65,8 @@ class AudioDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Audio settings")
         self.setMinimumWidth(520)
-        self._state_label = Label()
-        self._state_label.setWordWrap(True)
-        self._problem_label = Label()
-        self._problem_label.setObjectName("warning")
-        self._problem_label.setWordWrap(True)
-        self._problem_label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._state_label = label()
+        self._problem_label = label("warning", selectable=True)
         self._device = combo_box("Output", [("System default", None)])
         self._device.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self._device.setToolTip("Audio output; remembered by its name")
@@ -148,9 +144,6 @@ class AudioDialog(QDialog):
         for button, side in zip(self._tones, ("left", "both", "right"), strict=True):
             button.clicked.connect(lambda _=False, side=side: self.tone_asked.emit(side))
         reset = _button("Reset", "Count dropouts from zero", self.gaps_reset)
-        advice = Label(ADVICE)
-        advice.setObjectName("faint")
-        advice.setWordWrap(True)
         form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         form.setVerticalSpacing(10)
@@ -168,7 +161,7 @@ class AudioDialog(QDialog):
         column.addWidget(self._state_label)
         column.addWidget(self._problem)
         column.addLayout(form)
-        column.addWidget(advice)
+        column.addWidget(label("faint", ADVICE))
         column.addStretch(1)
         column.addLayout(_row(None, close))
 
@@ -195,6 +188,6 @@ def _row(*widgets: QWidget | None) -> QHBoxLayout:
     return row
 
 
-def _set(label: QLabel, text: str) -> None:
-    if label.text() != text:
-        label.setText(text)
+def _set(shown: QLabel, text: str) -> None:
+    if shown.text() != text:
+        shown.setText(text)

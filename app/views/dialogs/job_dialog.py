@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.views.controls.parts import label
@@ -20,7 +20,8 @@ class JobDialog(QDialog):
     """A subclass lays out its choices (`_lay_out`), and starts work on them (`_run`).
 
     Args:
-        meanwhile: a sentence beside the progress.
+        meanwhile: a sentence beside the progress: what the parent's window can be used for. The keyboard goes there
+            while a job runs; Escape in the dialog still cancels.
 
     Attributes:
         state: a line or more on what is to come, on progress, or on the result.
@@ -32,6 +33,7 @@ class JobDialog(QDialog):
         self.setWindowTitle(title)
         self.setMinimumWidth(width)
         self._meanwhile = f". {meanwhile}" if meanwhile else ""
+        self._borrower = parent.window() if parent is not None and meanwhile else None  # of the keyboard
         self._job: ExportJob | None = None
         self._shown_folder = Path()
         self._choosers: tuple[QWidget, ...] = ()
@@ -101,6 +103,25 @@ class JobDialog(QDialog):
         self.bar.show()
         self._say(begins)
         self._job.start()
+        self._lend_keyboard(True)
+
+    def _lend_keyboard(self, lent: bool) -> None:
+        """While a tool window has the focus, its parent's shortcuts work (`QShortcut`)."""
+        if self._borrower is None:
+            return
+        kind = Qt.WindowType.Tool if lent else Qt.WindowType.Dialog
+        self.overrideWindowFlags((self.windowFlags() & ~Qt.WindowType.WindowType_Mask) | kind)
+        if lent:
+            self._borrower.activateWindow()
+
+    def event(self, event: QEvent) -> bool:
+        """Passes keys on to the parent's window while a job lends it the keyboard, all but Escape."""
+        if isinstance(event, QKeyEvent) and self._job is not None and self._borrower is not None:
+            if event.key() == Qt.Key.Key_Escape:
+                event.accept()  # no shortcut of the window
+            elif event.type() != QEvent.Type.ShortcutOverride:
+                return QCoreApplication.sendEvent(self._borrower, event)
+        return super().event(event)
 
     def _tell_progress(self, share: float, text: str, left_s: float | None) -> None:
         self.bar.setValue(round(1000 * share))
@@ -115,6 +136,7 @@ class JobDialog(QDialog):
     def _end(self, text: str, failed: bool = False, saved: bool = False) -> None:
         """The job is over, with this result. `saved`: there are files to show."""
         self._wait()
+        self._lend_keyboard(False)
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)

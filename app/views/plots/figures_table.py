@@ -39,12 +39,18 @@ LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, its tooltip, how a value is written, and the source whose colour it has."""
+    """A column: the field it shows, its heading, its tooltip, how a value is written, and whose colour it has."""
 
+    field: str
     title: str
     tip: str
     text: Callable[[Any], str] = str
     source: str = ""  # a key of `theme.SOURCE_COLOURS`; "": no colour of its own
+
+
+def values_of(row: object, columns: Sequence[Column]) -> tuple[Value, ...]:
+    """The values of a record in the order of the columns."""
+    return tuple(getattr(row, column.field) for column in columns)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QLine, QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QLinearGradient, QPainter, QPen, QPolygonF
 
-from app.analysis.string_frame import Band, StringFrame
+from app.analysis.moment import Band, StringFrame
 from app.views import theme
 from app.views.string.axes import StringAxes
 from app.views.string.ground import paint_grid

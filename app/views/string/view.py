@@ -24,7 +24,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QApplication, QSizePolicy, QToolButton, QWidget
 
-from app.analysis.string_frame import StringFrame
+from app.analysis.moment import StringFrame
 from app.session.shown import DEFAULT_SOURCES, ShownSource
 from app.views import theme
 from app.views.controls.parts import tool_button
@@ -167,10 +167,6 @@ class StringView(QWidget):
                 self.update()
         else:  # all that moves lies in one rectangle, between the legend above and the markers below
             self.update(0, WORDS_HEIGHT, self.width(), math.ceil(self._axes().bottom) - WORDS_HEIGHT)
-
-    @property
-    def is_dragging_pluck(self) -> bool:
-        return self._drag == "pluck"
 
     @property
     def _shows_pluck(self) -> bool:

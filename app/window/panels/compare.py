@@ -11,13 +11,13 @@ from PySide6.QtCore import QSignalBlocker
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
-from app.analysis.comparison import ComparedRow, Trial, compare, same_string
+from app.analysis.comparison import Basis, ComparedRow, compare, same_string
 from app.presets.library import Library, PresetEntry
 from app.session.choices import Session
 from app.session.slots import other_preset
 from app.views.controls.parts import tool_button, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 SETTLED_S = 0.5  # a pluck that is still being moved is not computed
@@ -44,24 +44,21 @@ def times(value: float) -> str:
     return f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×"
 
 
+_TRAINED, _PAST = "over the trained time and the whole string", "from the end of training to the end of the pluck"
+_NULL = "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck"
+_SPEED = "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time"
 COLUMNS = (
-    Column("Preset", "Double-click or Enter loads the preset"),
-    Column("MAE", "Relative mean absolute error over the trained time and the whole string", percent),
-    Column("MAE past", "Relative mean absolute error from the end of training to the end of the pluck", percent),
-    Column(
-        "Null, dB",
-        "Null depth: level of model − truth relative to the truth, at the listening point, over the whole pluck",
-        decibels,
-    ),
-    Column(
-        "Speed", "Seconds of sound that are rendered in a second on one core; above 1 is faster than real time", times
-    ),
-    Column("Parameters", "Trainable parameters", lambda n: f"{n:,}"),
-    Column("MSE", "Relative mean squared error over the trained time and the whole string", scientific),
-    Column("MSE past", "Relative mean squared error from the end of training to the end of the pluck", scientific),
-    Column("Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
-    Column("Model", "Model architecture"),
-    Column("Note", "Why there are no figures"),
+    Column("title", "Preset", "Double-click or Enter loads the preset"),
+    Column("mae", "MAE", f"Relative mean absolute error {_TRAINED}", percent),
+    Column("past_mae", "MAE past", f"Relative mean absolute error {_PAST}", percent),
+    Column("null_db", "Null, dB", _NULL, decibels),
+    Column("real_time", "Speed", _SPEED, times),
+    Column("parameters", "Parameters", "Trainable parameters", lambda n: f"{n:,}"),
+    Column("mse", "MSE", f"Relative mean squared error {_TRAINED}", scientific),
+    Column("past_mse", "MSE past", f"Relative mean squared error {_PAST}", scientific),
+    Column("rate_hz", "Rate", "Sample rate of the model", lambda hz: f"{hz / 1000:g} kHz"),
+    Column("model", "Model", "Model architecture"),
+    Column("note", "Note", "Why there are no figures"),
 )
 
 
@@ -80,7 +77,7 @@ class ComparePanel(Panel):
         self.setAccessibleName("Compare")
         self.setMinimumHeight(LEAST_HEIGHT)
         self._names: list[str] | None = None  # chosen by the user; None: those of the present string
-        self._rows: dict[str, tuple[Trial | None, ComparedRow]] = {}  # None: of an earlier pluck
+        self._rows: dict[str, tuple[Basis | None, ComparedRow]] = {}  # None: of an earlier pluck
         self._tried: tuple[object, ...] = ()  # what the latest job was started for
         self._unchanged_s = 0.0
         self._stopped = False
@@ -142,10 +139,10 @@ class ComparePanel(Panel):
             self._actions[entry.name] = action
 
     @property
-    def _trial(self) -> Trial:
+    def _basis(self) -> Basis:
         choices = self.session.choices
         string = None if choices.string is None else choices.string.parameters
-        return Trial(choices.pluck, choices.seconds, choices.listen, string)
+        return Basis(choices.pluck, choices.seconds, choices.listen, string)
 
     @property
     def _entries(self) -> list[PresetEntry]:
@@ -158,15 +155,15 @@ class ComparePanel(Panel):
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
     def _wanted(self) -> tuple[object, ...]:
-        return (self._trial, *(entry.name for entry in self._entries))
+        return (self._basis, *(entry.name for entry in self._entries))
 
     def _compute(self) -> None:
-        self._tried, trial = self._wanted(), self._trial
-        missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != trial]
+        self._tried, basis = self._wanted(), self._basis
+        missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != basis]
         missing.sort(key=lambda entry: self._urgency(entry.name))
         if missing:
             self._set_computing(0.0)
-            self.compute(lambda job: compare(missing, trial, job))
+            self.compute(lambda job: compare(missing, basis, job))
         self._show()
 
     def _urgency(self, name: str) -> int:
@@ -177,7 +174,7 @@ class ComparePanel(Panel):
     def _progressed(self, share: float, _: str, row: ComparedRow | None) -> None:
         self._set_computing(share)
         if row is not None:
-            self._rows[row.name] = (self._trial, row)
+            self._rows[row.name] = (self._basis, row)
             self._show()
 
     def _set_computing(self, share: float | None) -> None:
@@ -196,10 +193,10 @@ class ComparePanel(Panel):
             self.background.cancel()
             self._set_computing(None)
         else:
-            done = {name for name, (trial, row) in self._rows.items() if trial == self._trial and row.mae is not None}
+            done = {name for name, (basis, row) in self._rows.items() if basis == self._basis and row.mae is not None}
             if all(entry.name in done for entry in self._entries):
                 done = set()
-            self._rows = {n: (trial if n in done else None, row) for n, (trial, row) in self._rows.items()}
+            self._rows = {n: (basis if n in done else None, row) for n, (basis, row) in self._rows.items()}
             self._compute()
 
     def _toggle(self, name: str, on: bool) -> None:
@@ -220,7 +217,7 @@ class ComparePanel(Panel):
 
     def _show(self) -> None:
         self._stale = False
-        entries, trial, present = self._entries, self._trial, self.session.choices.preset
+        entries, basis, present = self._entries, self._basis, self.session.choices.preset
         chosen = {entry.name for entry in entries}
         for name, action in self._actions.items():
             with QSignalBlocker(action):
@@ -228,31 +225,18 @@ class ComparePanel(Panel):
         shown = []
         for entry in entries:
             computed, row = self._rows.get(entry.name, (None, ComparedRow.of(entry)))
-            shown.append((row, computed == trial))
+            shown.append((row, computed == basis))
         self.table.show_rows([_row(row, fresh, row.name == present) for row, fresh in shown])
         count, fresh = len(entries), sum(of_this for _, of_this in shown)
         done = f"{fresh} of {count}" if fresh < count else f"{count}"
         former = any(row.mae is not None and not of_this for row, of_this in shown)
         self._words.setText(
-            f"{done} preset{'s' if count != 1 else ''} on this pluck, {trial.seconds:g} s"
+            f"{done} preset{'s' if count != 1 else ''} on this pluck, {basis.seconds:g} s"
             + ("; grey: an earlier pluck" if former else "")
         )
 
 
 def _row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
     """`fresh`: of the present pluck; `present`: of the chosen preset."""
-    values = (
-        row.title,
-        row.mae,
-        row.past_mae,
-        row.null_db,
-        row.real_time,
-        row.parameters,
-        row.mse,
-        row.past_mse,
-        row.rate_hz,
-        row.model,
-        row.note,
-    )
     tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
-    return TableRow(row.name, values, grey=not fresh, bold=present, tip=tip)
+    return TableRow(row.name, values_of(row, COLUMNS), grey=not fresh, bold=present, tip=tip)

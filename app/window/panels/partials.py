@@ -10,7 +10,7 @@ from app.rendering import Take
 from app.session.choices import Session
 from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
-from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table
+from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 from engine.metrics import ErrorSums
 from engine.partials import LEAST_DECAY_DB
@@ -37,17 +37,18 @@ def hundredths(value: float) -> str:
     return signed(value, 2)
 
 
+_OF_MODEL = "of the model relative to the truth"
 _NO_T60 = f"none where it falls by less than {LEAST_DECAY_DB:g} dB in the window"
 COLUMNS = (
-    Column("Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
-    Column("Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
-    Column("Model, Hz", "Frequency of the model in Hz", hertz, "model"),
-    Column("Cents", "Frequency of the model relative to the truth, in cents (hundredths of a semitone)", hundredths),
-    Column("Level, dB", "Level of the model relative to the truth, in dB", hundredths),
-    Column("T60, %", "Error of the model's decay time T60, in %", signed),
-    Column("Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
-    Column("Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
-    Column("Note", "Why a row is grey"),
+    Column("mode", "Mode", "Mode number: the number of half waves along the string", lambda n: f"{n}"),
+    Column("truth_hz", "Truth, Hz", "Frequency of the truth in Hz, its mean over the window", hertz, "truth"),
+    Column("model_hz", "Model, Hz", "Frequency of the model in Hz", hertz, "model"),
+    Column("cents", "Cents", f"Frequency {_OF_MODEL}, in cents (hundredths of a semitone)", hundredths),
+    Column("level_db", "Level, dB", f"Level {_OF_MODEL}, in dB", hundredths),
+    Column("t60_error_percent", "T60, %", "Error of the model's decay time T60, in %", signed),
+    Column("truth_t60_s", "Truth T60", f"Time in s in which the truth decays by 60 dB; {_NO_T60}", seconds, "truth"),
+    Column("model_t60_s", "Model T60", f"Time in s in which the model decays by 60 dB; {_NO_T60}", seconds, "model"),
+    Column("note", "Note", "Why a row is grey"),
 )
 
 
@@ -121,25 +122,12 @@ class PartialsPanel(Panel):
         window = str(self._window.currentData())
         rows = self._rows.get(window, [])
         self.table.set_dimmed(False)
-        self.table.show_rows([_row(row) for row in rows])
+        self.table.show_rows(
+            [TableRow(row.mode, values_of(row, COLUMNS), grey=bool(row.note), tip=row.note) for row in rows]
+        )
         self._show_solo()
         short = f"{WINDOWS[window].capitalize()}: too short to measure; increase the duration"
         self._words.setText("" if rows else short)
 
     def _show_solo(self) -> None:
         self.table.choose(self.session.choices.solo or None)
-
-
-def _row(row: PartialRow) -> TableRow:
-    values = (
-        row.mode,
-        row.truth_hz,
-        row.model_hz,
-        row.cents,
-        row.level_db,
-        row.t60_error_percent,
-        row.truth_t60_s,
-        row.model_t60_s,
-        row.note,
-    )
-    return TableRow(row.mode, values, grey=bool(row.note), tip=row.note)

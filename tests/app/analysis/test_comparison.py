@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from app.analysis import comparison
-from app.analysis.comparison import ComparedRow, Trial, compare, same_string
+from app.analysis.comparison import Basis, ComparedRow, compare, same_string
 from app.presets.library import PresetEntry, list_presets
 from app.shared.worker import Cancelled
 from engine.pluck import Pluck
@@ -18,7 +18,7 @@ from engine.presets import load_preset, save_preset
 from engine.resonators.sine_transform import listening_weights
 from engine.sources import ModelSource, TruthSource, project
 
-TRIAL = Trial(Pluck(0.35, 4.0), 0.3, 0.37)
+TRIAL = Basis(Pluck(0.35, 4.0), 0.3, 0.37)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.audio.impulse_file import ImpulseError, read_impulse
+from app.audio.impulse_file import ImpulseError, cut_words, read_impulse
 from engine import bounds
 
 SAMPLES = 0.5 * np.random.default_rng(0).uniform(-1, 1, (3000, 2)) * np.geomspace(1, 1e-3, 3000)[:, None]
@@ -46,7 +46,7 @@ def broken(name: str, folder: Path) -> Path:
         case "ogg":
             return written(folder / "body.ogg", SAMPLES, subtype="VORBIS")
         case "long":
-            return written(path, np.tile(SAMPLES, (49, 1)))
+            return written(path, np.tile(SAMPLES, (500, 1)))  # 31.25 s
         case "channels":
             return written(path, SAMPLES[:, :1].repeat(3, 1))
         case "rate":
@@ -70,7 +70,7 @@ def broken(name: str, folder: Path) -> Path:
         ("folder", "no file"),
         ("text", "no sound file"),
         ("ogg", "save it as WAV"),
-        ("long", "its length"),
+        ("long", r"its length must lie in 0 … 30 s, not 31\.25\).*of up to 30 s"),
         ("channels", "its channels"),
         ("rate", "its rate"),
         ("silent", "silent"),
@@ -84,3 +84,19 @@ def test_what_cannot_be_used_is_told_with_its_name(tmp_path: Path, name: str, to
     with pytest.raises(ImpulseError, match=told) as error:
         read_impulse(path)
     assert str(error.value).startswith(f"{path}: ") and str(error.value).isprintable()
+
+
+@pytest.mark.parametrize("seconds", [3.0, 3.0 + 1 / 48_000, 6.97])
+def test_of_a_long_response_the_beginning_is_used_and_fades_out(tmp_path: Path, seconds: float) -> None:
+    frames, most = round(48_000 * seconds), 3 * 48_000
+    samples = np.random.default_rng(0).uniform(-0.5, 0.5, (frames, 2))
+    path = written(tmp_path / "hall.wav", samples)
+    found, words = read_impulse(path), cut_words(path)
+    assert len(found.samples) == most
+    whole = most if frames == most else round(2.7 * 48_000)
+    np.testing.assert_allclose(found.samples[:whole], samples[:whole], atol=1e-7)
+    if frames == most:
+        assert words == ""
+        return
+    assert np.abs(found.samples[-100:]).max() < 1e-4, "no click at its end"
+    assert words == f"hall.wav lasts {seconds:.2f} s: its first 3 s, faded out, are the body."

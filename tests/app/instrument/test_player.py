@@ -266,6 +266,29 @@ def test_events_give_the_same_samples_for_ever(patch: Patch, preset: Preset) -> 
     np.testing.assert_array_equal(play(patch, preset, 1.5, *BUSY), play(patch, preset, 1.5, *BUSY))
 
 
+@pytest.mark.parametrize("source", ["model", "truth"])
+def test_notes_of_a_file_begin_at_their_frames(patch: Patch, preset: Preset, source: str) -> None:
+    """Wherever in a quantum; also of a string that is struck again."""
+    frames = (0, 4_801, 9_640, 14_463)
+    alone = play(patch, preset, 0.5, (0.0, NoteOn(57, 90)), source=source)
+    keys = [57, 57, 45, 57]
+    sound = play(
+        patch,
+        preset,
+        0.5,
+        *((frame / RATE_HZ, NoteOn(key, 90)) for frame, key in zip(frames, keys, strict=True)),
+        source=source,
+    )
+    settled = round(PLUCK_STOPS_S * RATE_HZ) + QUANTUM  # the one before has faded
+    np.testing.assert_array_equal(sound[: frames[1] - QUANTUM], alone[: frames[1] - QUANTUM])
+    second = slice(frames[1] + settled, frames[2])
+    np.testing.assert_allclose(sound[second], alone[settled : frames[2] - frames[1]], atol=1e-6)
+    third = play(patch, preset, 0.5, (0.0, NoteOn(45, 90)), source=source)
+    both = sound[frames[2] : frames[3] - QUANTUM]
+    expected = alone[frames[2] - frames[1] :][: len(both)] + third[: len(both)]
+    np.testing.assert_allclose(both, expected, atol=1e-6)
+
+
 def test_in_guitar_mode_a_channel_is_one_string(guitar: Patch, preset: Preset) -> None:
     struck: list[Struck] = []
     player = Player(guitar, preset, RATE_HZ, struck.append)

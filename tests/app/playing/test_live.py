@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from app.instrument.events import (
     PatchTurned,
     TimedEvent,
 )
+from app.instrument.loudness import peak_db
 from app.instrument.player import Player, Struck
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
@@ -65,6 +66,97 @@ def live(notes: Notes, patch: Patch, wait: Wait, wishes: list[Effects | None]) -
     made.set_patch(patch, EAR)
     wait(lambda: made.ready)
     yield made
+
+
+def settle(notes: Notes, wait: Wait) -> None:
+    """Until what was asked for is done."""
+    done = Event()
+    notes.in_background(done.set)
+    wait(done.is_set)
+
+
+def test_a_key_waits_for_no_knob(live: Live, patch: Patch, wait: Wait, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the loudness of the turned patch takes: here it takes until the key has sounded."""
+    made = live.handle(NoteOn(45, 60))
+    assert made is not None
+    struck, _ = made
+    before = struck.parameters
+    begun, held = Event(), Event()
+
+    def slow(*args: Any) -> float:
+        begun.set()
+        held.wait(30)
+        return peak_db(*args)
+
+    monkeypatch.setattr("app.instrument.loud_keys.peak_db", slow)
+    turned, played = patch.with_value("knobs.stiffness", 3.0), list[object]()
+    knob = Thread(target=live.set_patch, args=(turned, EAR))
+    key = Thread(target=lambda: played.append(live.handle(NoteOn(52, 60))))
+    knob.start()
+    wait(begun.is_set)
+    key.start()
+    key.join(5)
+    try:
+        assert not key.is_alive()
+        assert played != [None]
+    finally:
+        held.set()
+        knob.join()
+        key.join()
+    wait(lambda: struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
+
+
+def test_the_last_of_many_turns_counts(live: Live, patch: Patch, notes: Notes, wait: Wait) -> None:
+    made = live.handle(NoteOn(45, 60))
+    assert made is not None
+    struck, _ = made
+    before = struck.parameters
+    live.begin_recording()
+    for stiffness in np.linspace(1.1, 3.0, 20):
+        live.set_patch(patch.with_value("knobs.stiffness", float(stiffness)), EAR)
+    live.listen(Ear((0.1,)))
+    made = live.handle(NoteOn(50, 60))  # at once
+    assert made is not None
+    assert made[0].ear.points == (0.1,)
+    assert made[0].key.patch.knobs.stiffness == 3.0
+    settle(notes, wait)
+    assert struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
+    exact = live._player
+    assert exact is not None
+    fresh = Player(exact.patch, exact.preset, 48_000, lambda struck: None, ear=exact.ear)
+    assert exact.gain_of(struck) == fresh.gain_of(struck) != made[0].gain
+    turned = [each.event.patch for each in live.end_recording() if isinstance(each.event, PatchTurned)]
+    assert (turned[-1].knobs.stiffness, turned[-1].pickup.points) == (3.0, (0.1,)), "it is recorded as it was played"
+
+
+def test_another_patch_is_played_at_once(live: Live, patch: Patch) -> None:
+    """As by a note that is played to hear it."""
+    other = read_patch(PATCHES / "classical_guitar.json")
+    assert other.preset == patch.preset
+    live.set_patch(other, EAR)
+    made = live.handle(NoteOn(45, 60))
+    assert made is not None
+    live.set_patch(patch, EAR)
+    again = live.handle(NoteOn(45, 60))
+    assert again is not None
+    assert made[0].key.string.parameters != again[0].key.string.parameters
+
+
+def test_an_impossible_tuning_is_reported_and_what_was_played_stays(
+    live: Live, patch: Patch, notes: Notes, wait: Wait
+) -> None:
+    made = live.handle(NoteOn(45, 60))
+    assert made is not None
+    tuning = patch.tuning.model_copy(update={"scale": "no scale"})  # as no patch of a file could have it
+    live.set_patch(patch.model_copy(update={"tuning": tuning}), EAR)
+    wait(lambda: bool(live.told))  # type: ignore[attr-defined]
+    live.listen(Ear((0.1,)))
+    settle(notes, wait)
+    again = live.handle(NoteOn(45, 60))
+    assert again is not None
+    assert again[0].parameters == made[0].parameters
+    assert again[0].ear == Ear((0.1,))
+    assert len(live.told) == 1  # type: ignore[attr-defined]
 
 
 def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(
@@ -128,7 +220,7 @@ def test_pedal_bend_and_another_patch_reach_strings_that_ring(
     assert struck.damped
     stiff = patch.with_value("knobs.stiffness", 3.0).model_copy(update={"body": Body(name="guitar", mix=0.5)})
     live.set_patch(stiff, EAR)
-    assert struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
+    wait(lambda: struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
 
     def hears_guitar() -> bool:
         """The room that the patch begins with, which has no body, may come late."""
@@ -175,7 +267,7 @@ def test_a_recording_begins_and_ends_as_the_hands_are(live: Live) -> None:
     assert played[45].parameters.tension_n > played[45].key.string.parameters.tension_n
 
 
-def test_a_soloed_mode_is_as_loud_as_in_the_note(live: Live, sound: Any, notes: Notes) -> None:
+def test_a_soloed_mode_is_as_loud_as_in_the_note(live: Live, sound: Any, notes: Notes, wait: Wait) -> None:
     """So that the other modes do not thunder when the solo ends, and a pluck by hand does not either."""
     made = live.handle(NoteOn(45, 100))
     assert made is not None
@@ -189,6 +281,7 @@ def test_a_soloed_mode_is_as_loud_as_in_the_note(live: Live, sound: Any, notes: 
     assert made is not None
     assert made[0].gain <= 1, "nothing is heard of it: no gain would help"
     live.listen(EAR)
+    settle(notes, wait)
     assert live.gain_of(made[0].key.string.parameters) == pytest.approx(whole)
 
 

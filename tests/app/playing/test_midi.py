@@ -41,9 +41,9 @@ def test_notes_choose_presets_where_the_user_wants_that() -> None:
 
 def test_a_taught_controller_goes_through_all_of_its_field() -> None:
     choices = MidiChoices()
-    for number, field in enumerate(TURNED):
+    for number, field in enumerate(TURNED, 16):
         choices = choices.learned(field, number)
-    for number, field in enumerate(TURNED):
+    for number, field in enumerate(TURNED, 16):
         for value, expected in zip((0, 127), OF_CHOICES[field].limits, strict=True):
             meaning = meaning_of(Controller(number, value), choices, REACH, PRESETS)
             assert meaning == Meaning({field: pytest.approx(expected)})

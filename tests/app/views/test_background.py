@@ -103,6 +103,21 @@ def test_the_end_of_a_job_that_is_stopped_is_reported(qtbot: QtBot, background: 
     assert not background.busy
 
 
+def test_a_job_can_be_finished_before_the_end(qtbot: QtBot, background: Background) -> None:
+    under_way, done = threading.Event(), []
+
+    def work(job: Job) -> None:
+        under_way.set()
+        for _ in range(50):
+            job.report(0.1)
+        done.append(True)
+
+    background.start(work)
+    assert under_way.wait(10)
+    background.close(None, cancel=False)
+    assert done == [True]
+
+
 @pytest.mark.parametrize(
     ("error", "message", "has_details"),
     [(PresetError("x: broken"), "x: broken", False), (ZeroDivisionError("none"), "Computing failed: none", True)],

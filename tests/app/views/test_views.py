@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.analysis.string_frame import StringFrame
+from app.analysis.moment import StringFrame
 from app.presets.library import Library
 from app.session.choices import Session
 from app.shared.parameters import PARAMETERS

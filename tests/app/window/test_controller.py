@@ -58,7 +58,7 @@ def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller)
     x = round(MARGIN_X + 0.6 * (string.width() - 2 * MARGIN_X))
     qtbot.mousePress(string, LEFT, pos=QPoint(x, string.height() // 2))
     qtbot.mouseMove(string, QPoint(x, string.height() // 4))
-    assert string.is_dragging_pluck
+    assert string._drag == "pluck"
     assert not controller.performance.playing
     qtbot.mouseRelease(string, LEFT, pos=QPoint(x, string.height() // 4))
     assert controller.session.choices.position == pytest.approx(0.6, abs=0.01)

@@ -171,8 +171,8 @@ def came() -> list[Event]:
 
 @pytest.fixture
 def heard(qtbot: QtBot, backend: FakeBackend, played: Played, came: list[Event]) -> Iterator[MidiControl]:
-    """An input through which a patch is played, with the dialog open; the pedal is assigned."""
-    choices = MidiChoices(port="Keys:Keys 9:0", controllers={"width": 64})
+    """An input through which a patch is played, with the dialog open; a controller is assigned."""
+    choices = MidiChoices(port="Keys:Keys 9:0", controllers={"width": 74})
     midi = control(choices, ["a"], played, lambda: backend, lambda event: came.append(event) is None)
     window = QWidget()
     qtbot.addWidget(window)
@@ -207,19 +207,55 @@ def test_what_an_input_holds_is_let_go_with_it(
     assert came == let_go([2])
     QCoreApplication.processEvents()
     assert performed == []
-    assert heard.choices.controllers == {"width": 64}
+    assert heard.choices.controllers == {"width": 74}
 
 
-def test_a_pedal_that_is_assigned_while_it_is_down_does_not_stay_down(
+def test_a_wheel_that_is_assigned_while_it_is_turned_does_not_stay_there(
     qtbot: QtBot, heard: MidiControl, backend: FakeBackend, came: list[Event]
 ) -> None:
-    heard._remember(heard.choices.forgotten("width"))
-    backend.send("control_change", control=64, value=127, channel=1)
-    assert came == [Controller(64, 127, 1)]
+    backend.send("control_change", control=1, value=127, channel=1)
+    assert came == [Controller(1, 127, 1)]
     heard._learn("listen")
     with qtbot.waitSignal(heard.performed):
-        backend.send("control_change", control=64, value=127, channel=1)
+        backend.send("control_change", control=1, value=127, channel=1)
     assert came[1:] == let_go([1])
+
+
+@pytest.mark.parametrize("number", [64, 6, 101, 120, 123])
+def test_a_controller_with_a_function_of_its_own_is_not_learned(
+    qtbot: QtBot, heard: MidiControl, backend: FakeBackend, came: list[Event], number: int
+) -> None:
+    """It is played, the dialog says why it is not assigned, and another one is still waited for."""
+    dialog = heard._dialog
+    assert dialog is not None
+    taught, learn, _ = dialog._rows["listen"]
+    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
+    backend.send("control_change", control=number, value=127, channel=1)
+    qtbot.waitUntil(lambda: f"Controller {number} " in dialog._problem.text())
+    assert "move another" in dialog._problem.text()
+    assert dialog._problem.isVisible()
+    assert came == [Controller(number, 127, 1)]
+    assert heard.choices.controllers == {"width": 74}
+    assert learn.isChecked()
+    with qtbot.waitSignal(heard.performed):
+        backend.send("control_change", control=20, value=127, channel=1)
+    assert heard.choices.controllers == {"width": 74, "listen": 20}
+    assert taught.text() == "Controller 20"
+    assert dialog._problem.text() == ""
+    backend.send("control_change", control=number, value=0, channel=1)
+    assert came[-1] == Controller(number, 0, 1)
+
+
+def test_a_pedal_that_an_earlier_version_assigned_is_the_pedal(
+    backend: FakeBackend, played: Played, came: list[Event]
+) -> None:
+    choices = MidiChoices.model_validate_json('{"port": "Keys:Keys 9:0", "controllers": {"width": 64, "listen": 7}}')
+    midi = control(choices, ["a"], played, lambda: backend, lambda event: came.append(event) is None)
+    midi.start()
+    backend.send("control_change", control=64, value=127, channel=0)
+    assert came == [Controller(64, 127, 0)]
+    assert midi.choices.controllers == {"listen": 7}
+    midi.close()
 
 
 def test_controllers_reach_the_windows_thread(

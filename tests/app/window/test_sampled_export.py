@@ -13,10 +13,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.export.files import ExportCancelled
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.patches.library import find_patch
 from app.session.instrument import choices_of
+from app.views.dialogs.sampled_dialog import SampledDialog
 from app.window.controller import Controller
 from app.window.settings import load_settings
 from engine.presets.finding import SHIPPED
@@ -70,6 +72,60 @@ def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Con
     plan = SampledPlan(find_patch("Concert harp").patch, (60, 61), layers=1)
     assert [path.stem for path in samples] == [zone.stem for zone in plan.zones]
     assert soundfile.info(samples[0]).frames == 9_600
+
+
+@pytest.fixture
+def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch) -> SampledDialog:
+    """Its dialog, which had the focus when the export began; it ends when it is cancelled."""
+    begun = threading.Event()
+
+    def export(plan, out, render, progress, cancelled):
+        begun.set()
+        while not cancelled():
+            time.sleep(0.01)
+        raise ExportCancelled
+
+    monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
+    qtbot.waitUntil(lambda: patched.performance.live.ready)
+    dialog = open_dialog(qtbot, patched)
+    qtbot.waitUntil(dialog.isActiveWindow)
+    qtbot.mouseClick(dialog.save, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(begun.is_set)
+    return dialog
+
+
+@pytest.mark.parametrize("in_front", ["window", "dialog"])
+def test_keys_play_and_shortcuts_work_while_it_runs(
+    qtbot: QtBot, patched: Controller, exporting: SampledDialog, in_front: str
+) -> None:
+    """Without a click, and after the dialog was moved by its title bar, which gives it the focus."""
+    qtbot.waitUntil(patched.window.isActiveWindow)
+    if in_front == "dialog":
+        exporting.activateWindow()
+        qtbot.waitUntil(exporting.isActiveWindow)
+    active = QApplication.activeWindow()
+    assert active is not None
+    focused = active.focusWidget() or active
+    qtbot.keyPress(focused, Qt.Key.Key_A)
+    assert patched.performance.live.sounding()
+    qtbot.keyRelease(focused, Qt.Key.Key_A)
+    looped = patched.session.choices.loop
+    qtbot.keyClick(focused, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
+    assert patched.session.choices.loop != looped
+    qtbot.keyClick(focused, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    assert not patched.window.isVisible()
+
+
+def test_escape_in_the_dialog_cancels(qtbot: QtBot, patched: Controller, exporting: SampledDialog) -> None:
+    exporting.activateWindow()
+    qtbot.waitUntil(exporting.isActiveWindow)
+    patched.session.update(solo=2)
+    qtbot.keyClick(exporting.focusWidget() or exporting, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: "Cancelled" in exporting.state.text())
+    assert patched.session.choices.solo == 2
+    looped = patched.session.choices.loop
+    qtbot.keyClick(exporting.form, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
+    assert patched.session.choices.loop == looped  # its own keys again
 
 
 def test_what_was_chosen_is_remembered(qtbot: QtBot, patched: Controller, tmp_path: Path) -> None:

@@ -227,6 +227,13 @@ def test_the_listing_traces_every_run() -> None:
     assert "## Runs" not in as_markdown([known])
 
 
+def test_the_listing_ends_with_what_rows_say_of_themselves() -> None:
+    said = [row(cell, mse=0.1, commit="abc1234", message="of unpublished code") for cell in seeds(2)]
+    assert as_markdown(said, listing=True).endswith("\n\n- abc1234 (2 runs): of unpublished code.\n")
+    assert "unpublished" not in as_markdown(said)
+    assert as_markdown([row(mse=0.1)], listing=True).endswith("|\n")
+
+
 def test_rows_of_a_trial_or_of_an_older_recipe_are_no_figures() -> None:
     a, b = seeds(2)
     told = as_markdown(

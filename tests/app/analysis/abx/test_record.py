@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from app.analysis.abx.record import AbxRecord, as_text, load_record, p_text, save_record, subject_of
+from app.analysis.abx.record import AbxRecord, as_text, load_record, material_of, p_text, save_record
 from app.patches.patch import PhysicalString
 from app.presets.library import list_presets
 from app.session.choices import Choices
@@ -104,13 +104,13 @@ def test_the_smallest_p_values_are_a_bound() -> None:
     assert p_text(2.0**-25) == "p < 0.001"
 
 
-def test_the_chosen_pluck_and_string_are_the_subjects(preset_folder: Path) -> None:
+def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
     entry = list_presets(preset_folder)[0][0]
     own = StringParameters()
     string = PhysicalString(**{name: getattr(own, name) for name in PhysicalString.model_fields})
     for stereo, chosen in ((False, None), (True, string)):
         choices = Choices(preset=entry.name, position=0.3, string=chosen, stereo=stereo)
-        pluck = subject_of(entry, choices).pluck
+        pluck = material_of(entry, choices).pluck
         assert pluck["position"] == 0.3
         assert pluck["string"] == (chosen and chosen.model_dump(mode="json"))
         assert ("listen_right" in pluck) == stereo

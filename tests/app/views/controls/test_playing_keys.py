@@ -8,7 +8,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.views.controls.playing_keys import PlayingKeys
+from app.views.controls.playing_keys import X11, PlayingKeys
 from app.views.instrument.patch_browser import PatchBrowser
 
 
@@ -83,7 +83,7 @@ def native(kind: QEvent.Type, time_ms: int) -> QKeyEvent:
 
 
 def test_a_repetition_that_looks_like_a_release_and_a_press_is_neither(qtbot: QtBot, window: QWidget) -> None:
-    keys, told = PlayingKeys(window), list[str]()
+    keys, told = PlayingKeys(window, X11), list[str]()
     keys.pressed.connect(lambda press: told.append("down"))
     keys.released.connect(lambda press: told.append("up"))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
@@ -96,11 +96,33 @@ def test_a_repetition_that_looks_like_a_release_and_a_press_is_neither(qtbot: Qt
     qtbot.waitUntil(lambda: told == ["down", "up"])
 
 
-def test_a_key_struck_fast_again_is_let_go_first(window: QWidget) -> None:
-    keys, told = PlayingKeys(window), list[str]()
+@pytest.mark.parametrize("platform", [X11, "windows"])
+def test_a_key_struck_fast_again_is_let_go_first(window: QWidget, platform: str) -> None:
+    keys, told = PlayingKeys(window, platform), list[str]()
     keys.pressed.connect(lambda press: told.append("down"))
     keys.released.connect(lambda press: told.append("up"))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
     QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_030))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_042))
     assert told == ["down", "up", "down"]
+
+
+@pytest.mark.parametrize("platform", ["windows", "cocoa", "wayland"])
+def test_a_release_is_not_held_back_where_qt_marks_repetitions(window: QWidget, platform: str) -> None:
+    keys, told = PlayingKeys(window, platform), list[str]()
+    keys.pressed.connect(lambda press: told.append("down"))
+    keys.released.connect(lambda press: told.append("up"))
+    QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
+    QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_500))
+    assert told == ["down", "up"]
+
+
+def test_keys_let_go_together_are_all_released(qtbot: QtBot, window: QWidget) -> None:
+    keys, told = PlayingKeys(window, X11), list[str]()
+    keys.released.connect(lambda press: told.append(press.letter))
+    for key, code in ((Qt.Key.Key_S, 39), (Qt.Key.Key_D, 40)):
+        for kind, time_ms in ((QEvent.Type.KeyPress, 1_000), (QEvent.Type.KeyRelease, 1_500)):
+            event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, code, 0, 0, chr(key))
+            event.setTimestamp(time_ms)
+            QApplication.sendEvent(window, event)
+    qtbot.waitUntil(lambda: sorted(told) == ["D", "S"])

@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.analysis.abx.record import AbxRecord, Candidate, Subject, load_record
+from app.analysis.abx.record import AbxRecord, Candidate, Material, load_record
 from app.analysis.abx.trials import AbxChoices, draw_order
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
@@ -62,7 +62,7 @@ def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
         choices = AbxChoices(trials=trials, folder=str(tmp_path / "records"))
         rendering = rendered or done(sounds_of())
         dialog = AbxDialog(
-            through, Subject(CANDIDATES, PLUCK, 0.0), choices, lambda rate_hz: rendering, seed=lambda: seed
+            through, Material(CANDIDATES, PLUCK, 0.0), choices, lambda rate_hz: rendering, seed=lambda: seed
         )
         qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
         with qtbot.waitExposed(dialog):
@@ -239,7 +239,7 @@ def test_at_another_rate_of_the_device_it_is_rendered_anew(qtbot: QtBot, sound: 
         asked.append(rate_hz)
         return done(sounds_of())
 
-    dialog = AbxDialog(sound, Subject(CANDIDATES, PLUCK, 0.0), AbxChoices(folder=str(tmp_path)), render)
+    dialog = AbxDialog(sound, Material(CANDIDATES, PLUCK, 0.0), AbxChoices(folder=str(tmp_path)), render)
     qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
     dialog.open()
     for rate_hz, channels in ((44_100, 2), (44_100, 1)):

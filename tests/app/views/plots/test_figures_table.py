@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from app.views.plots.figures_table import Column, FiguresTable, TableRow
 
-COLUMNS = (Column("name", "a name"), Column("level", "in dB", lambda v: f"{v:.1f}"))
+COLUMNS = (Column("name", "name", "a name"), Column("level", "level", "in dB", lambda v: f"{v:.1f}"))
 
 
 @pytest.fixture

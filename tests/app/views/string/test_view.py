@@ -9,7 +9,7 @@ from PySide6.QtGui import QImage, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.analysis.string_frame import StringFrame
+from app.analysis.moment import StringFrame
 from app.views.string.axes import StringAxes
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
