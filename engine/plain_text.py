@@ -1,4 +1,4 @@
-"""Text that came from a file, made fit for one line of a terminal or a label."""
+"""Text made fit for one line of a terminal or a label: what came from a file, and durations in words."""
 
 from __future__ import annotations
 
@@ -24,3 +24,11 @@ def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
         return line
     end = most // 3
     return f"{line[: most - end - 3].rstrip()} … {line[-end:].lstrip()}"
+
+
+def duration(seconds: float) -> str:
+    """A duration in words, such as "8.2 s", "3 min 20 s", "2 h 5 min"."""
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

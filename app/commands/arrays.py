@@ -10,9 +10,9 @@ import torch
 from numpy.lib import format as npy
 from torch import Tensor
 
-from app.commands.console import Failure, Report
-from app.shared.whole_file import whole_file
 from engine.plain_text import one_line
+from engine.result_file import whole_file
+from training.cli.console import Failure, Report
 
 MOST_NUMBERS = 8 * 2**20  # of a file of displacements: 64 MiB in double precision
 LARGEST_RESULT_BYTES = 4 * 2**30

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands import arguments
-from app.commands.console import Failure, progress, say
 from app.commands.render import (
     BitsOption,
     DecayDb,
@@ -23,6 +21,8 @@ from app.commands.render import (
 )
 from engine.plain_text import one_line
 from engine.pluck import DEFAULT_LISTEN
+from training.cli import arguments
+from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
     from app.export.sound import Source
@@ -71,7 +71,7 @@ def batch(
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
     from app.export.batch import INDEX, BatchPlan, NamedString, run_batch
     from app.export.wav import WavSettings
-    from app.presets.folders import usable_files
+    from engine.folders import usable_files
     from engine.presets import find_preset, find_string, read_string
 
     files = usable_files()

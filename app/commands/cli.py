@@ -16,26 +16,11 @@ from typing import Annotated
 
 import typer
 
-from app.commands import (
-    abx,
-    batch,
-    evaluation,
-    family,
-    faust,
-    info,
-    listing,
-    motion,
-    patches,
-    play,
-    render,
-    sampled,
-    sweep,
-    tables,
-    training,
-)
-from app.commands.console import say, use_any_output
+from app.commands import abx, batch, faust, info, listing, motion, patches, play, render, sampled
 from app.shared.thread_priority import wait_asleep
-from app.shared.whole_file import explain
+from engine.result_file import explain
+from training.cli import evaluation, family, sweep, tables, training
+from training.cli.console import say, use_any_output
 
 DEBUG_VARIABLE = "LEARNED_STRINGS_DEBUG"
 NAME = "learned-strings"

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from app.commands.console import Failure, say
 from engine.plain_text import one_line
+from training.cli.console import Failure, say
 
 
 def faust(
@@ -19,10 +19,10 @@ def faust(
     ] = None,
 ) -> None:
     """Write a patch's quiet string as a Faust program: a bank of its modes, for plug-ins, Max, the web and more."""
-    from app.commands.arguments import open_preset
     from app.export.faust import write_faust
     from app.patches.library import PatchError, find_patch
-    from app.shared.whole_file import WriteError
+    from engine.result_file import WriteError
+    from training.cli.arguments import open_preset
 
     try:
         chosen = find_patch(patch).patch

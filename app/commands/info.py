@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from app.commands.arguments import Json
-from app.commands.console import print_json, say
 from engine.plain_text import one_line
+from training.cli.arguments import Json
+from training.cli.console import print_json, say
 
 
 def info(
@@ -21,7 +21,7 @@ def info(
     `render --recipe FILE.wav` renders it again.
     """
     from app.export.recipe import RecipeError, preset_of, read_recipe
-    from app.presets.folders import usable_files
+    from engine.folders import usable_files
 
     recipe = read_recipe(file)
     facts = recipe.model_dump(mode="json")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from app.commands.arguments import Json
-from app.commands.console import print_json, print_table, say
+from training.cli.arguments import Json
+from training.cli.console import print_json, print_table, say
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,7 +31,7 @@ PRESET_FIELDS = (
 
 def presets(json: Json = False) -> None:
     """List the presets, shipped and your own. Files that cannot be used are reported on standard error."""
-    from app.presets.folders import usable_files
+    from engine.folders import usable_files
     from engine.presets import PresetError
     from training.heard_file import read_heard
 
@@ -73,8 +73,8 @@ def models(json: Json = False) -> None:
 
 
 def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
-    from app.presets.heard_words import heard_word
     from engine.presets import described_parameters, preset_digest, read_info
+    from training.heard_words import heard_word
 
     info = read_info(path)
     values = (

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from app.commands import arguments
-from app.commands.console import Failure, number, print_json, print_table, progress, say
 from engine.plain_text import one_line
+from training.cli import arguments
+from training.cli.console import Failure, number, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.commands.arguments import Json
-from app.commands.console import print_json, print_table, say
+from training.cli.arguments import Json
+from training.cli.console import print_json, print_table, say
 
 FIELDS = ("name", "title", "category", "own", "description", "file")
 

@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 
 import typer
 
-from app.commands import arguments
-from app.commands.console import Failure, progress, say
 from app.commands.render import SILENT_DB, BitsOption
 from engine.plain_text import one_line
+from training.cli import arguments
+from training.cli.console import Failure, progress, say
 
 DEFAULT_RATE_HZ = 48_000
 
@@ -57,7 +57,7 @@ def play(
     from app.export.played import write_played
     from app.export.wav import WavSettings
     from app.instrument.offline import LONGEST_TAIL_S
-    from app.shared.whole_file import WriteError
+    from engine.result_file import WriteError
 
     began_s = time.monotonic()
     whole_s = seconds if seconds is not None else song.events[-1].time_s + LONGEST_TAIL_S / 10

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from app.commands import arguments
-from app.commands.console import Failure, progress, say
 from app.shared.vocabulary import Bits, Pickup, Source
 from engine.pluck import DEFAULT_LISTEN
+from training.cli import arguments
+from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
     from app.export.files import SoundRequest, WavReport
@@ -152,8 +152,8 @@ def _given(name: str, value: Value | None) -> Value:
 def _render_again(file: Path, out: Path | None) -> None:
     from app.export.files import default_file_name
     from app.export.recipe import changed_preset_notice, preset_of, read_recipe, request_of
-    from app.presets.folders import usable_files
     from app.shared.version import program_version
+    from engine.folders import usable_files
     from engine.presets import load_preset
 
     recipe = read_recipe(file)

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 import typer
 
-from app.commands.console import Failure, progress, say
 from app.shared.key_names import key_named
 from engine.plain_text import one_line
+from training.cli.console import Failure, progress, say
 
 ASKED_ABOVE_BYTES = 2**30  # refused without --yes
 
@@ -54,7 +54,7 @@ def sampled(
     from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
-    from app.presets.folders import usable_files
+    from engine.folders import usable_files
     from engine.presets import find_preset, preset_digest
 
     soundfont = out.suffix.lower() == ".sf2"

@@ -12,9 +12,9 @@ from typing import Literal, get_args
 from filelock import FileLock
 
 from app.export.files import ExportError
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
 from engine.read_file import read_bounded
+from engine.result_file import WriteError, explain, whole_file
 
 INDEX = "index.csv"
 Status = Literal["written", "kept", "failed"]

@@ -19,9 +19,9 @@ from app.instrument.strings import HIGHEST_HZ
 from app.patches.patch import Body, Patch, Room
 from app.patches.tuning import A4_KEY
 from app.shared.version import PROGRAM, program_version
-from app.shared.whole_file import whole_file
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM
 from engine.resonators.sine_transform import mode_shapes, to_modes
+from engine.result_file import whole_file
 from engine.voices import Ear
 from engine.voices.voice import ATTACK_S
 

@@ -32,9 +32,9 @@ from app.export.sound import (
 from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, write_wav
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import BITS, Bits
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine.pluck import Pluck
 from engine.presets import PresetError
+from engine.result_file import WriteError, explain, whole_file
 
 END_OF_TRAINING = "end of training"  # the name of the marker at the training horizon
 LONGEST_NAME = 150  # characters of a preset's name in a file's name

@@ -14,8 +14,8 @@ from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE
-from app.shared.whole_file import whole_file
 from engine.presets import Preset
+from engine.result_file import whole_file
 
 RATE_HZ = 48_000
 

@@ -16,11 +16,11 @@ from pydantic import TypeAdapter, ValidationError
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.patches.library import file_stem
 from app.patches.patch import LONGEST_NAME, Reference
-from app.presets.folders import user_folder
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine.bounds import LARGEST_IMPULSE_BYTES
 from engine.effects import BODIES, Impulse
+from engine.folders import user_folder
 from engine.read_file import read_bounded
+from engine.result_file import WriteError, explain, whole_file
 
 TITLES = {"guitar": "Guitar"}  # of the engine's bodies
 ENDINGS = (".wav", ".flac", ".aif", ".aiff")

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.patches.patch import CATEGORIES, LONGEST_NAME, Patch, explained
-from app.presets.folders import user_folder
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
+from engine.folders import user_folder
 from engine.plain_text import one_line
 from engine.read_file import read_bounded
+from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"

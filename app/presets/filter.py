@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from app.presets.heard_words import heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import initial_word, model_word, rate_word, string_word
+from training.heard_words import heard_word
 
 Order = Literal["truest", "name", "error"]
 

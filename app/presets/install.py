@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine.bounds import LARGEST_PRESET_BYTES
 from engine.presets import PresetError, load_preset, preset_digest
 from engine.read_file import read_bounded
+from engine.result_file import WriteError, explain, whole_file
 from engine.sources import ModelSource
 
 SUFFIX = ".safetensors"

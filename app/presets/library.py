@@ -9,8 +9,8 @@ from pathlib import Path
 
 from psygnal import Signal
 
-from app.presets.folders import user_folder
 from app.presets.words import model_word
+from engine.folders import user_folder
 from engine.plain_text import one_line
 from engine.presets import (
     SHIPPED,

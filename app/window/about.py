@@ -7,10 +7,10 @@ import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from app.presets.folders import user_folder
 from app.shared.log import log_file
 from app.shared.version import PROGRAM, program_version
 from app.views.dialogs.help_text import CITATION
+from engine.folders import user_folder
 
 LIBRARIES = (
     "torch",

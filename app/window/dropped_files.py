@@ -9,11 +9,11 @@ from typing import Any
 from app.audio.impulse_file import ImpulseError, cut_words
 from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
-from app.presets.folders import user_folder
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
-from app.shared.whole_file import WriteError
+from engine.folders import user_folder
+from engine.result_file import WriteError
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,6 @@ from app.session.choices import Session
 from app.session.instrument import choices_of
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
-from app.shared.whole_file import WriteError
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
 from app.window.instruments import Instruments
@@ -46,6 +45,7 @@ from app.window.recordings import Recordings
 from engine.plain_text import one_line
 from engine.presets import PresetError, load_preset
 from engine.presets.of_string import of_string, read_string
+from engine.result_file import WriteError
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04

@@ -8,11 +8,11 @@ from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 
 from app.presets.filter import PresetFilter
-from app.presets.folders import user_folder
 from app.presets.library import Library
 from app.session.choices import Session
 from app.views.controls.preset_bar import PresetBar
 from app.views.dialogs.preset_browser import PresetBrowser
+from engine.folders import user_folder
 
 
 class PresetDesk(QObject):

@@ -15,9 +15,9 @@ from app.playing.live import Live
 from app.presets.library import Library
 from app.session.choices import Session
 from app.session.slots import other_preset
-from app.shared.whole_file import WriteError
 from app.views.instrument.patch_bar import PatchBar
 from engine.presets import PresetError, load_preset
+from engine.result_file import WriteError
 
 FILES = "WAV and MIDI (*.wav)"
 WAIT_S = 30.0  # for files that are being written, when the window is closed

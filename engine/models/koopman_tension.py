@@ -45,7 +45,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 import torch
@@ -101,21 +100,21 @@ class KoopmanTensionState:
             q and -(v + σq)/ω.
         largest_energy: of Σ ω² |z|², at the present, (batch,).
         largest_stretch: of S, (batch,).
-        step_size: samples of the trained rate in a frame; None before the first.
         nodes: of a frame, int64 (batch,); None before the first.
+        begun: whether a frame was asked for: before it x and y are the mode itself.
     """
 
     x: Tensor
     y: Tensor
     largest_energy: Tensor
     largest_stretch: Tensor
-    step_size: Fraction | None
     nodes: Tensor | None = None
+    begun: bool = False
 
     def rows(self, index: Tensor) -> KoopmanTensionState:
         """Of some of the strings."""
         x, y, energy, stretch, nodes = (getattr(self, name)[index] for name in OF_STRINGS)
-        return KoopmanTensionState(x, y, energy, stretch, self.step_size, nodes)
+        return KoopmanTensionState(x, y, energy, stretch, nodes, self.begun)
 
 
 OF_STRINGS = ("x", "y", "largest_energy", "largest_stretch", "nodes")
@@ -141,7 +140,7 @@ class Step(NamedTuple):
         return torch.stack(self[2:])
 
 
-Run = Callable[[KoopmanTensionState, int], tuple[Tensor, KoopmanTensionState]]  # of strings with so many nodes
+Run = Callable[[KoopmanTensionState, Step], tuple[Tensor, KoopmanTensionState]]  # of strings with so many nodes
 
 
 class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
@@ -219,66 +218,49 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         energy = (omega.square() * (x.square() + y.square())).sum(-1)
         energy = SPARE * (energy + 0.5 * stretch * (self._coupling * q.square()).sum(-1))
         largest_stretch = energy * (self._stretch / omega.square()).amax()
-        return KoopmanTensionState(x, y, energy, largest_stretch, None)
+        return KoopmanTensionState(x, y, energy, largest_stretch)
 
     def advance(
-        self,
-        state: KoopmanTensionState,
-        steps: int,
-        readout: Tensor | None = None,
-        step_size: Fraction | int = 1,
+        self, state: KoopmanTensionState, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, KoopmanTensionState]:
-        """See the contract.
-
-        Args:
-            step_size: samples of the trained rate in a frame, the same throughout a motion.
-
-        Raises:
-            ValueError: a step size that is not above 0, or another than the state's.
-        """
-        return self._advance(state, None, steps, readout, Fraction(step_size))
+        return self._advance(state, None, steps, readout)
 
     def sample(
         self, state: KoopmanTensionState, frames: Tensor, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, KoopmanTensionState]:
         """See the contract. It steps through all frames, which costs little beside their shapes."""
-        return self._advance(state, frames, steps, readout, Fraction(1))
+        return self._advance(state, frames, steps, readout)
 
     def _advance(
-        self, state: KoopmanTensionState, frames: Tensor | None, steps: int, readout: Tensor | None, size: Fraction
+        self, state: KoopmanTensionState, frames: Tensor | None, steps: int, readout: Tensor | None
     ) -> tuple[Tensor, KoopmanTensionState]:
         """The next `steps` frames, or those of them with these numbers."""
-        if not size > 0 or state.step_size not in (None, size):
-            raise ValueError(f"step_size must be above 0 and stay the same, not {size} after {state.step_size}")
-        if state.nodes is None:
-            state = replace(state, nodes=self._nodes(state, size))
-        return self._by_nodes(state, lambda part, nodes: self._frames(part, nodes, frames, steps, readout, size))
+        return self._by_nodes(state, lambda part, step: self._frames(part, step, frames, steps, readout))
 
     def _by_nodes(self, state: KoopmanTensionState, run: Run) -> tuple[Tensor, KoopmanTensionState]:
         """Strings with the same number of nodes go together."""
-        assert state.nodes is not None
-        groups = [(state.nodes == count).nonzero()[:, 0] for count in state.nodes.unique()]
-        ran = [run(state.rows(rows), int(state.nodes[rows[0]])) for rows in groups]
+        nodes = self._nodes(state) if state.nodes is None else state.nodes
+        state, ran = replace(state, nodes=nodes), []
+        groups = [(nodes == count).nonzero()[:, 0] for count in nodes.unique()]
+        for rows in groups:
+            part, step = state.rows(rows), self.step(int(nodes[rows[0]]))
+            ran.append(run(part if state.begun else self._set_out(part, step), step))
         if len(ran) == 1:
             return ran[0]
         place = torch.cat(groups).argsort()
         joined = (torch.cat([getattr(part, name) for _, part in ran])[place] for name in OF_STRINGS)
         x, y, energy, stretch, nodes = joined
-        state = KoopmanTensionState(x, y, energy, stretch, ran[0][1].step_size, nodes)
+        state = KoopmanTensionState(x, y, energy, stretch, nodes, begun=True)
         return torch.cat([out for out, _ in ran])[place], state
 
     def _frames(
         self,
         state: KoopmanTensionState,
-        nodes: int,
+        step: Step,
         frames: Tensor | None,
         steps: int,
         readout: Tensor | None,
-        size: Fraction,
     ) -> tuple[Tensor, KoopmanTensionState]:
-        step = self.step(size, nodes)
-        if state.step_size is None:
-            state = self._set_out(state, step, size)
         to_points = self.shapes if readout is None else self.shapes @ readout.double()
         blocks, done = [], 0
         while done < steps:
@@ -294,37 +276,28 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
     @torch.no_grad()
     def amplitudes(self, state: KoopmanTensionState, steps: int) -> Tensor:
         """Modal amplitudes of the next frames, float64 (batch, steps, modes), without gradients, on the CPU."""
-        size = Fraction(1)
-        if state.nodes is None:
-            state = replace(state, nodes=self._nodes(state, size))
+        return self._by_nodes(state, lambda part, step: self._compiled(part, step, steps))[0]
 
-        def run(part: KoopmanTensionState, nodes: int) -> tuple[Tensor, KoopmanTensionState]:
-            step = self.step(size, nodes)
-            part = part if part.step_size is not None else self._set_out(part, step, size)
-            return self._compiled(part, step, steps)
-
-        return self._by_nodes(state, run)[0]
-
-    def _nodes(self, state: KoopmanTensionState, size: Fraction) -> Tensor:
+    def _nodes(self, state: KoopmanTensionState) -> Tensor:
         """Of a frame, for strings as they set out, (batch,)."""
         c, (_, omega) = self.configuration, self._rates()
         fastest = max(float(omega[0]) / c.node_phase, float(omega[-1]) / c.highest_phase)
         swings = (state.x.square() + self._swing(state).square()).detach()
         kick = (swings @ (self._stretch * self._coupling)).sqrt()
         closest = (kick / HARDEST_KICK).clamp(min=fastest, max=MOST_NODES * fastest)
-        return (float(size) * closest).ceil().clamp(min=1).long()
+        return closest.ceil().clamp(min=1).long()
 
-    def step(self, size: Fraction, nodes: int) -> Step:
-        """From node to node, of frames that are `size` samples of the trained rate apart."""
+    def step(self, nodes: int) -> Step:
+        """From node to node."""
         sigma, omega = self._rates()
-        h = float(size) / nodes
+        h = 1 / nodes
         phase = h * omega
         growth, r, p = self._curves(phase)
         kappa = h * h * self._coupling
         shrunk, angle = torch.exp(-h * sigma), h * self._coupling / omega
         return Step(
             nodes,
-            math.exp(-2 * float(size) * float(sigma.min())),
+            math.exp(-2 * float(sigma.min())),
             shrunk * phase.cos(),
             shrunk * phase.sin(),
             angle * growth,
@@ -347,7 +320,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         sigma, omega = self._rates()
         return -state.y - sigma * state.x / omega
 
-    def _set_out(self, state: KoopmanTensionState, step: Step, size: Fraction) -> KoopmanTensionState:
+    def _set_out(self, state: KoopmanTensionState, step: Step) -> KoopmanTensionState:
         """The coordinates in which kicks act, half a kick before the first node."""
         q, swing, (_, omega) = state.x, self._swing(state), self._rates()
         share = step.seen * (self._stretch * q.square()).sum(-1, keepdim=True)
@@ -359,7 +332,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         first = torch.minimum((step.stretch * x.square()).sum(-1, keepdim=True), state.largest_stretch[:, None])
         second = (step.second_stretch * x.square()).sum(-1, keepdim=True)
         kick = step.kick * first * (1 - 2 * second) - step.second_kick * first.square()
-        return replace(state, x=x, y=state.y + (swing - lifted) - 0.5 * kick * x, step_size=size)
+        return replace(state, x=x, y=state.y + (swing - lifted) - 0.5 * kick * x, begun=True)
 
     def _compiled(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Tensor, KoopmanTensionState]:
         from engine.kernels.tension import advance  # Numba only when it is needed

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from app.commands.arguments import Json
 from app.commands.cli import carry_out
-from app.commands.console import Failure, progress
 from tests.bench.printing import show
+from training.cli.arguments import Json
+from training.cli.console import Failure, progress
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
@@ -100,9 +100,9 @@ def tune(
 
     Also the level of a chord, and the model's error against the truth while a key is bent and plucked again.
     """
-    from app.commands.arguments import open_preset
     from app.patches.library import list_patches
     from tests.bench.tune import measure
+    from training.cli.arguments import open_preset
 
     chosen = [_patch(name) for name in patch] if patch else [entry.patch for entry in list_patches()[0]]
     presets = {name: open_preset(name) for name in {each.preset for each in chosen}}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from app.commands.console import number, print_json, print_table
+from training.cli.console import number, print_json, print_table
 
 MOST_COLUMNS = 12  # a list of records with more fields is printed with a row per field
 MOST_VALUES = 8  # of a list in one cell

@@ -20,7 +20,6 @@ import torch
 from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
-from app.commands.console import Failure
 from app.export.files import ExportError, SoundRequest
 from app.export.recipe import Recipe, RecipeError, read_recipe, request_of
 from app.export.sampled.store import SampleIndex, StoredSample, read_index
@@ -52,6 +51,7 @@ from engine.voices import Ear, model_program, render_voice, truth_program
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
 from training.by_name import load
+from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
 from training.results import Row, add_rows, read_results

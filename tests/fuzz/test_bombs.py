@@ -17,7 +17,6 @@ import pytest
 from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
-from app.commands.console import Failure
 from app.export.batch_index import _read_rows
 from app.export.files import ExportError
 from app.export.recipe import RecipeError, read_recipe
@@ -26,14 +25,15 @@ from app.instrument.midi_file import MOST_EVENTS, MidiFileError, read_midi
 from app.patches.library import PatchError, read_patch
 from app.patches.patch import TuningChoice
 from app.patches.tuning import Tuning, read_scala
-from app.presets.folders import usable_files
 from app.presets.library import list_presets
 from app.window.settings import Settings, load_settings, read_settings
+from engine.folders import usable_files
 from engine.presets import PresetError, load_preset, preset_digest, read_string
 from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read_toml
 from tests.fuzz.costs import MOST_MB, Costs
 from training.by_name import load
+from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
 from training.results import read_results

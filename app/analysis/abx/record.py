@@ -17,9 +17,9 @@ from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
 from app.shared.version import program_version
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine.presets import preset_digest
 from engine.read_file import read_bounded
+from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json
 
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"

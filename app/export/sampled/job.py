@@ -20,7 +20,7 @@ from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
 from app.export.sampled.store import INDEX, SampledProgress, SampleStore, read_index
 from app.export.sound import Cancelled, ExportCancelled
-from app.shared.whole_file import WriteError, explain, whole_file
+from engine.result_file import WriteError, explain, whole_file
 
 if TYPE_CHECKING:
     import numpy as np

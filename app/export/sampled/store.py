@@ -17,10 +17,10 @@ from app.export.files import ExportError
 from app.export.sampled.plan import NoteRenderer, SampledPlan, Zone
 from app.export.sampled.sample import INAUDIBLE_DBFS, PEAK_DBFS, encoded, sample_of
 from app.export.sound import Cancelled, ExportCancelled
-from app.shared.whole_file import WriteError, explain, whole_file
 from engine import bounds
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
+from engine.result_file import WriteError, explain, whole_file
 from engine.schema import parse_json
 
 INDEX = "index.json"

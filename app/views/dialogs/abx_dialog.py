@@ -22,10 +22,10 @@ from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound, new_seed
 from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
-from app.shared.whole_file import WriteError
 from app.views.dialogs.abx_result import ResultPage
 from app.views.dialogs.abx_setup import SetupPage
 from app.views.dialogs.abx_trial import TrialPage
+from engine.result_file import WriteError
 
 Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
 

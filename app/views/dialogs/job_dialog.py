@@ -11,9 +11,9 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from app.shared.durations import duration
 from app.views.controls.parts import label
 from app.views.dialogs.export_job import ExportJob, Work
+from engine.plain_text import duration
 
 
 class JobDialog(QDialog):

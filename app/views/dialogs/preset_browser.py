@@ -24,13 +24,13 @@ from PySide6.QtWidgets import (
 )
 
 from app.presets.filter import PresetFilter
-from app.presets.heard_words import HEARD_TIP, heard_sentence, heard_word
 from app.presets.library import PresetEntry
 from app.presets.words import error_word, model_word, rate_word, string_word
 from app.views.controls.browser import SHORTEST_CHOICE, Browser
 from app.views.controls.parts import combo_box, scrolled, tool_button
 from app.views.controls.plain import Label
 from app.views.dialogs.preset_card import preset_card
+from training.heard_words import HEARD_TIP, heard_sentence, heard_word
 
 _STAR, _TITLE, _RATE, _ERROR, _HEARD = range(5)
 _HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}

@@ -6,7 +6,6 @@ from html import escape
 
 from PySide6.QtWidgets import QApplication
 
-from app.presets.heard_words import heard_sentence
 from app.presets.library import PresetEntry
 from app.presets.words import (
     error_word,
@@ -18,9 +17,10 @@ from app.presets.words import (
     size_word,
     string_word,
 )
-from app.shared.durations import duration
+from engine.plain_text import duration
 from engine.schema import SchemaError
 from training.by_name import load
+from training.heard_words import heard_sentence
 
 
 def preset_card(entry: PresetEntry) -> str:

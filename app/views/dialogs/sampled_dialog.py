@@ -31,11 +31,11 @@ from app.instrument.bodies import body_digest
 from app.instrument.effects import body_problem
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
-from app.shared.whole_file import explain
 from app.views.controls.parts import label
 from app.views.dialogs.job_dialog import JobDialog
 from app.views.dialogs.sampled_form import SampledForm
 from engine.presets import PresetError, load_preset, preset_digest
+from engine.result_file import explain
 
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
 RESUMES = "A cancelled export keeps its samples, and goes on from there the next time."

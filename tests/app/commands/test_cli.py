@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 import typer
 
-from app.commands import arguments, cli, render
+from app.commands import cli, render
 from app.export.files import BITS, SOURCES
 from app.shared.vocabulary import PICKUPS
+from training.cli import arguments
 
 ROOT = Path(__file__).parents[3]
 COMMANDS = [

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from app.commands import console
+from training.cli import console
 
 
 def test_progress_off_a_terminal_is_a_line_now_and_then(

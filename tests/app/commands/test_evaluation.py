@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 import torch
 
-from app.presets.heard_words import heard_word
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.presets import STRINGS, load_preset, preset_digest, save_preset
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.heard_file import read_heard
+from training.heard_words import heard_word
 
 DATA = DatasetConfiguration(initial="gaussian", rate_hz=4000, modes=10, tension_modulated=False, steps=600, count=20)
 HORIZON = 500  # frames

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.commands.console import number
+from training.cli.console import number
 from training.research import fit_baseline
 
 

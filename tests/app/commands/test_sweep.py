@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from app.commands import sweep as command
-from app.commands.sweep import Board
-from app.shared.whole_file import REMEDIES
 from engine.metrics import RelativeError
 from engine.presets import find_preset
+from engine.result_file import REMEDIES
 from tests.app.commands.conftest import FullDisk
 from training.cell import Cell, configuration_of
+from training.cli import sweep as command
+from training.cli.sweep import Board
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
 from training.run import run_row

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 import torch
 
-from app.presets.heard_words import heard_word
-from app.shared.whole_file import REMEDIES
 from engine.presets import load_preset, preset_digest
+from engine.result_file import REMEDIES
 from tests.app.commands.conftest import FullDisk
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
+from training.heard_words import heard_word
 
 CONFIGURATION = """
 title = "Tiny"

@@ -25,7 +25,7 @@ from app.patches.library import (
     save_patch,
 )
 from app.patches.patch import Patch
-from app.shared.whole_file import WriteError
+from engine.result_file import WriteError
 
 Make = Callable[..., Patch]
 

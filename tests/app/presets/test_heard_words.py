@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.presets.heard_words import faults, heard_sentence, heard_word
 from training.heard_file import Heard
+from training.heard_words import faults, heard_sentence, heard_word
 
 TRUE = Heard("x", "0" * 64, 4.0, 0.2, 0.5, 0.0, 1.0)
 

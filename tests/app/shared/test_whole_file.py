@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.shared.whole_file import WriteError, whole_file
+from engine.result_file import WriteError, whole_file
 
 
 def test_the_file_appears_when_the_block_ends(tmp_path: Path) -> None:

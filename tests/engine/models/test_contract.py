@@ -119,6 +119,7 @@ def test_a_preset_of_it_renders_what_the_model_does(
     info = replace(
         read_info(preset_file),
         model=name,
+        scale_m=PHYSICS.scale_m,  # of what `made` tells the model: a model of many strings holds it
         model_configuration=write(model.configuration),
         initialisation=model.own_initialisation(),
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from fractions import Fraction
 
 import pytest
 import torch
@@ -93,12 +92,12 @@ def test_another_string_takes_what_was_learned() -> None:
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 44_100, 96_000])
 def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
     displacement = pluck_m(NYLON, 25, 0.2)
-    model = made(NYLON, 25, "series")
+    model = made(NYLON, 25, "series").tuned(Physics(NYLON.resonator(25), rate_hz, 1e-3))
     steps = rate_hz // 20
     truth = true_motion(NYLON, displacement, 25, rate_hz, steps)
     with torch.inference_mode():
         state = model.encode((displacement / 1e-3).float())
-        found, _ = model.advance(state, steps, step_size=Fraction(48_000, rate_hz))
+        found, _ = model.advance(state, steps)
     error = (found.double() * 1e-3 - truth).square().sum() / truth.square().sum()
     assert float(error) < 1e-8
 
@@ -196,7 +195,7 @@ def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() ->
     speeds = amplitudes * resonator.eigenvalues().imag / 16_000
     pulled = model.encode(resonator.to_grid(amplitudes) / 1e-3)
     struck = model.encode(torch.zeros(1, 101).double(), resonator.to_grid(speeds) / 1e-3)
-    assert model._nodes(struck, Fraction(1)).tolist() == model._nodes(pulled, Fraction(1)).tolist() == [5]
+    assert model._nodes(struck).tolist() == model._nodes(pulled).tolist() == [5]
     assert 0.5 < float(struck.largest_energy / pulled.largest_energy) <= 1
     truth, _ = SplittingSolver(resonator, 16_000).advance(ModalState(0 * amplitudes, speeds * 16_000), 1_600)
     found = model.amplitudes(struck, 1_600) * 1e-3
@@ -259,12 +258,13 @@ def test_any_weights_stay_bounded_and_fall_silent(seed: int) -> None:
 
 
 def test_phases_are_kept_where_the_curves_were_learned() -> None:
-    model = made(NYLON, 57, "series")
-    for size in (Fraction(1), Fraction(3), Fraction(12), Fraction(160, 147)):
+    learned = made(NYLON, 57, "series")
+    for rate_hz in (48_000, 16_000, 4_000, 44_100):
+        model = learned.tuned(Physics(NYLON.resonator(57), rate_hz, 1e-3))
         with torch.no_grad():
-            _, state = model.advance(model.encode(torch.zeros(1, 101)), 1, step_size=size)
+            _, state = model.advance(model.encode(torch.zeros(1, 101)), 1)
         assert state.nodes is not None
-        phases = float(size) / int(state.nodes) * model.theta_log.exp()
+        phases = 1 / int(state.nodes) * model.theta_log.exp()
         assert float(phases[0]) <= model.configuration.node_phase + 1e-12
         assert float(phases[-1]) <= model.configuration.highest_phase + 1e-12
 
@@ -274,14 +274,6 @@ def test_the_series_are_twelfths() -> None:
         _, r, p = made(NYLON, 25, "series")._curves(torch.linspace(0, 1.5, 5, dtype=torch.float64))
     assert math.isclose(float(r.max()), SERIES)
     assert math.isclose(float(p.min()), SERIES)
-
-
-def test_another_step_size_amid_a_motion_is_refused() -> None:
-    model = made(NYLON, 25, "series")
-    with torch.inference_mode():
-        _, state = model.advance(model.encode((pluck_m(NYLON, 25, 0.1) / 1e-3).float()), 3)
-        with pytest.raises(ValueError, match="step_size"):
-            model.advance(state, 3, step_size=2)
 
 
 def test_latents_to_spare_rest() -> None:

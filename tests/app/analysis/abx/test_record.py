@@ -13,8 +13,8 @@ from app.analysis.abx.record import AbxRecord, as_text, load_record, material_of
 from app.patches.patch import PhysicalString
 from app.presets.library import list_presets
 from app.session.choices import Choices
-from app.shared.whole_file import WriteError
 from engine.resonators.string import StringParameters
+from engine.result_file import WriteError
 from engine.schema import SchemaError
 
 

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all; a failure names the remedy."""
+"""Files that a user asked for, written whole or not at all; a failure names the remedy."""
 
 from __future__ import annotations
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from platformdirs import user_data_path
-
 FOLDER_VARIABLE = "LEARNED_STRINGS_PRESETS"
 
 
@@ -15,8 +13,11 @@ def user_folder() -> Path:
 
     The folder need not exist.
     """
-    given = os.environ.get(FOLDER_VARIABLE)
-    return Path(given) if given else user_data_path("learned-strings", appauthor=False) / "presets"
+    if given := os.environ.get(FOLDER_VARIABLE):
+        return Path(given)
+    from platformdirs import user_data_path
+
+    return user_data_path("learned-strings", appauthor=False) / "presets"
 
 
 def usable_files() -> list[Path]:

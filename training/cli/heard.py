@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.commands.console import print_json, print_table, progress, say
+from training.cli.console import print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from training.heard_file import Heard
@@ -22,9 +22,9 @@ def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
     Args:
         write: add the results to the table beside each preset.
     """
-    from app.presets.heard_words import heard_word
     from engine.presets import PresetError
     from engine.schema import write as plain
+    from training.heard_words import heard_word
 
     found = []
     files = list(files)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Json, PresetName, check_range, open_preset
-from app.commands.console import Failure, Shares, number, print_json, print_table, progress
+from training.cli.arguments import Cache, Json, PresetName, check_range, open_preset
+from training.cli.console import Failure, Shares, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -82,7 +82,7 @@ def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width
 
 def open_preset(name_or_path: str) -> Preset:
     """Loads a preset by its name, of the shipped ones and the user's own, or by its path. Raises PresetError."""
-    from app.presets.folders import usable_files
+    from engine.folders import usable_files
     from engine.presets import find_preset, load_preset
 
     return load_preset(find_preset(name_or_path, usable_files()))

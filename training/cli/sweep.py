@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Device, Json, Runs
-from app.commands.console import Failure, number, print_json, print_table, say
-from app.shared.durations import duration
-from engine.plain_text import one_line
+from engine.plain_text import duration, one_line
+from training.cli.arguments import Cache, Device, Json, Runs
+from training.cli.console import Failure, number, print_json, print_table, say
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.arguments import Cache, Device, Json, Runs
-from app.commands.console import Failure, number, print_json, progress, say
-from app.shared.durations import duration
+from engine.plain_text import duration
+from training.cli.arguments import Cache, Device, Json, Runs
+from training.cli.console import Failure, number, print_json, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from app.commands.console import Report
+    from training.cli.console import Report
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
     from training.fitting.fit import Progress
@@ -121,8 +121,8 @@ def train(
 
 def _tell_heard(file: Path) -> None:
     """Compares the sound of the preset with the truth, and adds the result to the table beside it."""
-    from app.commands.heard import measure
-    from app.presets.heard_words import heard_word
+    from training.cli.heard import measure
+    from training.heard_words import heard_word
 
     try:
         with progress("listen") as report:

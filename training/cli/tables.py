@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from app.commands.arguments import check_range, open_preset
-from app.commands.console import Failure, progress, say
-from app.shared.whole_file import whole_file
 from engine.plain_text import printable
 from engine.pluck import DEFAULT_LISTEN
+from engine.result_file import whole_file
+from training.cli.arguments import check_range, open_preset
+from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from app.commands.console import Report
     from engine.presets import Preset
+    from training.cli.console import Report
 
 figure = typer.Typer(help="Draw figures of presets beside the truth, as PNG, SVG or PDF.", no_args_is_help=True)
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from app.commands import arguments
-from app.commands.arguments import Cache, Json, check_range, open_preset_of_string
-from app.commands.console import Failure, Shares, number, print_json, print_table, progress, say
-from app.commands.training import load_data
 from engine.pluck import DEFAULT_LISTEN
+from training.cli import arguments
+from training.cli.arguments import Cache, Json, check_range, open_preset_of_string
+from training.cli.console import Failure, Shares, number, print_json, print_table, progress, say
+from training.cli.training import load_data
 
 if TYPE_CHECKING:
     from engine.presets import Preset
@@ -123,7 +123,7 @@ def evaluate(
     if fresh is not None:
         splits, configuration = ("all",), replace(configuration, count=fresh)
     _check_trajectories(trajectories, configuration, splits)
-    from app.shared.whole_file import whole_file
+    from engine.result_file import whole_file
     from training.evaluate import held_out
 
     with nullcontext() if table is None else whole_file(table) as file:
@@ -162,9 +162,9 @@ def evaluate(
 
 
 def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: bool) -> None:
-    from app.commands.heard import show_heard
-    from app.presets.folders import usable_files
+    from engine.folders import usable_files
     from engine.presets import find_preset
+    from training.cli.heard import show_heard
 
     if everything == (preset is not None):
         raise typer.BadParameter("give a preset, or --all for all of them", param_hint="PRESET")

@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from app.shared.durations import duration
-from engine.plain_text import one_line
+from engine.plain_text import duration, one_line
 
 LINE_EVERY_S = 10.0  # between two lines of progress, where standard error is not a terminal
 WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped

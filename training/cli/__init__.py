@@ -1,0 +1,1 @@
+"""The command line of training, which `app.commands.cli` adds to its own; and what all commands print and share."""
