@@ -18,11 +18,12 @@ from engine.resonators.base import Resonator
 from engine.voices import Ear
 
 PART_S = 0.4  # of the note: a loudness meter's block
-WANTED_DB = -30.0  # level of a note at REFERENCE_VELOCITY: ten hard ones struck at once stay below full scale
-HIGHEST_PEAK_DB = -15.0  # peak of such a note of any key: six hard ones at once reach full scale at worst
+# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -9 dBFS.
+WANTED_DB = -24.0
+HIGHEST_PEAK_DB = WANTED_DB + 15.0  # of such a note of any key
 PEAK_BLOCKS = 54  # blocks of 54 frames: 60 ms
 REFERENCE_VELOCITY = 100
-GAIN_RANGE_DB = (-36.0, 36.0)
+GAIN_RANGE_DB = (WANTED_DB - 6.0, WANTED_DB + 66.0)
 # BS.1770: the shelf and the high-pass as analogue filters of second order
 _SHELF_HZ, _SHELF_DB, _SHELF_Q = 1681.97, 4.0, 0.7072
 _PASS_HZ, _PASS_Q = 38.135, 0.5003

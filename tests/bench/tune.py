@@ -92,6 +92,13 @@ def measure(
     return TuneBenchmark(Machine.here(), RATE_HZ, tuple(found))
 
 
+def chord_of(patch: Patch) -> list[int]:
+    """The keys of a chord of six in the middle of a patch's range; fewer where it is narrower."""
+    low, high = patch.range
+    root = min((low + high) // 2 - 12, high - CHORD[-1]) if high - low > CHORD[-1] else low
+    return [root + step for step in CHORD if root + step <= high]
+
+
 def _measure(patch: Patch, preset: Preset, every: int) -> TunedPatch:
     strings = Strings(patch)
     low, high = patch.range
@@ -107,8 +114,7 @@ def _measure(patch: Patch, preset: Preset, every: int) -> TunedPatch:
         heard = render_note(patch, preset, key, REFERENCE_VELOCITY, 2.0, 2.0, RATE_HZ)
         levels.append(loudness_db(heard[: round(PART_S * RATE_HZ)]))
         lengths.append(_falls_s(heard))
-    middle = min((low + high) // 2 - 12, high - CHORD[-1]) if high - low > CHORD[-1] else low
-    chord = [TimedEvent(0.0, NoteOn(middle + step, HARD, step % 16)) for step in CHORD if middle + step <= high]
+    chord = [TimedEvent(0.0, NoteOn(key, HARD, number)) for number, key in enumerate(chord_of(patch))]
     peak = max(
         float(np.abs(block).max()) for block in render_events(patch, preset, chord, RATE_HZ, "model", 1.0, False)
     )

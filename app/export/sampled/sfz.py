@@ -76,7 +76,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
 
 
 def _velocity_curve(zone: Zone, levels_db: Levels) -> str:
-    """Within a layer the level goes on as between layers: 1 at its loudest velocity.
+    """Gains by velocity within a layer, along the levels of all layers: 1 at its loudest velocity.
 
     Players draw straight lines between these points: with four, a layer of 10 dB is right to 0.1 dB.
     """

@@ -124,8 +124,10 @@ def test_a_scale_that_miscounts_its_notes_is_refused(tmp_path: Path, said: int, 
     path = tmp_path / "wrong.scl"
     tones = "".join(f" {100 * n}. ! a note\n" for n in range(1, listed + 1))
     path.write_text(f"! wrong.scl\na scale\n {said}\n!\n{tones}")
-    told = f"wrong.scl: scale: says {str(said)[:20]} notes and lists {listed}; correct its count or its list of notes"
-    with pytest.raises(ValueError, match=re.escape(told)) as caught:
+    message = (
+        f"wrong.scl: scale: says {str(said)[:20]} notes and lists {listed}; correct its count or its list of notes"
+    )
+    with pytest.raises(ValueError, match=re.escape(message)) as caught:
         read_scala(path)
     assert len(str(caught.value)) < 300
 
