@@ -67,13 +67,14 @@ APP_PACKAGES = {
     "fonts-dejavu-core": "/usr/share/fonts/**/*.[ot]t[fc]",
     f"python3.{sys.version_info.minor}-venv": "import ensurepip",
 }
-# For the tests of the real sound path, of a real window and of SoundFonts, which are skipped without them.
+# For the tests of the real sound path, of MIDI, of a real window and of SoundFonts, which are skipped without them.
 TEST_PACKAGES = {
     "fluidsynth": "fluidsynth",
     "pulseaudio": "pulseaudio",
     "pulseaudio-utils": "parec",
     "libasound2-plugins": "/usr/lib/*/alsa-lib/libasound_module_pcm_pulse.so",
     "xvfb": "Xvfb",
+    "jackd2": "jackd",
 }
 OTHER_INSTALLERS = {
     "dnf": "sudo dnf install portaudio mesa-libEGL mesa-libGL libxkbcommon-x11 dejavu-sans-fonts"
@@ -257,6 +258,10 @@ def environment(absent: list[str]) -> None:
         make_venv()
     pip("setuptools")
     pip("--no-build-isolation", "-e", ".[dev]")
+    try:
+        pip("--no-build-isolation", "-e", ".[midi]")
+    except SetupError:
+        say("warning: MIDI input was not installed, for the reason above; going on without")
     stamp = {
         "fingerprint": fingerprint(),
         "absent": {name: sign for name, sign in APP_PACKAGES.items() if name in absent},

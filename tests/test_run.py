@@ -167,11 +167,24 @@ def test_a_sound_environment_is_installed_into_and_another_is_made_anew(run, mon
     monkeypatch.setattr(run, "pip", lambda *arguments: steps.append(arguments[-1]))
     monkeypatch.setattr(run, "make_venv", lambda: steps.append("venv"))
     run.environment([])
-    assert steps == ["setuptools", ".[dev]"]
+    installed = ["setuptools", ".[dev]", ".[midi]"]
+    assert steps == installed
     monkeypatch.setattr(run, "sound", lambda: False)
     run.environment([])
-    assert steps == ["setuptools", ".[dev]", "venv", "setuptools", ".[dev]"]
+    assert steps == [*installed, "venv", *installed]
     assert run.read_stamp()
+
+
+def test_midi_that_cannot_be_installed_is_a_warning(run, monkeypatch, capsys):
+    def pip(*arguments):
+        if arguments[-1] == ".[midi]":
+            raise run.SetupError("no wheel")
+
+    monkeypatch.setattr(run, "pip", pip)
+    run.STAMP.unlink()
+    run.prepare("start", True)
+    assert run.read_stamp()
+    assert "warning: MIDI input was not installed" in capsys.readouterr().err
 
 
 def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):
