@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prepare and start Learned Strings on Linux, macOS or Windows, with nothing but Python 3.11 or newer.
+"""Prepare and start Learned Strings on Linux, macOS or Windows, with nothing but Python 3.11 to 3.14.
 
 python3 run.py                 open the app
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
@@ -25,8 +25,8 @@ import sys
 from pathlib import Path
 
 # Before any annotation, and in words that Python 3.6 can read, so that an old Python gets as far as this.
-if sys.version_info < (3, 11):  # noqa: UP036
-    sys.exit(f"run.py: needs Python 3.11 or newer; this is {sys.version.split()[0]}: {sys.executable}")
+if not (3, 11) <= sys.version_info < (3, 15):
+    sys.exit(f"run.py: needs Python 3.11 to 3.14; this is {sys.version.split()[0]}: {sys.executable}")
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
@@ -65,7 +65,7 @@ APP_PACKAGES = {
     "libxcb-xfixes0": "libxcb-xfixes.so.0",
     "libxkbcommon-x11-0": "libxkbcommon-x11.so.0",
     "fonts-dejavu-core": "/usr/share/fonts/**/*.[ot]t[fc]",
-    f"python3.{sys.version_info.minor}-venv": "import ensurepip",
+    f"python3.{sys.version_info[1]}-venv": "import ensurepip",
 }
 # For the tests of the real sound path, of MIDI, of a real window and of SoundFonts, which are skipped without them.
 TEST_PACKAGES = {
@@ -277,7 +277,7 @@ def sound() -> bool:
     try:
         made = settings()
         numbers = made["version"].split(".")[:2]
-        if not made["command"].endswith(str(VENV)) or tuple(map(int, numbers)) < (3, 11):
+        if not made["command"].endswith(str(VENV)) or not (3, 11) <= tuple(map(int, numbers)) < (3, 15):
             return False
         command = [PYTHON, "-I", "-m", "pip", "--version"]
         reply = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout

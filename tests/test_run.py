@@ -2,16 +2,19 @@
 
 import ast
 import collections
+import contextlib
 import csv
 import importlib.util
 import shutil
 import subprocess
 import sys
 import threading
+import tomllib
 import venv
 from pathlib import Path
 
 import pytest
+from packaging.specifiers import SpecifierSet
 
 SOURCE = Path(__file__).parents[1] / "run.py"
 
@@ -87,7 +90,17 @@ def test_help_goes_to_standard_output(run, capsys):
 def test_an_old_python_can_read_the_file_and_is_told(monkeypatch):
     ast.parse(SOURCE.read_text("utf-8"), feature_version=(3, 6))
     monkeypatch.setattr(sys, "version_info", (3, 6, 15))
-    with pytest.raises(SystemExit, match=r"needs Python 3\.11 or newer"):
+    with pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
+        load(SOURCE)
+
+
+@pytest.mark.parametrize(("version", "taken"), [((3, 10), False), ((3, 11), True), ((3, 14), True), ((3, 15), False)])
+def test_all_places_state_the_same_versions_of_python(version, taken, monkeypatch):
+    asked = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text("utf-8"))["project"]["requires-python"]
+    assert SpecifierSet(asked).contains(".".join(map(str, version))) == taken
+    assert "Python 3.11 to 3.14" in (SOURCE.parent / "README.md").read_text("utf-8")
+    monkeypatch.setattr(sys, "version_info", (*version, 0))
+    with contextlib.nullcontext() if taken else pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
         load(SOURCE)
 
 
