@@ -22,6 +22,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 # Before any annotation, and in words that Python 3.6 can read, so that an old Python gets as far as this.
@@ -82,6 +83,10 @@ OTHER_INSTALLERS = {
     "pacman": "sudo pacman -S --needed portaudio libglvnd libxkbcommon-x11 ttf-dejavu"
     " xcb-util-cursor xcb-util-wm xcb-util-keysyms xcb-util-image xcb-util-renderutil",
 }
+# A sign of an NVIDIA card; PyTorch's own builds without CUDA; how long their server may take to answer.
+NVIDIA = Path("/proc/driver/nvidia")
+CPU_BUILDS = "https://download.pytorch.org/whl/cpu"
+ANSWER_S = 3.0
 # Whether system packages can be installed here without asking anyone: Debian or its kin, as root.
 APT = sys.platform == "linux" and shutil.which("apt-get") is not None and os.geteuid() == 0
 
@@ -257,6 +262,7 @@ def environment(absent: list[str]) -> None:
     else:
         make_venv()
     pip("setuptools")
+    pip("torch", *torch_source())
     pip("--no-build-isolation", "-e", ".[dev]")
     try:
         pip("--no-build-isolation", "-e", ".[midi]")
@@ -329,6 +335,34 @@ def pip(*arguments: str) -> None:
     )
     command = [PYTHON, "-I", "-X", "utf8", "-m", "pip", "install", "--no-input", "-c", "constraints.txt"]
     run_step([*command, *arguments], trouble, env={**os.environ, "PIP_USER": "0"}, close_fds=False)
+
+
+def torch_source() -> list[str]:
+    """Return where else pip is to look for torch: on Linux without an NVIDIA card, among the builds without CUDA."""
+    if sys.platform != "linux" or NVIDIA.exists() or shutil.which("nvidia-smi"):
+        return []
+    if reachable(CPU_BUILDS + "/torch/"):
+        say("no NVIDIA card: taking PyTorch's build without CUDA")
+        return ["--extra-index-url", CPU_BUILDS]
+    say("no NVIDIA card, but PyTorch's builds without CUDA cannot be reached: the usual one may bring gigabytes")
+    return []
+
+
+def reachable(address: str) -> bool:
+    """Whether a server has the page; one that is silent for ANSWER_S has not, nor has a slow name server."""
+    import urllib.request  # tens of milliseconds, which only a set-up spends
+
+    answers = []
+
+    def ask():
+        # whatever is raised, as by a proxy that is set up wrongly, is no answer
+        with contextlib.suppress(Exception), urllib.request.urlopen(address, timeout=ANSWER_S):
+            answers.append(True)
+
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    asking.join(ANSWER_S)
+    return bool(answers)
 
 
 def run_step(command: list, trouble: str, **options) -> None:
