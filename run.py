@@ -2,6 +2,7 @@
 """Prepare and start Learned Strings on Linux, macOS or Windows, with nothing but Python 3.11 to 3.14.
 
 python3 run.py                 open the app
+python3 run.py FILE ...        open it with these: presets, patches, MIDI files, WAVs, whatever can be dropped on it
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
 python3 run.py setup           only prepare
@@ -99,7 +100,7 @@ def main(words: list[str]) -> int:
     """Prepare for what the words ask, do it, and return its exit status."""
     action, arguments = parse(words)
     try:
-        prepare(action, window=action == "start" and not arguments)
+        prepare(action, window=action == "start" and words[:1] != ["--"])
         if action == "test":
             return check(arguments)
         return start(arguments) if action == "start" else 0
@@ -110,7 +111,7 @@ def main(words: list[str]) -> int:
 
 
 def parse(words: list[str]) -> tuple[str, list[str]]:
-    """Return the action and its arguments; help, and words that mean nothing here, end the program."""
+    """Return the action and its arguments; help, absent files and words without a meaning end the program."""
     if not words:
         return "start", []
     if words[0] == "--":
@@ -123,8 +124,18 @@ def parse(words: list[str]) -> tuple[str, list[str]]:
     if words[0] in ("-h", "--help"):
         print(usage)
         sys.exit(0)
+    if all(map(is_file_name, words)):
+        absent = [word for word in words if not Path(word).is_file()]
+        if absent:
+            sys.exit(fail(f"no such file: {', '.join(absent)}; check the name", 2))
+        return "start", words
     print(f"{usage}\n\nrun.py: not understood: {' '.join(words)}", file=sys.stderr)
     sys.exit(2)
+
+
+def is_file_name(word: str) -> bool:
+    """Whether a word has a folder or an ending, as nothing else that is understood here."""
+    return not word.startswith("-") and bool(Path(word).suffix or {os.sep, os.altsep or os.sep} & set(word))
 
 
 def start(arguments: list[str]) -> int:

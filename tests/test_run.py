@@ -70,19 +70,43 @@ def run(tmp_path, monkeypatch):
         (["--", "render", "--", "a b"], ("start", ["render", "--", "a b"])),
         (["test", "-k", "x"], ("test", ["-k", "x"])),
         (["setup"], ("setup", [])),
+        (["./setup", "song.mid"], ("start", ["./setup", "song.mid"])),
     ],
 )
-def test_words_are_understood(run, words, meant):
+def test_words_are_understood(run, words, meant, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name in ("setup", "test", "song.mid"):  # a command wins over a file of its name
+        (tmp_path / name).touch()
     assert run.parse(words) == meant
 
 
-@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["--frob"]])
+@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["--frob"], ["song.mid", "now"], ["--frob.mid"]])
 def test_other_words_are_answered_with_the_usage(run, words, capsys):
     with pytest.raises(SystemExit) as exit:
         run.main(words)
     out, err = capsys.readouterr()
     assert (exit.value.code, out) == (2, "")
     assert "python3 run.py setup" in err and f"not understood: {' '.join(words)}" in err
+
+
+def test_an_absent_file_is_named_before_anything_starts(run, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(run, "prepare", lambda *_, **__: pytest.fail("prepared"))
+    (tmp_path / "song.mid").touch()
+    with pytest.raises(SystemExit) as exit:
+        run.main(["song.mid", "gone.wav"])
+    assert exit.value.code == 2
+    assert capsys.readouterr() == ("", "run.py: no such file: gone.wav; check the name\n")
+
+
+def test_files_open_in_the_app(run, monkeypatch, capsys, tmp_path):
+    started = []
+    monkeypatch.setattr(run, "start", started.append)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "take.wav").touch()
+    run.main(["take.wav"])
+    assert started == [["take.wav"]]
+    assert capsys.readouterr() == ("", "")
 
 
 def test_help_goes_to_standard_output(run, capsys):
