@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Prepare and start Learned Strings on Linux, macOS or Windows, with nothing but Python 3.11 or newer.
+"""Prepare and start Learned Strings on Linux, macOS or Windows, with nothing but Python 3.11 to 3.14.
 
 python3 run.py                 open the app
+python3 run.py FILE ...        open it with these: presets, patches, MIDI files, WAVs, whatever can be dropped on it
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
 python3 run.py bench NAME      measure speed, sound and memory on this machine (without NAME: which there are)
@@ -23,11 +24,12 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 # Before any annotation, and in words that Python 3.6 can read, so that an old Python gets as far as this.
-if sys.version_info < (3, 11):  # noqa: UP036
-    sys.exit(f"run.py: needs Python 3.11 or newer; this is {sys.version.split()[0]}: {sys.executable}")
+if not (3, 11) <= sys.version_info < (3, 15):
+    sys.exit(f"run.py: needs Python 3.11 to 3.14; this is {sys.version.split()[0]}: {sys.executable}")
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
@@ -66,15 +68,16 @@ APP_PACKAGES = {
     "libxcb-xfixes0": "libxcb-xfixes.so.0",
     "libxkbcommon-x11-0": "libxkbcommon-x11.so.0",
     "fonts-dejavu-core": "/usr/share/fonts/**/*.[ot]t[fc]",
-    f"python3.{sys.version_info.minor}-venv": "import ensurepip",
+    f"python3.{sys.version_info[1]}-venv": "import ensurepip",
 }
-# For the tests of the real sound path, of a real window and of SoundFonts, which are skipped without them.
+# For the tests of the real sound path, of MIDI, of a real window and of SoundFonts, which are skipped without them.
 TEST_PACKAGES = {
     "fluidsynth": "fluidsynth",
     "pulseaudio": "pulseaudio",
     "pulseaudio-utils": "parec",
     "libasound2-plugins": "/usr/lib/*/alsa-lib/libasound_module_pcm_pulse.so",
     "xvfb": "Xvfb",
+    "jackd2": "jackd",
 }
 OTHER_INSTALLERS = {
     "dnf": "sudo dnf install portaudio mesa-libEGL mesa-libGL libxkbcommon-x11 dejavu-sans-fonts"
@@ -82,6 +85,10 @@ OTHER_INSTALLERS = {
     "pacman": "sudo pacman -S --needed portaudio libglvnd libxkbcommon-x11 ttf-dejavu"
     " xcb-util-cursor xcb-util-wm xcb-util-keysyms xcb-util-image xcb-util-renderutil",
 }
+# A sign of an NVIDIA card; PyTorch's own builds without CUDA; how long their server may take to answer.
+NVIDIA = Path("/proc/driver/nvidia")
+CPU_BUILDS = "https://download.pytorch.org/whl/cpu"
+ANSWER_S = 3.0
 # Whether system packages can be installed here without asking anyone: Debian or its kin, as root.
 APT = sys.platform == "linux" and shutil.which("apt-get") is not None and os.geteuid() == 0
 
@@ -94,7 +101,7 @@ def main(words: list[str]) -> int:
     """Prepare for what the words ask, do it, and return its exit status."""
     action, arguments = parse(words)
     try:
-        prepare(action, window=action == "start" and not arguments)
+        prepare(action, window=action == "start" and words[:1] != ["--"])
         if action == "test":
             return check(arguments)
         if action == "bench":
@@ -107,7 +114,7 @@ def main(words: list[str]) -> int:
 
 
 def parse(words: list[str]) -> tuple[str, list[str]]:
-    """Return the action and its arguments; help, and words that mean nothing here, end the program."""
+    """Return the action and its arguments; help, absent files and words without a meaning end the program."""
     if not words:
         return "start", []
     if words[0] == "--":
@@ -120,8 +127,18 @@ def parse(words: list[str]) -> tuple[str, list[str]]:
     if words[0] in ("-h", "--help"):
         print(usage)
         sys.exit(0)
+    if all(map(is_file_name, words)):
+        absent = [word for word in words if not Path(word).is_file()]
+        if absent:
+            sys.exit(fail(f"no such file: {', '.join(absent)}; check the name", 2))
+        return "start", words
     print(f"{usage}\n\nrun.py: not understood: {' '.join(words)}", file=sys.stderr)
     sys.exit(2)
+
+
+def is_file_name(word: str) -> bool:
+    """Whether a word has a folder or an ending, as nothing else that is understood here."""
+    return not word.startswith("-") and bool(Path(word).suffix or {os.sep, os.altsep or os.sep} & set(word))
 
 
 def start(arguments: list[str]) -> int:
@@ -259,7 +276,12 @@ def environment(absent: list[str]) -> None:
     else:
         make_venv()
     pip("setuptools")
+    pip("torch", *torch_source())
     pip("--no-build-isolation", "-e", ".[dev]")
+    try:
+        pip("--no-build-isolation", "-e", ".[midi]")
+    except SetupError:
+        say("warning: MIDI input was not installed, for the reason above; going on without")
     stamp = {
         "fingerprint": fingerprint(),
         "absent": {name: sign for name, sign in APP_PACKAGES.items() if name in absent},
@@ -275,7 +297,7 @@ def sound() -> bool:
     try:
         made = settings()
         numbers = made["version"].split(".")[:2]
-        if not made["command"].endswith(str(VENV)) or tuple(map(int, numbers)) < (3, 11):
+        if not made["command"].endswith(str(VENV)) or not (3, 11) <= tuple(map(int, numbers)) < (3, 15):
             return False
         command = [PYTHON, "-I", "-m", "pip", "--version"]
         reply = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
@@ -327,6 +349,34 @@ def pip(*arguments: str) -> None:
     )
     command = [PYTHON, "-I", "-X", "utf8", "-m", "pip", "install", "--no-input", "-c", "constraints.txt"]
     run_step([*command, *arguments], trouble, env={**os.environ, "PIP_USER": "0"}, close_fds=False)
+
+
+def torch_source() -> list[str]:
+    """Return where else pip is to look for torch: on Linux without an NVIDIA card, among the builds without CUDA."""
+    if sys.platform != "linux" or NVIDIA.exists() or shutil.which("nvidia-smi"):
+        return []
+    if reachable(CPU_BUILDS + "/torch/"):
+        say("no NVIDIA card: taking PyTorch's build without CUDA")
+        return ["--extra-index-url", CPU_BUILDS]
+    say("no NVIDIA card, but PyTorch's builds without CUDA cannot be reached: the usual one may bring gigabytes")
+    return []
+
+
+def reachable(address: str) -> bool:
+    """Whether a server has the page; one that is silent for ANSWER_S has not, nor has a slow name server."""
+    import urllib.request  # tens of milliseconds, which only a set-up spends
+
+    answers = []
+
+    def ask():
+        # whatever is raised, as by a proxy that is set up wrongly, is no answer
+        with contextlib.suppress(Exception), urllib.request.urlopen(address, timeout=ANSWER_S):
+            answers.append(True)
+
+    asking = threading.Thread(target=ask, daemon=True)
+    asking.start()
+    asking.join(ANSWER_S)
+    return bool(answers)
 
 
 def run_step(command: list, trouble: str, **options) -> None:

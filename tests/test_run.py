@@ -2,16 +2,22 @@
 
 import ast
 import collections
+import contextlib
 import csv
+import http.server
 import importlib.util
 import shutil
+import socket
 import subprocess
 import sys
 import threading
+import time
+import tomllib
 import venv
 from pathlib import Path
 
 import pytest
+from packaging.specifiers import SpecifierSet
 
 SOURCE = Path(__file__).parents[1] / "run.py"
 
@@ -45,6 +51,8 @@ def run(tmp_path, monkeypatch):
     record(run.site_packages() / "numpy-1.dist-info", [("numpy/__init__.py", 5), ("numpy/x.pyc", 9)])
     monkeypatch.setattr(run, "pip", lambda *arguments: None)
     monkeypatch.setattr(run, "sound", lambda: True)
+    run.torch_source_here = run.torch_source  # for the tests that ask for it
+    monkeypatch.setattr(run, "torch_source", lambda: [])
     monkeypatch.setattr(run, "missing", lambda table: [])
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: pytest.fail(f"started {command}"))
     run.environment([])
@@ -62,19 +70,43 @@ def run(tmp_path, monkeypatch):
         (["--", "render", "--", "a b"], ("start", ["render", "--", "a b"])),
         (["test", "-k", "x"], ("test", ["-k", "x"])),
         (["setup"], ("setup", [])),
+        (["./setup", "song.mid"], ("start", ["./setup", "song.mid"])),
     ],
 )
-def test_words_are_understood(run, words, meant):
+def test_words_are_understood(run, words, meant, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name in ("setup", "test", "song.mid"):  # a command wins over a file of its name
+        (tmp_path / name).touch()
     assert run.parse(words) == meant
 
 
-@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["--frob"]])
+@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["--frob"], ["song.mid", "now"], ["--frob.mid"]])
 def test_other_words_are_answered_with_the_usage(run, words, capsys):
     with pytest.raises(SystemExit) as exit:
         run.main(words)
     out, err = capsys.readouterr()
     assert (exit.value.code, out) == (2, "")
     assert "python3 run.py setup" in err and f"not understood: {' '.join(words)}" in err
+
+
+def test_an_absent_file_is_named_before_anything_starts(run, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(run, "prepare", lambda *_, **__: pytest.fail("prepared"))
+    (tmp_path / "song.mid").touch()
+    with pytest.raises(SystemExit) as exit:
+        run.main(["song.mid", "gone.wav"])
+    assert exit.value.code == 2
+    assert capsys.readouterr() == ("", "run.py: no such file: gone.wav; check the name\n")
+
+
+def test_files_open_in_the_app(run, monkeypatch, capsys, tmp_path):
+    started = []
+    monkeypatch.setattr(run, "start", started.append)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "take.wav").touch()
+    run.main(["take.wav"])
+    assert started == [["take.wav"]]
+    assert capsys.readouterr() == ("", "")
 
 
 def test_help_goes_to_standard_output(run, capsys):
@@ -87,7 +119,17 @@ def test_help_goes_to_standard_output(run, capsys):
 def test_an_old_python_can_read_the_file_and_is_told(monkeypatch):
     ast.parse(SOURCE.read_text("utf-8"), feature_version=(3, 6))
     monkeypatch.setattr(sys, "version_info", (3, 6, 15))
-    with pytest.raises(SystemExit, match=r"needs Python 3\.11 or newer"):
+    with pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
+        load(SOURCE)
+
+
+@pytest.mark.parametrize(("version", "taken"), [((3, 10), False), ((3, 11), True), ((3, 14), True), ((3, 15), False)])
+def test_all_places_state_the_same_versions_of_python(version, taken, monkeypatch):
+    asked = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text("utf-8"))["project"]["requires-python"]
+    assert SpecifierSet(asked).contains(".".join(map(str, version))) == taken
+    assert "Python 3.11 to 3.14" in (SOURCE.parent / "README.md").read_text("utf-8")
+    monkeypatch.setattr(sys, "version_info", (*version, 0))
+    with contextlib.nullcontext() if taken else pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
         load(SOURCE)
 
 
@@ -167,11 +209,78 @@ def test_a_sound_environment_is_installed_into_and_another_is_made_anew(run, mon
     monkeypatch.setattr(run, "pip", lambda *arguments: steps.append(arguments[-1]))
     monkeypatch.setattr(run, "make_venv", lambda: steps.append("venv"))
     run.environment([])
-    assert steps == ["setuptools", ".[dev]"]
+    installed = ["setuptools", "torch", ".[dev]", ".[midi]"]
+    assert steps == installed
     monkeypatch.setattr(run, "sound", lambda: False)
     run.environment([])
-    assert steps == ["setuptools", ".[dev]", "venv", "setuptools", ".[dev]"]
+    assert steps == [*installed, "venv", *installed]
     assert run.read_stamp()
+
+
+def test_midi_that_cannot_be_installed_is_a_warning(run, monkeypatch, capsys):
+    def pip(*arguments):
+        if arguments[-1] == ".[midi]":
+            raise run.SetupError("no wheel")
+
+    monkeypatch.setattr(run, "pip", pip)
+    run.STAMP.unlink()
+    run.prepare("start", True)
+    assert run.read_stamp()
+    assert "warning: MIDI input was not installed" in capsys.readouterr().err
+
+
+@pytest.fixture
+def cardless(run, monkeypatch, tmp_path):
+    """Return run.py on Linux without an NVIDIA card, with a server of PyTorch's builds that answers."""
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200 if self.path == "/cpu/torch/" else 404)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    monkeypatch.setattr(run, "torch_source", run.torch_source_here)
+    monkeypatch.setattr(run.sys, "platform", "linux")
+    monkeypatch.setattr(run.shutil, "which", lambda name: None)
+    monkeypatch.setattr(run, "NVIDIA", tmp_path / "nvidia")
+    monkeypatch.setenv("no_proxy", "*")
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        monkeypatch.setattr(run, "CPU_BUILDS", f"http://127.0.0.1:{server.server_port}/cpu")
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield run
+        server.shutdown()
+
+
+def test_without_a_card_torch_comes_without_cuda_and_that_is_said(cardless, capsys):
+    assert cardless.torch_source() == ["--extra-index-url", cardless.CPU_BUILDS]
+    assert "no NVIDIA card: taking PyTorch's build without CUDA" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("sign", ["driver", "program"])
+def test_with_a_card_torch_is_the_usual_one(cardless, sign, monkeypatch, capsys):
+    if sign == "driver":
+        cardless.NVIDIA.mkdir()
+    else:
+        monkeypatch.setattr(cardless.shutil, "which", {"nvidia-smi": "/usr/bin/nvidia-smi"}.get)
+    assert cardless.torch_source() == []
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("fault", ["nobody", "no such page", "silent"])
+def test_builds_out_of_reach_cost_little_time_and_that_is_said(cardless, fault, monkeypatch, capsys):
+    monkeypatch.setattr(cardless, "ANSWER_S", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = silent.getsockname()[1]
+        if fault == "nobody":
+            silent.close()
+        place = f"{cardless.CPU_BUILDS}/absent" if fault == "no such page" else f"http://127.0.0.1:{port}/cpu"
+        monkeypatch.setattr(cardless, "CPU_BUILDS", place)
+        began_s = time.monotonic()
+        assert cardless.torch_source() == []
+        assert time.monotonic() - began_s < 2
+    assert "cannot be reached" in capsys.readouterr().err
 
 
 def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):
@@ -268,6 +377,7 @@ class TestSystemPackages:
         """Return run.py on a machine that lacks PortAudio and Xvfb, with a record of the commands it runs."""
         lacking = {"libportaudio.so.2", "Xvfb"}
         monkeypatch.undo()
+        monkeypatch.setattr(run, "torch_source", lambda: [])
         monkeypatch.setattr(run, "present", lambda sign: sign not in lacking)
         monkeypatch.setattr(run, "pip", lambda *arguments: None)
         monkeypatch.setattr(run, "sound", lambda: True)

@@ -1,4 +1,4 @@
-"""The command line: `learned-strings` opens the app, its sub-commands work without a window.
+"""The command line: `learned-strings` opens the app, with files where some are named; commands have no window.
 
 Exit status: 0 on success, 2 on bad usage, 130 when interrupted, 1 on any other failure, which is explained in one
 line on standard error (after its traceback where the environment variable LEARNED_STRINGS_DEBUG is set).
@@ -42,7 +42,8 @@ def start(
 ) -> None:
     """Play learned strings, compare them with the physics, and export them as WAV.
 
-    Without a command, the app opens. Every command has its own --help.
+    Without a command, the app opens; files that are named instead open in it, as learned-strings song.mid take.wav.
+    Every command has its own --help.
     """
     if context.invoked_subcommand is not None:
         return
@@ -91,8 +92,11 @@ def carry_out(commands: typer.Typer, arguments: Sequence[str] | None, name: str)
     """Runs a command line of some commands; failures are printed in one line. Returns the exit status."""
     wait_asleep()
     use_any_output()
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        typer.main.get_command(commands).main(list(sys.argv[1:] if arguments is None else arguments), prog_name=name)
+        if commands is cli and words and is_file_name(words[0]):
+            return open_files(words)
+        typer.main.get_command(commands).main(words, prog_name=name)
     except SystemExit as exit:
         return exit.code if isinstance(exit.code, int) else 0 if exit.code is None else 1
     except Exception as error:
@@ -101,6 +105,24 @@ def carry_out(commands: typer.Typer, arguments: Sequence[str] | None, name: str)
         say(describe(error))
         return 1
     return 0
+
+
+def is_file_name(word: str) -> bool:
+    """Whether a word has a folder or an ending, as no command and no option has."""
+    separators = {os.sep, os.altsep or os.sep}
+    return not word.startswith("-") and bool(Path(word).suffix or separators & set(word))
+
+
+def open_files(words: Sequence[str]) -> int:
+    """Opens the app with files, as if they were dropped on its window; returns its exit status, or 2 for no file."""
+    files = [Path(word).absolute() for word in words]
+    for word, file in zip(words, files, strict=True):
+        if not file.is_file():
+            say(f"{word}: no such file; check the name")
+            return 2
+    from app.window.main import run
+
+    return run(files=files)
 
 
 def describe(error: Exception) -> str:

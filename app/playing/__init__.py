@@ -1,6 +1,7 @@
 """From gestures to sound: keys and MIDI, what is plucked, and the notes that ring.
 
 keyboard, midi, midi_port   gestures of instruments, as plucks or choices
+midi_backend                the system's MIDI
 chosen                      from what is chosen to what is plucked, heard and drawn
 stroke                      what is plucked and how it is mixed: values
 sources                     presets in memory, and the programs of their voices

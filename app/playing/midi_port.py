@@ -1,60 +1,21 @@
-"""The MIDI input, through mido, which is loaded only when it is needed."""
+"""The MIDI input that a player has chosen, and what its keys hold."""
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from app.instrument.events import Event, channels_in, let_go
 from app.instrument.midi_file import event_of
-
-
-class MidiUnavailable(Exception):
-    """Why there is no MIDI, in plain words with the remedy."""
-
-
-class OpenPort(Protocol):
-    def close(self) -> None: ...
-
-
-class Backend(Protocol):
-    """What is used of mido."""
-
-    def get_input_names(self) -> list[str]: ...
-
-    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> OpenPort: ...
-
-
-def load_backend() -> Backend:
-    """Mido with python-rtmidi, or what mido's own variable MIDO_BACKEND names, as "mido.backends.rtmidi/UNIX_JACK".
-
-    Raises:
-        MidiUnavailable: one of them is not installed.
-    """
-    try:
-        import mido
-
-        backend: Backend = mido.Backend(load=True)
-    except ImportError as error:
-        if named := os.environ.get("MIDO_BACKEND"):
-            raise MidiUnavailable(
-                f"MIDO_BACKEND names {named}, which cannot be loaded ({error}). Correct it, or unset it."
-            ) from error
-        raise MidiUnavailable(
-            "MIDI needs two packages that are not installed: mido and python-rtmidi. "
-            f"Get them with:  {sys.executable} -m pip install mido python-rtmidi"
-        ) from error
-    return backend
+from app.playing.midi_backend import Backend, MidiUnavailable, OpenPort, load_backend
 
 
 class MidiInput:
     """At most one open input. All is called by one thread.
 
     Args:
-        on_message: is called with what comes, in mido's thread.
+        on_message: is called with what comes, in the input's thread.
         on_let_go: is called with what lets go what came, in the thread of `let_go`, `close` or `open`.
     """
 
@@ -80,7 +41,7 @@ class MidiInput:
         """
         try:
             return list(dict.fromkeys(self._loaded().get_input_names()))
-        except (OSError, RuntimeError, ValueError) as error:
+        except OSError as error:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:
@@ -95,7 +56,7 @@ class MidiInput:
             raise MidiUnavailable(f"The MIDI input {name} is not connected. Connect it, or choose another.")
         try:
             self._port = self._loaded().open_input(found, callback=self._receive)
-        except (OSError, RuntimeError) as error:
+        except OSError as error:
             raise MidiUnavailable(
                 f"The MIDI input {found} cannot be opened ({error}). Another program may be using it."
             ) from error

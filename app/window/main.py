@@ -7,14 +7,15 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if sys.platform == "win32":
     import torch  # noqa: F401 - before Qt: the other order fails there
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.patches.library import SHIPPED, PatchError, read_patch
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 
 Alive = Callable[["Controller"], None]
 CANNOT_START = "The models cannot be loaded, so the program cannot be used."
-
+PATIENCE_S = 5.0  # for the sound device and the patch's preset, before a file is taken
+LOOK_MS = 20
 
 FIRST_PATCH = SHIPPED / "classical_guitar.json"
 
@@ -55,10 +57,17 @@ class _Start(QObject):
     _loaded = Signal()
 
     def __init__(
-        self, window: MainWindow, settings: Settings, path: Path, notice: str, alive: Alive, faults: Faults
+        self,
+        window: MainWindow,
+        settings: Settings,
+        path: Path,
+        notice: str,
+        alive: Alive,
+        faults: Faults,
+        files: Sequence[Path],
     ) -> None:
         super().__init__()
-        self._faults = faults
+        self._faults, self._files = faults, list(files)
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
@@ -96,12 +105,30 @@ class _Start(QObject):
         if self._notice:
             self._window.notices.tell(self._notice)
         self._alive(self._controller)
+        self._patience_s = time.monotonic() + PATIENCE_S
+        self._take_files()
+
+    def _take_files(self) -> None:
+        """Takes one file after another, each when keys would sound: of a MIDI file, the first notes do too."""
+        controller = self._controller
+        if not self._files or controller is None:
+            return
+        if _playable(controller) or time.monotonic() > self._patience_s:
+            controller.take_file(self._files.pop(0))
+            self._patience_s = time.monotonic() + PATIENCE_S
+        QTimer.singleShot(LOOK_MS, self, self._take_files)
 
     def _failed(self, error: Exception) -> None:
         """Shows the error in a dialog; the window stays until its user closes it."""
         collect_anywhere()
         self._window.show_failed()
         self._faults.tell(log_fault(error, "while the engine was loaded"), CANNOT_START)
+
+
+def _playable(controller: Controller) -> bool:
+    """Whether a pluck would sound at once, and a key of the patch if there is one."""
+    performance = controller.performance
+    return performance.at_hand and (controller.session.choices.patch is None or performance.live.ready)
 
 
 def load_engine() -> None:
@@ -124,12 +151,17 @@ def _find_devices() -> None:
         import sounddevice  # noqa: F401
 
 
-def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive = lambda controller: None) -> int:
+def run(
+    watch: Callable[[MainWindow], None] = lambda window: None,
+    alive: Alive = lambda controller: None,
+    files: Sequence[Path] = (),
+) -> int:
     """Opens the app and returns its exit status when it is closed.
 
     Args:
         watch: is given the window before it is shown.
         alive: is given the controller as soon as there is one.
+        files: are then taken as if they were dropped on the window, in this order.
 
     Raises:
         NoDisplay: there is no screen.
@@ -150,7 +182,7 @@ def run(watch: Callable[[MainWindow], None] = lambda window: None, alive: Alive 
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
     faults = Faults(window)
-    start = _Start(window, settings, path, notice, alive, faults)
+    start = _Start(window, settings, path, notice, alive, faults, files)
     with crashes_written(), faults_logged(faults.tell):
         watch(window)
         window.show()

@@ -1,6 +1,6 @@
 """MIDI in the window: messages of the input become notes and new values of `Choices`; the dialog sets both up.
 
-Messages come in mido's thread. Notes are played there, without the window; controllers reach the window's thread
+Messages come in the input's thread. Notes are played there, without the window; controllers reach the window's thread
 through a queued signal.
 """
 
@@ -16,19 +16,20 @@ from app.instrument.events import Controller, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
 from app.playing.keyboard import Reach
 from app.playing.midi import MidiChoices, meaning_of
-from app.playing.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
+from app.playing.midi_backend import Backend, MidiUnavailable, load_backend
+from app.playing.midi_port import MidiInput
 from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
 from app.views.dialogs.midi_dialog import MidiDialog
 
 
 class MidiControl(QObject):
-    """Lives in the window's thread; notes are played in mido's.
+    """Lives in the window's thread; notes are played in the input's.
 
     Args:
         reach: the positions and amplitudes that notes pluck with; called in any thread.
         presets: the names that notes may select; called in any thread.
-        play: plucks with new values of `Choices`; called in mido's thread.
-        handle: plays an event as a pitch; False where there is no patch to play. Called in mido's thread.
+        play: plucks with new values of `Choices`; called in the input's thread.
+        handle: plays an event as a pitch; False where there is no patch to play. Called in the input's thread.
 
     Attributes:
         choices: what is to be remembered.
@@ -37,7 +38,7 @@ class MidiControl(QObject):
     performed = Signal(dict)  # new values of `Choices`, by a controller
     patch_turned = Signal(str, object)  # field and value of the patch, by the dialog
     told = Signal(str)  # an error, for the user
-    _received = Signal(object)  # emitted in mido's thread
+    _received = Signal(object)  # emitted in the input's thread
 
     def __init__(
         self,
@@ -147,7 +148,7 @@ class MidiControl(QObject):
     # Messages
 
     def _receive(self, event: Event) -> None:
-        """In mido's thread. Notes are played at once; an assigned controller waits for the window's thread.
+        """In the input's thread. Notes are played at once; an assigned controller waits for the window's thread.
 
         While a controller is waited for, one with a function of its own goes both ways.
         """

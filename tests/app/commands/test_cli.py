@@ -93,6 +93,34 @@ def test_without_a_command_the_app_opens_and_gives_its_status(monkeypatch: pytes
     assert cli.main([]) == 3
 
 
+def test_files_open_in_the_app_and_a_command_wins_over_a_file_of_its_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened: list[Path] = []
+
+    def run(files: list[Path]) -> int:
+        opened.extend(files)
+        return 3
+
+    monkeypatch.setitem(sys.modules, "app.window.main", types.SimpleNamespace(run=run))  # type: ignore[arg-type]
+    monkeypatch.chdir(tmp_path)
+    for name in ("song.mid", "models"):
+        Path(name).touch()
+    assert cli.main(["song.mid", "./models"]) == 3
+    assert opened == [tmp_path / "song.mid", tmp_path / "models"]
+    assert cli.main(["models", "--json"]) == 0
+    assert len(opened) == 2 and "koopman" in capsys.readouterr().out
+
+
+def test_an_absent_file_is_named_and_nothing_opens(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "app.window.main", None)  # type: ignore[arg-type]
+    (tmp_path / "song.mid").touch()
+    assert cli.main([str(tmp_path / "song.mid"), "gone.wav"]) == 2
+    assert capsys.readouterr().err == "learned-strings: gone.wav: no such file; check the name\n"
+
+
 def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out.strip()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from app.commands.benchmarks.tune import chord_of
+
 from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.loudness import REFERENCE_VELOCITY
 from app.instrument.offline import render_events

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from typing import Any, Protocol
 
 import mido
@@ -22,7 +21,8 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Damping, Patch
 from app.playing.live import Live
-from app.playing.midi_port import Backend, MidiInput
+from app.playing.midi_backend import Backend, MidiUnavailable, RtMidi, load_backend
+from app.playing.midi_port import MidiInput
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from engine.presets import SHIPPED
@@ -77,25 +77,16 @@ class VirtualPort:
         self._output = output
 
     def send(self, *data: int) -> None:
-        self._output.send(mido.Message.from_bytes(data))
+        self._output.send_message(data)
 
 
-def system_backend() -> tuple[Any, Any]:
-    """mido with python-rtmidi, by the first system for MIDI that answers, and a virtual output there."""
-    rtmidi = pytest.importorskip("rtmidi", reason="python-rtmidi is not installed")
-    refused: list[str] = []
-    for name in (rtmidi.get_api_name(api) for api in rtmidi.get_compiled_api()):
-        backend = mido.Backend(f"mido.backends.rtmidi/{API[name]}", load=True) if name in API else None
-        if backend is None:
-            continue
-        try:
-            return backend, backend.open_output(NAME, virtual=True)
-        except (OSError, RuntimeError, NotImplementedError) as error:
-            refused.append(f"{name}: {error}")
-    pytest.skip(f"no virtual MIDI port can be made here ({'; '.join(refused) or 'no system for MIDI'})")
-
-
-API = {"alsa": "LINUX_ALSA", "jack": "UNIX_JACK", "core": "MACOSX_CORE"}  # Windows has no virtual ports
+def system_backend() -> tuple[RtMidi, Any]:
+    """The system's MIDI and a virtual output there."""
+    try:
+        backend = load_backend()
+        return backend, backend.virtual_output(NAME)
+    except (MidiUnavailable, OSError) as error:  # Windows has no virtual ports
+        pytest.skip(f"no virtual MIDI port can be made here ({error})")
 
 
 @pytest.fixture(params=["system", "own"])
@@ -107,8 +98,7 @@ def ends(request: pytest.FixtureRequest) -> Iterator[tuple[Backend, Sender]]:
         return
     backend, output = system_backend()
     yield backend, VirtualPort(output)
-    with suppress(OSError, RuntimeError):
-        output.close()
+    output.delete()
 
 
 @pytest.fixture

@@ -185,7 +185,7 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
 def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:
     wait_for_take(qtbot, controller)
     midi = controller.instruments.midi
-    midi._receive(MidiNote(96, 127))  # as in mido's thread
+    midi._receive(MidiNote(96, 127))  # as in the input's thread
     (note,) = notes(controller)
     assert (note.stroke.pluck.position, note.stroke.pluck.amplitude_mm) == pytest.approx((0.7, 10))
     assert controller.session.choices.position == Choices().position, "the window has had no time yet"

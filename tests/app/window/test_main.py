@@ -8,6 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from app.instrument.events import NoteOn, TimedEvent
+from app.instrument.midi_file import midi_bytes
+from app.patches.library import SHIPPED as PATCHES
+
+ROOT = Path(__file__).parents[3]
 PROGRAM = """
 import threading
 from PySide6.QtCore import QTimer
@@ -33,21 +38,66 @@ raise SystemExit(status)
 """
 
 
-def test_start_and_close(tmp_path: Path) -> None:
+OPENING = """
+import json, sys
+from pathlib import Path
+from PySide6.QtCore import QTimer
+from app.instrument.events import NoteOn
+from app.window import main
+
+def watch(controller):
+    live, struck = controller.performance.live, []
+    handle = live.handle
+
+    def noted(event):
+        made = handle(event)
+        if isinstance(event, NoteOn):
+            struck.append([event.key, made is not None])
+        return made
+
+    def close_when_played():
+        if len(struck) == 2 and controller.performance.ready:
+            print(json.dumps({"struck": struck, "patch": controller.session.choices.patch.name}))
+            controller.window.close()
+
+    live.handle = noted
+    timer = QTimer(controller.window, interval=50)
+    timer.timeout.connect(close_when_played)
+    timer.start()
+
+raise SystemExit(main.run(alive=watch, files=[Path(word) for word in sys.argv[1:]]))
+"""
+
+
+def test_files_are_taken_at_the_start_and_no_note_of_a_song_is_lost(tmp_path: Path) -> None:
+    song = tmp_path / "song.mid"
+    song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.1, NoteOn(57, 90))]))
     settings = tmp_path / "settings.json"
-    settings.write_text('{"choices": {"seconds": 0.5, "preset": "a preset that is gone"}}')
-    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(settings)}
-    root = Path(__file__).parents[3]
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore::DeprecationWarning", "-c", PROGRAM],
-        env=environment,
-        cwd=root,
+    settings.write_text('{"choices": {"seconds": 0.5}}')
+    done = start(OPENING, settings, PATCHES / "concert_harp.json", song)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found == {"struck": [[50, True], [57, True]], "patch": "Concert harp"}
+
+
+def start(program: str, settings: Path, *files: Path) -> subprocess.CompletedProcess[str]:
+    """Runs a program in a process of its own, without a screen and with settings of its own."""
+    return subprocess.run(
+        [sys.executable, "-W", "ignore::DeprecationWarning", "-c", program, *map(str, files)],
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(settings)},
+        cwd=ROOT,
         capture_output=True,
         text=True,
         timeout=120,
     )
+
+
+def test_start_and_close(tmp_path: Path) -> None:
+    settings = tmp_path / "settings.json"
+    settings.write_text('{"choices": {"seconds": 0.5, "preset": "a preset that is gone"}}')
+    done = start(PROGRAM, settings)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
     saved = json.loads(settings.read_text())
-    assert (root / "presets" / f"{saved['choices']['preset']}.safetensors").is_file()
+    assert (ROOT / "presets" / f"{saved['choices']['preset']}.safetensors").is_file()
     assert saved["window_geometry"]

@@ -1,8 +1,7 @@
-"""The input with a backend of our own in place of mido, and what the window makes of it."""
+"""The input with a backend of our own in place of the system's, and what the window makes of it."""
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
@@ -18,12 +17,13 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.playing.keyboard import Reach
 from app.playing.midi import MidiChoices
-from app.playing.midi_port import MidiInput, MidiUnavailable, load_backend, same_device
+from app.playing.midi_backend import MidiUnavailable
+from app.playing.midi_port import MidiInput, same_device
 from app.window.midi_control import MidiControl
 
 
 class FakeBackend:
-    """Two inputs; `send` speaks in a thread of its own, as mido does."""
+    """Two inputs; `send` speaks in a thread of its own, as the system's does."""
 
     def __init__(self) -> None:
         self.names = ["Keys:Keys 20:0", "Pads:Pads 24:0"]
@@ -76,12 +76,6 @@ def test_faults_are_told_in_plain_words() -> None:
     assert midi.name == ""
 
 
-def test_without_the_packages_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mido", None)
-    with pytest.raises(MidiUnavailable, match=r"pip install mido python-rtmidi"):
-        load_backend()
-
-
 @pytest.fixture
 def backend() -> FakeBackend:
     return FakeBackend()
@@ -94,15 +88,6 @@ Played = list[tuple[dict[str, Any], threading.Thread]]
 def played() -> Played:
     """Notes, and the threads that they were played in."""
     return []
-
-
-def test_midos_own_variable_chooses_what_brings_messages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MIDO_BACKEND", "mido.backends.portmidi_of_nobody")
-    with pytest.raises(MidiUnavailable, match=r"MIDO_BACKEND names mido\.backends\.portmidi_of_nobody"):
-        load_backend()
-    monkeypatch.setenv("MIDO_BACKEND", "mido.backends.rtmidi/NO_SUCH_API")
-    with pytest.raises(MidiUnavailable, match="does not answer"):
-        MidiInput(lambda event: None).names()
 
 
 def control(
@@ -298,14 +283,14 @@ def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend
     assert not learn.isChecked()
 
 
-def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
-    """And the dialog says how to get them; with them, it can."""
+def test_without_the_package_nothing_can_be_learned(qtbot: QtBot) -> None:
+    """And the dialog says how to get it; with it, they can."""
     window, missing = QWidget(), True
     qtbot.addWidget(window)
 
     def load() -> FakeBackend:
         if missing:
-            raise MidiUnavailable("Get them with: pip install mido python-rtmidi")
+            raise MidiUnavailable("Install it with: pip install supriya-midi")
         return FakeBackend()
 
     midi = control(MidiChoices(), [], [], load)
@@ -314,8 +299,8 @@ def test_without_the_packages_nothing_can_be_learned(qtbot: QtBot) -> None:
     assert dialog is not None
     for _, learn, _ in dialog._rows.values():
         assert not learn.isEnabled()
-        assert "pip install mido" in learn.toolTip()
-    assert "pip install mido" in dialog._problem.text()
+        assert "pip install supriya-midi" in learn.toolTip()
+    assert "pip install supriya-midi" in dialog._problem.text()
     missing = False
     midi.show_dialog(window)
     assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())

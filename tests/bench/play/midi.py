@@ -18,9 +18,10 @@ from typing import Any
 
 from app.instrument.events import Event
 from app.instrument.midi_file import messages_of
+from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidi, load_backend
 from tests.bench.play.children import Missing, child, need_programs
 
-BACKEND = "mido.backends.rtmidi/UNIX_JACK"
+SYSTEM = "jack"
 PORT = "hands"
 RATE_HZ, PERIOD_FRAMES = 48_000, 128  # of the JACK server: a message takes a period or two
 START_PATIENCE_S = 10.0
@@ -47,7 +48,7 @@ class Cable:
         sent_s = time.monotonic()
         for message in messages_of(event):
             self._sent_s.append(time.monotonic())
-            self._output.send(message)
+            self._output.send_message(message.bytes())
         return sent_s
 
     def hear(self, _message: Any) -> None:
@@ -72,19 +73,11 @@ def cable(folder: Path) -> Iterator[Cable]:
     """Starts the server, with its files in `folder`, and ends it afterwards. The user's own MIDI is left alone.
 
     Raises:
-        Missing: it did not start, or python-rtmidi does not support JACK.
+        Missing: it did not start, or MIDI or JACK is not supported here.
     """
     need_programs("jackd")
-    try:
-        import rtmidi
-    except ImportError as error:
-        raise Missing("MIDI needs python-rtmidi: pip install mido python-rtmidi") from error
-    if rtmidi.API_UNIX_JACK not in rtmidi.get_compiled_api():
-        raise Missing("this python-rtmidi was built without JACK: install a wheel of it for Linux, or play by keys")
-    import mido
-
     server = f"play{os.getpid()}"
-    ours = {"JACK_DEFAULT_SERVER": server, "JACK_NO_START_SERVER": "1", "MIDO_BACKEND": BACKEND}
+    ours = {"JACK_DEFAULT_SERVER": server, "JACK_NO_START_SERVER": "1", VARIABLE: SYSTEM}
     command = ["jackd", "--no-realtime", "--sync", "--name", server, "-d", "dummy"]
     command += ["--rate", str(RATE_HZ), "--period", str(PERIOD_FRAMES)]
     environment = {**os.environ, "JACK_NO_AUDIO_RESERVATION": "1"}
@@ -92,10 +85,13 @@ def cable(folder: Path) -> Iterator[Cable]:
         log = stack.enter_context((folder / "jackd.log").open("wb"))
         process = stack.enter_context(child(command, environment, stdout=log, stderr=log))
         stack.enter_context(_environment(ours))
-        backend: Any = mido.Backend(BACKEND, load=True)
+        try:
+            backend = load_backend()
+        except MidiUnavailable as error:
+            raise Missing(f"{error} Or play by keys") from error
         with _quiet(folder / "jack.log"):
             output = _opened(backend, process, folder / "jackd.log")
-        stack.callback(output.close)
+        stack.callback(output.delete)
         names = [name for name in backend.get_input_names() if name.endswith(PORT)]
         if not names:
             raise Missing("JACK does not show the MIDI port that was made; play by keys")
@@ -105,13 +101,13 @@ def cable(folder: Path) -> Iterator[Cable]:
         yield made
 
 
-def _opened(backend: Any, process: subprocess.Popen[bytes], log: Path) -> Any:
+def _opened(backend: RtMidi, process: subprocess.Popen[bytes], log: Path) -> Any:
     """The output port, as soon as the server is running. Raises Missing."""
     deadline_s = time.monotonic() + START_PATIENCE_S
     while True:
         try:
-            return backend.open_output(PORT, virtual=True)
-        except (OSError, RuntimeError) as error:
+            return backend.virtual_output(PORT)
+        except OSError as error:
             if process.poll() is not None or time.monotonic() > deadline_s:
                 said = log.read_text(errors="replace").strip()[-300:]
                 raise Missing(f"no MIDI port can be had of JACK ({error}; it said: {said}); play by keys") from error

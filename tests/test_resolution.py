@@ -1,0 +1,71 @@
+"""Everything that run.py installs has wheels, resolved by uv for each Python and system that README names."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PYTHONS = ("3.11", "3.12", "3.13", "3.14")
+SYSTEMS = {  # uv's names, and README's
+    "x86_64-manylinux_2_34": "| Linux, x86-64 | glibc 2.34:",
+    "aarch64-manylinux_2_39": "| Linux, ARM64 | glibc 2.39:",
+    "aarch64-apple-darwin": "| macOS, Apple silicon | macOS 14 |",
+    "x86_64-pc-windows-msvc": "| Windows, x64 |",
+}
+MACOS = "14.0"
+# Nothing is built, and no other Python is fetched: this one stands in for it.
+COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--no-build", "--no-python-downloads")
+WHAT = ("pyproject.toml", "--constraints", "constraints.txt", "--extra", "dev", "--extra", "midi")
+CUDA = ("cuda-", "nvidia-", "triton")  # comes with torch's usual build for Linux, which pins it itself
+AT_ONCE = 8
+
+Cell = tuple[str, str]  # a Python and a system
+
+
+def resolved(cells: Sequence[Cell]) -> dict[Cell, subprocess.CompletedProcess[str]]:
+    """What uv answers for each cell: the packages with their versions on standard output, or why there are none."""
+    uv = pytest.importorskip("uv", reason="uv is not installed")
+    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": MACOS, "UV_HTTP_TIMEOUT": "20", "UV_HTTP_RETRIES": "1"}
+
+    def resolve(cell: Cell) -> subprocess.CompletedProcess[str]:
+        python, system = cell
+        target = ("--python", sys.executable, "--python-version", python, "--python-platform", system)
+        command = [uv.find_uv_bin(), *COMPILE, *target, *WHAT]
+        return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        found = dict(zip(cells, pool.map(resolve, cells), strict=True))
+    for done in found.values():
+        if "Failed to fetch" in done.stderr:
+            pytest.skip(f"the package index cannot be reached: {done.stderr.strip()}")
+    return found
+
+
+def test_every_python_and_system_installs_from_wheels() -> None:
+    found = resolved([(python, system) for python in PYTHONS for system in SYSTEMS])
+    assert {cell: done.stderr for cell, done in found.items() if done.returncode != 0} == {}
+    installed = {line.split("==")[0] for done in found.values() for line in done.stdout.splitlines()}
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    pinned = {line.split("==")[0].lower().replace("_", "-") for line in lines}
+    assert sorted(name for name in installed - pinned if not name.startswith(CUDA)) == []
+
+
+def test_systems_that_readme_leaves_out_have_no_wheels() -> None:
+    """Or README asks for more than is needed."""
+    older = ["x86_64-manylinux_2_33", "aarch64-manylinux_2_38", "x86_64-apple-darwin", "aarch64-pc-windows-msvc"]
+    found = resolved([(PYTHONS[0], system) for system in older])
+    reason = "no wheels with a matching platform tag"
+    assert {system: done.stderr for (_, system), done in found.items() if reason not in done.stderr} == {}
+
+
+def test_readme_names_these_pythons_and_systems() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert [row for row in SYSTEMS.values() if row not in readme] == []
+    assert f"Python {PYTHONS[0]} to {PYTHONS[-1]}" in readme
