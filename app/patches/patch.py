@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from app.shared.parameters import OF_PATCHES, modulated_by
+from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
 from app.shared.vocabulary import Pickup as PickupKind
 from engine import bounds
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
@@ -30,7 +30,6 @@ LONGEST_NAME = 60  # characters
 LONGEST_DESCRIPTION = 400
 LONGEST_SCALE = 2**16  # characters of a .scl or .kbm file
 MOST_STRINGS = 128
-MOST_MACROS = 8
 MOST_TARGETS = 8
 FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on Linux, macOS or Windows
 HIGHEST_KEY = 127

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
 from app.instrument.events import Controller, Event, NoteOn, fixed_function
+from app.patches.patch import Patch
 from app.playing.keyboard import Reach
-from app.shared.parameters import OF_CHOICES
+from app.shared.parameters import LEARNABLE, MACROS, OF_CHOICES
 
 LOWEST_NOTE, HIGHEST_NOTE = 36, 96  # of a keyboard of 61 keys
 LARGEST_VALUE = 127
@@ -17,13 +18,12 @@ LARGEST_VALUE = 127
 NoteMode = Literal["pitch", "position", "preset"]
 
 
-TURNED = tuple(field for field, parameter in OF_CHOICES.items() if parameter.allows("learn"))
 ControllerNumber = Annotated[int, Field(ge=0, le=LARGEST_VALUE)]
 
 
 def _learnable(field: str) -> str:
-    if field not in TURNED:
-        raise ValueError(f"is no field that a controller can turn; try {', '.join(TURNED)}")
+    if field not in LEARNABLE:
+        raise ValueError(f"is no field that a controller can turn; try {', '.join(LEARNABLE)}")
     return field
 
 
@@ -59,6 +59,17 @@ class MidiChoices(BaseModel):
         return self.model_copy(update={"controllers": others})
 
 
+def turned(patch: Patch, field: str, value: float) -> Patch:
+    """The patch with a parameter or a macro turned; as it is where it has none, or the value is impossible in it."""
+    try:
+        if field in MACROS:
+            number = list(MACROS).index(field)
+            return patch.turned(number, value) if number < len(patch.macros) else patch
+        return patch.with_value(field, value)
+    except ValueError:
+        return patch
+
+
 @dataclass(frozen=True)
 class Meaning:
     """New values of `Choices`, and whether the string is then plucked."""
@@ -67,14 +78,25 @@ class Meaning:
     plucks: bool = False
 
 
-def meaning_of(event: Event, choices: MidiChoices, reach: Reach, presets: list[str]) -> Meaning:
+def meaning_of(
+    event: Event, choices: MidiChoices, reach: Reach, presets: list[str], patch: Patch | None = None
+) -> Meaning:
     """What an event means; for a controller that is not assigned, and for a release, nothing.
 
-    `presets`: the names that notes select, in their order.
+    Args:
+        presets: the names that notes select, in their order.
+        patch: whose parameters and macros controllers turn; None: they turn none of them.
     """
     if isinstance(event, Controller):
         fields = [field for field, controller in choices.controllers.items() if controller == event.number]
-        return Meaning({field: OF_CHOICES[field].value(event.value / LARGEST_VALUE) for field in fields})
+        turns: dict[str, Any] = {}
+        for field in fields:
+            value = LEARNABLE[field].value(event.value / LARGEST_VALUE)
+            if field in OF_CHOICES:
+                turns[field] = value
+            elif patch is not None:
+                turns["patch"] = patch = turned(patch, field, value)
+        return Meaning(turns)
     if not isinstance(event, NoteOn):
         return Meaning({})
     changes: dict[str, Any] = {"amplitude_mm": reach.amplitude_of(event.velocity)}

@@ -248,7 +248,14 @@ OF_CHOICES: Mapping[str, Parameter] = {
     )
 }
 PARAMETERS: Mapping[str, Parameter] = {**OF_PATCHES, **OF_CHOICES}
-MACRO = Parameter("macro", "macro", (0, 1), 0.5, PERCENT, modulation="learn")  # the position of any macro
+MOST_MACROS = 8  # of a patch
+MACROS: Mapping[str, Parameter] = {
+    id: Parameter(id, label, (0, 1), 0.5, PERCENT, modulation="learn")
+    for id, label in ((f"macros.{number}", f"macro {number + 1}") for number in range(MOST_MACROS))
+}
+LEARNABLE: Mapping[str, Parameter] = {  # what a MIDI controller can be assigned to
+    id: each for id, each in {**OF_CHOICES, **MACROS, **OF_PATCHES}.items() if each.allows("learn")
+}
 
 
 def modulated_by(modulation: Modulation) -> Iterator[Parameter]:

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import QWidget
 from app.instrument.events import Controller, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
 from app.playing.keyboard import Reach
-from app.playing.midi import TURNED, MidiChoices, meaning_of
+from app.playing.midi import MidiChoices, meaning_of
 from app.playing.midi_port import Backend, MidiInput, MidiUnavailable, load_backend
-from app.shared.parameters import OF_CHOICES, modulated_by
+from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
 from app.views.dialogs.midi_dialog import MidiDialog
 
 
@@ -77,7 +77,7 @@ class MidiControl(QObject):
         """Opens the dialog, which does not block the window, or brings it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(
-                {field: OF_CHOICES[field].name for field in TURNED},
+                {id: f"patch: {each.name}" if id in OF_PATCHES else each.name for id, each in LEARNABLE.items()},
                 {each.id: each.name for each in modulated_by("wheel")},
                 window,
             )
@@ -174,6 +174,6 @@ class MidiControl(QObject):
             if self._dialog is not None:
                 self._dialog.show_problem("")
             self.input.let_go()  # it may be the modulation wheel, whose way back would no longer be played
-        meaning = meaning_of(event, self.choices, self._reach(), self._presets())
+        meaning = meaning_of(event, self.choices, self._reach(), self._presets(), self._patch)
         if meaning.changes:
             self.performed.emit(meaning.changes)

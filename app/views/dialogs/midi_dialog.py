@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.views.controls.parts import combo_box
+from app.views.controls.parts import combo_box, scrolled
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
@@ -40,7 +40,7 @@ class MidiDialog(QDialog):
     """Gestures emit signals; `show_…` shows what became of them.
 
     Args:
-        turned: the names of what a controller can turn, by field of `Choices`.
+        turned: the names of what a controller can turn, by the id of its parameter.
         wheel: names of what the modulation wheel can turn, by field of a patch.
     """
 
@@ -101,7 +101,9 @@ class MidiDialog(QDialog):
         heading = Label("CONTROLLERS")
         heading.setObjectName("faint")
         column.addWidget(heading)
-        column.addLayout(self._build_rows(turned))
+        rows = QWidget()
+        rows.setLayout(self._build_rows(turned))
+        column.addWidget(scrolled(rows), stretch=1)
         close = QPushButton("Close")
         close.setAutoDefault(False)
         close.setToolTip("Close the dialog; MIDI plays on (Escape)")

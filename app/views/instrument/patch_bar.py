@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QToolTip, QVBoxLayout, QWidget
 
-from app.patches.patch import MOST_MACROS, Macro, Patch, TuningChoice
-from app.shared.parameters import MACRO, OF_PATCHES
+from app.patches.patch import Macro, Patch, TuningChoice
+from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
@@ -59,7 +59,7 @@ class PatchBar(QFrame):
         self.knobs = {field: Knob(OF_PATCHES[field]) for field in MIXES}
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.changed.emit(field, value))
-        self.macros = [Knob(MACRO) for _ in range(MOST_MACROS)]
+        self.macros = [Knob(macro) for macro in MACROS.values()]
         for number, knob in enumerate(self.macros):
             knob.value_asked.connect(lambda value, number=number: self.macro_turned.emit(number, value))
             knob.hide()
