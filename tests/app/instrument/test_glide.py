@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from app.commands.benchmarks.tune import pitch_hz
 
 from app.instrument.glide import START_S, glides_cents
 from app.instrument.offline import render_note
@@ -12,6 +11,7 @@ from app.instrument.strings import Strings
 from app.patches.library import find_patch
 from app.patches.patch import Patch, TuningChoice
 from engine.presets import Preset
+from tests.bench.tune import pitch_hz
 
 RATE_HZ = 48_000
 

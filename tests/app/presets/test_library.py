@@ -16,7 +16,7 @@ from app.export.files import SoundRequest, export_sound
 from app.presets.filter import PresetFilter
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
-from app.session.choices import SECONDS_RANGE
+from app.shared.parameters import PARAMETERS
 from app.window.dropped_files import receive
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, preset_digest
@@ -159,7 +159,7 @@ def test_a_dropped_wav_that_ends_by_its_decay_leaves_the_duration(
     """As the export dialog writes it: its longest duration, 30 s, is no choice for the window."""
     export, preset = ExportChoices(), load_preset(preset_folder / "first.safetensors")
     assert export.until_decayed
-    assert export.longest_s > SECONDS_RANGE[1]
+    assert export.longest_s > PARAMETERS["seconds"].limits[1]
     request = SoundRequest(preset, Pluck(0.5, 2.0), 0.3, export.longest_s, decay_db=export.decay_db)
     export_sound(request, tmp_path / "a.wav")
     dropped = receive(tmp_path / "a.wav", library)

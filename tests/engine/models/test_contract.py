@@ -26,7 +26,7 @@ PAPER_COUNTS = {
     "fgru": 640_033,
     "frnn": 643_201,
 }
-PHYSICS = Physics(StringParameters().resonator(10), 4_000)
+PHYSICS = Physics(StringParameters().resonator(10), 4_000, 1e-3)
 
 
 def made(name: str, seed: int = 0) -> StringModel[Any]:
@@ -119,7 +119,6 @@ def test_a_preset_of_it_renders_what_the_model_does(
     info = replace(
         read_info(preset_file),
         model=name,
-        scale_m=PHYSICS.scale_m,  # of what `made` tells the model: a model of many strings holds it
         model_configuration=write(model.configuration),
         initialisation=model.own_initialisation(),
     )

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from app.commands.benchmarks.tune import pitch_hz
 from numpy.typing import NDArray
 
 from app.export.sampled.job import export_sampled, note_renderer
@@ -17,6 +16,7 @@ from app.instrument.offline import render_note
 from app.patches.library import find_patch
 from app.patches.patch import Patch
 from engine.presets import find_preset, load_preset
+from tests.bench.tune import pitch_hz
 
 RATE_HZ = 48_000
 KEYS = (52, 53)
