@@ -6,6 +6,7 @@ The mouse or the arrow keys move a cursor; a click or Enter plucks there.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pyqtgraph as pg
@@ -27,6 +28,8 @@ _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _STEP_X = POSITIONS[1] - POSITIONS[0]
 _STEP_Y = math.log10(AMPLITUDES_MM[1] / AMPLITUDES_MM[0])
+
+OUTLINE = 25  # places at which the trained amplitudes are drawn
 
 Range = tuple[float, float]
 
@@ -69,9 +72,9 @@ class ErrorPlaneView(QWidget):
         """The present pluck."""
         self.map.set_pluck(position, amplitude_mm)
 
-    def set_trained(self, position: Range | None, amplitude_mm: Range | None) -> None:
-        """The training range; `position` is None where the model was trained on noise, which has none."""
-        self.map.set_trained(position, amplitude_mm)
+    def set_trained(self, position: Range | None, amplitudes_mm: Callable[[float], Range]) -> None:
+        """The training range: positions, None for a model trained on noise, and the amplitudes at each of them."""
+        self.map.set_trained(position, amplitudes_mm)
 
     def set_words(self, text: str) -> None:
         """The line above the map while nothing is pointed at."""
@@ -140,7 +143,7 @@ class _Map(pg.PlotWidget):
         self._cursor = pg.ScatterPlotItem(symbol="+", size=15, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for thing in (self._pluck, self._cursor):
             item.addItem(thing)
-        self._trained: tuple[Range, Range] | None = None
+        self._trained: tuple[Range, Callable[[float], Range]] | None = None
         self._present = (0.35, 4.0)
         self.cursor: tuple[float, float] | None = None
 
@@ -161,23 +164,20 @@ class _Map(pg.PlotWidget):
         held_mm = min(max(amplitude_mm, AMPLITUDES_MM[0]), AMPLITUDES_MM[-1])
         self._pluck.setData([position], [math.log10(held_mm)])
 
-    def set_trained(self, position: Range | None, amplitude_mm: Range | None) -> None:
-        if amplitude_mm is None:
-            self._trained = None
-            self._outline.setData([], [])
-            return
+    def set_trained(self, position: Range | None, amplitudes_mm: Callable[[float], Range]) -> None:
         left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
-        low, high = (math.log10(min(max(mm, AMPLITUDES_MM[0] / 10), 10 * AMPLITUDES_MM[-1])) for mm in amplitude_mm)
-        self._trained = ((left, right), amplitude_mm)
-        self._outline.setData([left, right, right, left, left], [low, low, high, high, low])
+        self._trained = ((left, right), amplitudes_mm)
+        places = np.linspace(left, right, OUTLINE)
+        low, high = np.log10(
+            np.clip([amplitudes_mm(float(place)) for place in places], AMPLITUDES_MM[0] / 10, 10 * AMPLITUDES_MM[-1])
+        ).T
+        self._outline.setData([*places, *places[::-1], left], [*low, *high[::-1], low[0]])
 
     def is_trained(self, position: float, amplitude_mm: float) -> bool:
         if self._trained is None:
             return True
-        return all(
-            low - 1e-9 <= value <= high + 1e-9
-            for value, (low, high) in zip((position, amplitude_mm), self._trained, strict=True)
-        )
+        places, amplitudes_mm = self._trained
+        return _within(position, places) and _within(amplitude_mm, amplitudes_mm(position))
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:
         super().resizeEvent(event)
@@ -241,3 +241,7 @@ class _Map(pg.PlotWidget):
         else:
             self._cursor.setData([at[0]], [math.log10(at[1])])
             self.pointed.emit(*at)
+
+
+def _within(value: float, bounds: Range) -> bool:
+    return bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9

@@ -9,13 +9,14 @@ from app.presets.library import Library
 from app.rendering import Take
 from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
+from app.session.slots import info_of
 from app.views.plots.error_plane_view import ErrorPlaneView
 from app.window.panels._background import Background
 from app.window.panels.base import Moment, Panel
 from engine.pluck import Pluck
 from engine.presets import preset_digest
 
-MM = 1000.0
+FORM_FIELDS = frozenset({"preset", "string", "shape", "width"})  # other ones are another map
 SETTLED_S = 0.3  # a width that is still being turned is not computed
 MOST_KEPT = 64  # planes of some 13 KB
 
@@ -45,10 +46,12 @@ class ErrorPlanePanel(Panel):
     def choices_changed(self, names: frozenset[str]) -> None:
         entry = self.library.find(self.session.choices.preset)
         self._moved |= bool(names & {"position", "amplitude_mm"})
-        if "preset" in names and entry is not None:
-            trained = entry.info.trained_range
-            self.view.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
-        if names & {"preset", "string", "shape", "width"} and self._wanted() != self._asked:
+        if names & FORM_FIELDS and entry is not None:
+            info, pluck = info_of(self.session.choices, entry), self.session.choices.pluck
+            self.view.set_trained(
+                info.trained_range.position, lambda place: info.trained_amplitudes_mm(pluck.moved(position=place))
+            )
+        if names & FORM_FIELDS and self._wanted() != self._asked:
             self._background.cancel()
             self._asked = ()
             self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
