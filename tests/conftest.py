@@ -52,7 +52,7 @@ def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
         grid_points=101,
         horizon_steps=400,
         scale_m=1e-3,
-        trained_range=TrainedRange((0.3, 0.7), (0.02, 0.1), (1e-3, 1e-2)),
+        trained_range=TrainedRange((0.3, 0.7), {"gaussian": (0.02, 0.1)}, (1e-3, 1e-2)),
         initialisation="physics",
         seed=0,
         rel_mse=0.5,

@@ -116,14 +116,9 @@ def _hum_db(
 
 
 def _bearable(info: PresetInfo, amplitude_mm: float) -> float:
-    """An amplitude within the trained range; the tension rises as its square."""
-    low_m, high_m = info.trained_range.peak_m
-    amplitude_mm = max(0.0, min(max(amplitude_mm, 1000 * low_m), 1000 * high_m, LARGEST_AMPLITUDE_MM))
-    if (limit := info.trained_range.tension_rise) is not None:
-        shape = info.resonator.to_modes(Pluck(amplitude_mm=amplitude_mm).displacement(info.grid_points))
-        rise = float(info.resonator.relative_tension_rise(shape))
-        amplitude_mm *= min(1.0, math.sqrt(limit / rise)) if rise > 0 else 1.0
-    return amplitude_mm
+    """An amplitude of the app's own pluck within the trained range."""
+    low_mm, high_mm = info.trained_amplitudes_mm(Pluck())
+    return min(max(amplitude_mm, low_mm), high_mm, info.hardest_mm(Pluck()), LARGEST_AMPLITUDE_MM)
 
 
 def _median(values: Sequence[float]) -> float | None:

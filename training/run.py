@@ -254,10 +254,11 @@ def trained_range(data: DatasetConfiguration) -> TrainedRange:
     """What the random draws of a data set cover; noise has neither a place nor a width."""
     if data.initial == "pluck":
         position, width, peak_m = PLUCK_POSITION_RANGE, PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M
-        return TrainedRange(position, width, peak_m, data.largest_tension_rise)
+        widths = {"gaussian": width, "raised_cosine": width}
+        return TrainedRange(position, widths, peak_m, data.largest_tension_rise)
     if data.initial == "noise":
         return TrainedRange(None, None, PEAK_RANGE_M, data.largest_tension_rise)
-    return TrainedRange(CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M, data.largest_tension_rise)
+    return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, data.largest_tension_rise)
 
 
 class TrainingLog:

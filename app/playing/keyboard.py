@@ -10,7 +10,7 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
 
 if TYPE_CHECKING:
     from engine.presets import PresetInfo  # and torch with it, which settings are read without
@@ -59,7 +59,10 @@ class Reach:
         if info is None:
             return cls()
         low, high = info.trained_range.position or ANYWHERE
-        low_mm, high_mm = (1000 * peak_m for peak_m in info.trained_range.peak_m)
+        if info.trained_range.peak_m is None:  # keys from soft to hard, as far as the string bears
+            low_mm, high_mm = ANY_AMPLITUDE_MM[0], min(ANY_AMPLITUDE_MM[1], info.hardest_mm(Pluck()))
+        else:
+            low_mm, high_mm = info.trained_amplitudes_mm(Pluck())
         return cls(
             (max(low, POSITION_RANGE[0]), min(high, POSITION_RANGE[1])),
             (max(low_mm, SOFTEST_MM), min(high_mm, LARGEST_AMPLITUDE_MM)),

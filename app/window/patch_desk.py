@@ -321,7 +321,7 @@ class PatchDesk(QObject):
         except PresetError as error:
             raise PresetError(f"{file.name}: {error}") from error
         self._session.update(preset=many.name, string=PhysicalString(**asdict(string)))
-        outside = many.info.family.outside(string) if many.info.family is not None else []
+        outside = [one.words for one in many.info.family.outside(string)] if many.info.family is not None else []
         beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""
         self.informed.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
 

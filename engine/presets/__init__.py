@@ -18,7 +18,7 @@ from engine.presets.file import (
 )
 from engine.presets.finding import SHIPPED, find_preset, preset_files, unreadable
 from engine.presets.info import PresetInfo, TrainedRange, outside_training
-from engine.presets.of_string import STRINGS, find_string, of_string, read_string
+from engine.presets.of_string import STRINGS, find_string, of_string, read_described_string, read_string
 
 __all__ = [
     "SHIPPED",
@@ -35,6 +35,7 @@ __all__ = [
     "outside_training",
     "preset_digest",
     "preset_files",
+    "read_described_string",
     "read_info",
     "read_string",
     "save_preset",

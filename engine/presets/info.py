@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
 from engine import bounds
 from engine.models import MODELS
-from engine.pluck import Pluck
+from engine.pluck import SHAPES, Pluck
 from engine.presets.migrations import FORMAT_VERSION
 from engine.resonators.base import Resonator
-from engine.resonators.family import StringFamily
+from engine.resonators.family import Bounds, StringFamily
 from engine.resonators.string import StringParameters
+
+# A model of many strings plays wider plucks than the trained ones as well, until the ends cut a Gaussian off.
+_WIDEST = {"gaussian": 0.2}
 
 
 @dataclass(frozen=True)
@@ -20,19 +24,27 @@ class TrainedRange:
     """What the initial displacements of the training set covered; None: not a parameter of that kind.
 
     Attributes:
-        tension_rise: the largest ΔT/T₀, to which draws were softened; None: they were left as drawn.
+        width: by shape, as `Pluck` counts it; a shape that was not drawn, or has no width, is absent.
+        peak_m: None: draws were scaled to a rise of tension instead.
+        tension_rise: the largest ΔT/T₀, to which draws were softened or scaled; None: they were left as drawn.
     """
 
-    position: tuple[float, float] | None
-    width: tuple[float, float] | None
-    peak_m: tuple[float, float]
+    position: Bounds | None
+    width: dict[str, Bounds] | None
+    peak_m: Bounds | None
     tension_rise: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("position", "width", "peak_m"):
-            low, high = getattr(self, name) or (0.0, 0.0)
+        ranges = {"position": self.position, "peak_m": self.peak_m}
+        for shape, width in (self.width or {}).items():
+            if shape not in SHAPES:
+                raise ValueError(f"width is of {bounds.brief(shape)}, not of one of {', '.join(SHAPES)}")
+            ranges[f"width.{shape}"] = width
+        for name, (low, high) in ((name, found) for name, found in ranges.items() if found is not None):
             if not 0 <= low <= high:
                 raise ValueError(f"{name} must be a range from 0 on, not {low:g} … {high:g}")
+        if self.peak_m is None and self.tension_rise is None:
+            raise ValueError("peak_m or tension_rise must be given: how hard plucks were in the training")
 
 
 @dataclass(frozen=True)
@@ -97,6 +109,31 @@ class PresetInfo:
             self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
         )
 
+    def tension_rise(self, pluck: Pluck) -> float:
+        """ΔT/T₀ of its string as it is pulled."""
+        displacement = pluck.displacement(self.grid_points)
+        return float(self.resonator.relative_tension_rise(self.resonator.to_modes(displacement)))
+
+    def hardest_mm(self, pluck: Pluck) -> float:
+        """The amplitude at which a pluck of this shape, place and width has the largest trained rise of tension.
+
+        inf where none is too large.
+        """
+        limit = self.trained_range.tension_rise
+        if limit is None or (rise := self.tension_rise(pluck.moved(amplitude_mm=1.0))) == 0:
+            return math.inf
+        return math.sqrt(limit / rise)
+
+    def trained_amplitudes_mm(self, pluck: Pluck) -> Bounds:
+        """The trained amplitudes of plucks of this shape, place and width, from the least to the largest.
+
+        Where draws were scaled to a rise of tension, from 0 on: the softer a pluck, the nearer to the linear string.
+        """
+        if self.trained_range.peak_m is None:
+            return 0.0, self.hardest_mm(pluck)
+        low_m, high_m = self.trained_range.peak_m
+        return 1000 * low_m, 1000 * high_m
+
     @property
     def string_kind(self) -> str:
         """The command line's word: "linear" or "nonlinear"."""
@@ -104,36 +141,39 @@ class PresetInfo:
 
 
 def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
-    """How a pluck differs from what the preset was trained on, in plain words; empty where it does not."""
+    """How a pluck differs from what the preset was trained on, in plain words; empty where it does not.
+
+    Of a preset of many strings only where its error is known to grow: see `docs/many-strings.md`.
+    """
+    trained = info.trained_range
+    width = (trained.width or {}).get(pluck.shape)
     if info.initial == "noise":
         found = [f"a {pluck.shape.replace('_', ' ')} pluck is not the noise that this preset was trained on"]
     elif info.initial == "gaussian" and pluck.shape != "gaussian":
         found = [f"shape {pluck.shape.replace('_', ' ')} is not the trained gaussian"]
-    elif pluck.shape == "triangular":
-        found = []  # it has no width
+    elif width is None or (info.family and width[0] <= pluck.width <= _WIDEST.get(pluck.shape, math.inf)):
+        found = []
     else:
-        found = _beyond("width", pluck.width, info.trained_range.width)
-    peak_mm = (1000 * info.trained_range.peak_m[0], 1000 * info.trained_range.peak_m[1])
+        found = _beyond("width", pluck.width, width)
+    peak_mm = None if trained.peak_m is None else info.trained_amplitudes_mm(pluck)
+    beyond = info.family.outside(info.string) if info.family else []
     return [
-        *_beyond("position", pluck.position, info.trained_range.position),
+        *_beyond("position", pluck.position, trained.position),
         *found,
         *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
         *_too_tense(info, pluck),
-        *(info.family.outside(info.string) if info.family else []),
+        *(one.words for one in beyond if one.error_grows),
     ]
 
 
 def _too_tense(info: PresetInfo, pluck: Pluck) -> list[str]:
     limit = info.trained_range.tension_rise
-    if limit is None:
-        return []
-    rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(pluck.displacement(info.grid_points))))
-    if rise <= limit:
+    if limit is None or (rise := info.tension_rise(pluck)) <= limit:
         return []
     return [f"the pluck raises the tension by {rise:.0%}, beyond the trained {limit:.0%}: pull less, or wider"]
 
 
-def _beyond(name: str, value: float, trained: tuple[float, float] | None, unit: str = "") -> list[str]:
+def _beyond(name: str, value: float, trained: Bounds | None, unit: str = "") -> list[str]:
     if trained is None or trained[0] <= value <= trained[1]:
         return []
     return [f"{name} {value:.4g}{unit} is outside the trained {trained[0]:g} … {trained[1]:g}{unit}"]

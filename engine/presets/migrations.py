@@ -49,7 +49,39 @@ def _displacement_alone(data: Metadata) -> Metadata:
     return {**data, "model_configuration": {name: value for name, value in sizes.items() if name != "input"}}
 
 
-MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {1: _knows, 2: _one_string, 3: _displacement_alone}
+def _range_of_training(data: Metadata) -> Metadata:
+    """4 → 5: widths by shape; no peak of plucks that were scaled to a rise of tension, as those of a family are."""
+    trained, family = data.get("trained_range"), data.get("family")
+    if not isinstance(trained, dict):
+        return data
+    width = trained.get("width")
+    if isinstance(family, dict):
+        low, high = _pair(family.get("half_width"))
+        widths: Any = {"gaussian": [low, high], "raised_cosine": [2 * low, 2 * high]}
+        trained = {**trained, "peak_m": None}
+    elif width is None:
+        widths = None
+    else:
+        widths = {"gaussian": width} if data.get("initial") == "gaussian" else dict.fromkeys(_WITH_A_WIDTH, width)
+    return {**data, "trained_range": {**trained, "width": widths}}
+
+
+_WITH_A_WIDTH = ("gaussian", "raised_cosine")
+
+
+def _pair(data: object) -> tuple[float, float]:
+    """Two numbers; of anything else two zeros, for the family itself is refused."""
+    if isinstance(data, list) and len(data) == 2 and all(type(each) in (int, float) for each in data):
+        return data[0], data[1]
+    return 0.0, 0.0
+
+
+MIGRATIONS: Mapping[int, Callable[[Metadata], Metadata]] = {
+    1: _knows,
+    2: _one_string,
+    3: _displacement_alone,
+    4: _range_of_training,
+}
 FORMAT_VERSION = max(MIGRATIONS) + 1
 
 

@@ -17,9 +17,15 @@ STRINGS = SHIPPED / "strings"
 
 
 def read_string(path: Path) -> StringParameters:
-    """The string of a TOML file: its eight parameters at top level, as `[data.string]` of a configuration has them.
+    """The string of a TOML file; see `read_described_string`."""
+    return read_described_string(path)[0]
 
-    All must be given: a string that is named by its file is not that of the paper where the file is silent.
+
+def read_described_string(path: Path) -> tuple[StringParameters, str]:
+    """The string of a TOML file, and its `description` in one line, "" where the file has none.
+
+    Its eight parameters stand at top level, as `[data.string]` of a configuration has them. All must be given: a
+    string that is named by its file is not that of the paper where the file is silent.
 
     Raises:
         SchemaError: see `read_toml`; a field is unknown, impossible or missing: the message names file,
@@ -27,13 +33,16 @@ def read_string(path: Path) -> StringParameters:
         OSError: the file cannot be read.
     """
     data = read_toml(path)
+    description = data.pop("description", "")
+    if not isinstance(description, str):
+        raise SchemaError(f"{path}: description must be a text; put it in quotes")
     string = read(StringParameters, data, str(path))
     if missing := [field.name for field in fields(string) if field.name not in data]:
         raise SchemaError(
             f"{path}: {', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; "
             f"a string's file gives all of {', '.join(field.name for field in fields(string))}"
         )
-    return string
+    return string, " ".join(description.split())
 
 
 def find_string(name_or_path: str) -> Path:

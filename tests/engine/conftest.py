@@ -81,7 +81,7 @@ def small_info() -> Callable[[bool], PresetInfo]:
             grid_points=41,
             horizon_steps=400,
             scale_m=1e-3,
-            trained_range=TrainedRange((0.3, 0.7), (0.02, 0.1), (1e-3, 1e-2)),
+            trained_range=TrainedRange((0.3, 0.7), {"gaussian": (0.02, 0.1)}, (1e-3, 1e-2)),
             initialisation="physics",
             seed=0,
         )

@@ -59,6 +59,8 @@ def test_a_run_that_goes_on_from_an_older_checkpoint_repeats_no_epoch(tmp_path: 
 @pytest.mark.parametrize("kind", ["gaussian", "noise", "pluck"])
 def test_the_trained_range_is_that_of_the_draws(kind: str) -> None:
     found = trained_range(DatasetConfiguration(kind, 4000, 5, largest_tension_rise=0.5))  # type: ignore[arg-type]
+    widths = {"gaussian": {"gaussian": (0.02, 0.1)}, "noise": None}
+    assert found.width == widths.get(kind, {"gaussian": (0.03, 0.3), "raised_cosine": (0.03, 0.3)})
     assert found.peak_m == ((5e-4, 1e-2) if kind == "pluck" else (1e-3, 1e-2))
     assert (found.position is None, found.width is None) == (kind == "noise", kind == "noise")
     assert found.tension_rise == 0.5

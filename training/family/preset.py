@@ -9,7 +9,6 @@ from pathlib import Path
 
 import torch
 
-from engine.excitation import PLUCK_PEAK_RANGE_M
 from engine.models import KoopmanTension, build_model
 from engine.models.base import Physics
 from engine.presets import PresetInfo, TrainedRange, save_preset
@@ -120,12 +119,7 @@ def train_preset(
         grid_points=GRID_POINTS,
         horizon_steps=steps,
         scale_m=SCALE_M,
-        trained_range=TrainedRange(
-            family.position,
-            (family.half_width[0], 2 * family.half_width[1]),
-            PLUCK_PEAK_RANGE_M,
-            family.tension_rise[1],
-        ),
+        trained_range=TrainedRange(family.position, family.width, None, family.tension_rise[1]),
         initialisation=c.initialisation,
         knows=KoopmanTension.initialisations[c.initialisation],
         seed=c.seed,

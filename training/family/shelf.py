@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from engine.presets import STRINGS, Preset, of_string, read_string, save_preset
+from engine.presets import STRINGS, Preset, of_string, read_described_string, save_preset
 
 TITLES = {
     "nylon_e4": "Nylon guitar, E4",
@@ -40,10 +40,9 @@ def put_on_shelf(preset: Preset, folder: Path) -> list[Path]:
     """Writes a preset for each string of `TITLES`; the errors that it tells are those of the family."""
     written = []
     for name, title in TITLES.items():
-        file = STRINGS / f"{name}.toml"
-        told = " ".join(line[1:].strip() for line in file.read_text().splitlines() if line.startswith("#"))
-        own = of_string(preset, read_string(file))
-        info = replace(own.info, title=title, description=f"{told} Played by the model of every string.")
+        string, description = read_described_string(STRINGS / f"{name}.toml")
+        own = of_string(preset, string)
+        info = replace(own.info, title=title, description=f"{description} Played by the model of every string.")
         written.append(folder / f"studio_any_{name}.safetensors")
         save_preset(written[-1], info, own.model)
     return written

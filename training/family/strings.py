@@ -15,6 +15,7 @@ import numpy as np
 from torch import Tensor
 
 from engine import excitation
+from engine.pluck import Shape
 from engine.resonators.base import Resonator
 from engine.resonators.family import BRIGHT_HZ, StringFamily
 from engine.resonators.string import StringParameters
@@ -22,6 +23,7 @@ from engine.resonators.string import StringParameters
 Column = Literal["inside", "beyond"]
 COLUMNS: tuple[Column, ...] = get_args(Column)
 SPLITS = ("train", "validation", "test")
+DRAWN_SHAPES: tuple[Shape, ...] = ("triangular", "raised_cosine", "gaussian")
 FAMILY_VERSION = 1  # of what a seed means
 HIGHEST_HZ = 20_000.0
 MOST_MODES = 99
@@ -54,9 +56,12 @@ class PluckedString:
 
 def draw_string(column: Column, split: str, number: int, seed: int = 0) -> PluckedString:
     """The string of a number; the same for ever, however many are drawn."""
-    ranges = FAMILY[column]
     entropy = (FAMILY_VERSION, seed, COLUMNS.index(column), SPLITS.index(split), number)
-    random = np.random.default_rng(entropy)
+    return draw_from(FAMILY[column], np.random.default_rng(entropy))
+
+
+def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | None = None) -> PluckedString:
+    """A string and a pluck of it within any ranges; the shape is drawn where none is given."""
     while True:
         pitch_hz, inharmonicity = (_either(random, r) for r in (ranges.pitch_hz, ranges.inharmonicity))
         t60_s, bright_t60_s = _log_uniform(random, ranges.t60_s), _log_uniform(random, ranges.bright_t60_s)
@@ -64,11 +69,12 @@ def draw_string(column: Column, split: str, number: int, seed: int = 0) -> Pluck
             break
     string = string_of(pitch_hz, inharmonicity, t60_s, bright_t60_s)
     resonator = string.resonator(min(MOST_MODES, string.modes_below(HIGHEST_HZ)), grid_points=GRID_POINTS)
-    shape, place = int(random.integers(3)), float(random.uniform(*ranges.position))
+    drawn, place = DRAWN_SHAPES[int(random.integers(3))], float(random.uniform(*ranges.position))
     half_width, rise = _log_uniform(random, ranges.half_width), _log_uniform(random, ranges.tension_rise)
-    if shape == 0:
+    shape = shape or drawn
+    if shape == "triangular":
         displacement = excitation.triangular(place, 1e-3, GRID_POINTS)
-    elif shape == 1:
+    elif shape == "raised_cosine":
         displacement = excitation.raised_cosine(place, 2 * half_width, 1e-3, GRID_POINTS)
     else:
         displacement = excitation.gaussian(place, half_width, 1e-3, GRID_POINTS)
@@ -114,4 +120,4 @@ def _either(random: np.random.Generator, bounds: tuple[tuple[float, float], ...]
     return _log_uniform(random, bounds[int(random.integers(len(bounds)))])
 
 
-__all__ = ["COLUMNS", "FAMILY", "Column", "PluckedString", "displacement_m", "draw_string", "string_of"]
+__all__ = ["COLUMNS", "FAMILY", "Column", "PluckedString", "displacement_m", "draw_from", "draw_string", "string_of"]

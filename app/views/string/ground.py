@@ -129,8 +129,8 @@ def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: Tr
     left, right = trained.position or (0.0, 1.0)  # beside them it is shaded already
     free = Qt.AlignmentFlag.AlignLeft if pluck else Qt.AlignmentFlag.AlignRight
     for bottom_mm, top_mm, text in (
-        (0.0, min(low_mm, axes.span_mm), f"not trained below {low_mm:g} mm"),
-        (high_mm, axes.span_mm, f"not trained above {high_mm:g} mm"),
+        (0.0, min(low_mm, axes.span_mm), f"not trained below {low_mm:.3g} mm"),
+        (high_mm, axes.span_mm, f"not trained above {high_mm:.3g} mm"),
     ):
         if top_mm <= bottom_mm:
             continue

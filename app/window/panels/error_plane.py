@@ -6,6 +6,7 @@ The mouse or the arrow keys move a cursor; a click or Enter plucks there.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pyqtgraph as pg
@@ -17,6 +18,7 @@ from app.playing.chosen import subject_of
 from app.presets.library import Library
 from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
+from app.session.slots import info_of
 from app.shared.worker import Job
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, lay_out_view, words_label
@@ -28,7 +30,7 @@ from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 from engine.pluck import Pluck
 from engine.presets import preset_digest
 
-MM = 1000.0
+FORM_FIELDS = frozenset({"preset", "string", "shape", "width"})  # other ones are another map
 SETTLED_S = 0.3  # a width that is still being turned is not computed
 MOST_KEPT = 64  # planes of some 13 KB
 SCALE = (8e-4, 1.25)  # relative errors at the ends of the colours
@@ -37,6 +39,7 @@ _LABELLED_MM = (0.5, 1, 2, 5, 10, 20)
 _LABELLED_ERRORS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _STEP_X = POSITIONS[1] - POSITIONS[0]
 _STEP_Y = math.log10(AMPLITUDES_MM[1] / AMPLITUDES_MM[0])
+OUTLINE = 25  # places at which the trained amplitudes are drawn
 
 Range = tuple[float, float]
 
@@ -78,10 +81,12 @@ class ErrorPlanePanel(Panel):
     def choices_changed(self, names: frozenset[str]) -> None:
         entry = self.library.find(self.session.choices.preset)
         self._moved |= bool(names & {"position", "amplitude_mm"})
-        if "preset" in names and entry is not None:
-            trained = entry.info.trained_range
-            self.map.set_trained(trained.position, (MM * trained.peak_m[0], MM * trained.peak_m[1]))
-        if names & {"preset", "string", "shape", "width"} and self._wanted() != self._asked:
+        if names & FORM_FIELDS and entry is not None:
+            info, pluck = info_of(self.session.choices, entry), self.session.choices.pluck
+            self.map.set_trained(
+                info.trained_range.position, lambda place: info.trained_amplitudes_mm(pluck.moved(position=place))
+            )
+        if names & FORM_FIELDS and self._wanted() != self._asked:
             self.background.cancel()
             self._asked = ()
             self._unchanged_s = 0.0 if "preset" not in names else SETTLED_S
@@ -206,7 +211,7 @@ class _Map(PointedPlot):
         self._cursor = pg.ScatterPlotItem(symbol="+", size=15, pen=pg.mkPen(theme.TEXT, width=1), brush=None)
         for thing in (self._pluck, self._cursor):
             item.addItem(thing)
-        self._trained: tuple[Range, Range] | None = None
+        self._trained: tuple[Range, Callable[[float], Range]] | None = None
         self._present = (0.35, 4.0)
         self.cursor: tuple[float, float] | None = None
 
@@ -227,23 +232,21 @@ class _Map(PointedPlot):
         held_mm = min(max(amplitude_mm, AMPLITUDES_MM[0]), AMPLITUDES_MM[-1])
         self._pluck.setData([position], [math.log10(held_mm)])
 
-    def set_trained(self, position: Range | None, amplitude_mm: Range | None) -> None:
-        if amplitude_mm is None:
-            self._trained = None
-            self._outline.setData([], [])
-            return
+    def set_trained(self, position: Range | None, amplitudes_mm: Callable[[float], Range]) -> None:
+        """The training range: positions, None for a model trained on noise, and the amplitudes at each of them."""
         left, right = position or (float(POSITIONS[0]), float(POSITIONS[-1]))
-        low, high = (math.log10(min(max(mm, AMPLITUDES_MM[0] / 10), 10 * AMPLITUDES_MM[-1])) for mm in amplitude_mm)
-        self._trained = ((left, right), amplitude_mm)
-        self._outline.setData([left, right, right, left, left], [low, low, high, high, low])
+        self._trained = ((left, right), amplitudes_mm)
+        places = np.linspace(left, right, OUTLINE)
+        low, high = np.log10(
+            np.clip([amplitudes_mm(float(place)) for place in places], AMPLITUDES_MM[0] / 10, 10 * AMPLITUDES_MM[-1])
+        ).T
+        self._outline.setData([*places, *places[::-1], left], [*low, *high[::-1], low[0]])
 
     def is_trained(self, position: float, amplitude_mm: float) -> bool:
         if self._trained is None:
             return True
-        return all(
-            low - 1e-9 <= value <= high + 1e-9
-            for value, (low, high) in zip((position, amplitude_mm), self._trained, strict=True)
-        )
+        places, amplitudes_mm = self._trained
+        return _within(position, places) and _within(amplitude_mm, amplitudes_mm(position))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         at = self._at(event.position())
@@ -298,3 +301,7 @@ class _Map(PointedPlot):
         else:
             self._cursor.setData([at[0]], [math.log10(at[1])])
             self.pointed.emit(*at)
+
+
+def _within(value: float, bounds: Range) -> bool:
+    return bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9

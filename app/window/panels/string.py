@@ -21,7 +21,7 @@ from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
 from app.window.panels.base import Moment, Panel
 from engine.metrics import ErrorSums
-from engine.pluck import SHAPES, WIDTH_RANGE
+from engine.pluck import SHAPES, WIDTH_RANGE, Pluck
 from engine.presets import PresetInfo, outside_training
 
 MM = 1000.0
@@ -117,7 +117,7 @@ class StringPanel(Panel):
         shape_mm = choices.pluck.displacement(SHAPE_POINTS).numpy() * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
-        view.set_trained(_trained(entry.info) if entry else TrainedPlucks())
+        view.set_trained(_trained(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
         view.set_warning(self._pluck_warning())
 
     def _pluck_warning(self) -> str:
@@ -161,6 +161,5 @@ def _label(choices: Choices) -> str:
     return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
 
 
-def _trained(info: PresetInfo) -> TrainedPlucks:
-    low_m, high_m = info.trained_range.peak_m
-    return TrainedPlucks(info.trained_range.position, (MM * low_m, MM * high_m))
+def _trained(info: PresetInfo, pluck: Pluck) -> TrainedPlucks:
+    return TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(pluck))

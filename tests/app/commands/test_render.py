@@ -157,7 +157,7 @@ def _impossible(tensors: Tensors, facts: dict[str, Any]) -> None:
         (_re_typed, "tensor 'nu_log' is of type F64, expected F32"),
         (_re_shaped, "tensor 'nu_log' has shape (15,), expected (16,)"),
         (_not_finite, "tensor 'nu_log' holds values that are not finite"),
-        (_newer, "format_version 99 is newer than this program's 4; update the program"),
+        (_newer, "format_version 99 is newer than this program's 5; update the program"),
         (_impossible, "rate_hz must be above 0"),
     ],
 )

@@ -19,7 +19,8 @@ from app.playing.keyboard import (
     semitone_of,
     turn,
 )
-from engine.presets import read_info
+from engine.pluck import Pluck
+from engine.presets import find_preset, read_info
 
 REACH = Reach((0.3, 0.7), (1.0, 10.0))
 
@@ -86,6 +87,15 @@ def test_what_is_played_is_round_and_within_reach() -> None:
 def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
     assert Reach.of(read_info(small_preset)) == Reach((0.3, 0.7), (1.0, 10.0))
     assert Reach.of(None).position == (0.05, 0.95)
+
+
+def test_keys_of_a_model_of_many_strings_reach_as_hard_as_it_was_trained() -> None:
+    """Up to the rise of tension; a string that bears more than the loudest key is played as any other."""
+    nylon, harp = (read_info(find_preset(name)) for name in ("studio_any_string", "studio_any_harp_c6"))
+    assert Reach.of(nylon) == Reach((0.06, 0.94), (0.5, 10.0))
+    low_mm, high_mm = Reach.of(harp).amplitude_mm
+    assert low_mm == 0.5
+    assert harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
 
 
 def test_two_rows_are_a_piano() -> None:

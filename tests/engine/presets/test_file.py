@@ -219,7 +219,10 @@ def test_plucks_outside_training_are_told(preset_file: Path) -> None:
     for word in ("position 0.1 ", "width 0.3", "15"):
         assert word in text
     assert "not the trained gaussian" in "; ".join(outside_training(info, Pluck(0.5, 5.0, "triangular")))
-    any_shape = replace(info, initial="pluck")
+    widths = {"gaussian": (0.02, 0.1), "raised_cosine": (0.1, 0.3)}
+    any_shape = replace(info, initial="pluck", trained_range=replace(info.trained_range, width=widths))
+    assert "width 0.09" in "; ".join(outside_training(any_shape, Pluck(0.5, 5.0, "raised_cosine", 0.09)))
+    assert outside_training(any_shape, Pluck(0.5, 5.0, "gaussian", 0.09)) == []
     assert outside_training(any_shape, Pluck(0.5, 5.0, "triangular", 0.5)) == []
     assert "width 0.5" in "; ".join(outside_training(any_shape, Pluck(0.5, 5.0, "raised_cosine", 0.5)))
     free = replace(info, trained_range=replace(info.trained_range, position=None, width=None))
@@ -227,3 +230,63 @@ def test_plucks_outside_training_are_told(preset_file: Path) -> None:
     tense = replace(info, trained_range=replace(info.trained_range, tension_rise=0.01))
     assert outside_training(tense, Pluck(0.5, 1.0, "gaussian", 0.05)) == []
     assert "beyond the trained 1%" in "; ".join(outside_training(tense, Pluck(0.5, 5.0, "gaussian", 0.05)))
+
+
+def any_string(name: str = "studio_any_string") -> PresetInfo:
+    return read_info(find_preset(name))
+
+
+@pytest.mark.parametrize("name", ["studio_any_string", "studio_any_harp_c6", "studio_any_nylon_e4"])
+def test_a_model_of_many_strings_was_trained_in_rises_of_tension(name: str) -> None:
+    """No peak: a loose string was pulled further than a tense one. Widths are those of each shape."""
+    info = any_string(name)
+    assert info.trained_range.peak_m is None
+    assert info.trained_range.tension_rise == 0.5
+    assert info.trained_range.width == {"gaussian": (0.04, 0.15), "raised_cosine": (0.08, 0.3)}
+    pluck = Pluck(0.3, 4.0, "raised_cosine", 0.2)
+    least_mm, largest_mm = info.trained_amplitudes_mm(pluck)
+    assert least_mm == 0
+    assert largest_mm == info.hardest_mm(pluck) == pytest.approx(4.0 * (0.5 / info.tension_rise(pluck)) ** 0.5)
+
+
+@pytest.mark.parametrize(
+    ("pluck", "words"),
+    [
+        (Pluck(0.12, 20.0, "triangular"), ""),  # 20 mm raise the tension of a nylon B3 by a fifth
+        (Pluck(0.3, 0.01, "gaussian", 0.06), ""),
+        (Pluck(0.3, 4.0, "gaussian", 0.19), ""),
+        (Pluck(0.3, 4.0, "raised_cosine", 0.5), ""),
+        (Pluck(0.3, 4.0, "gaussian", 0.25), "width 0.25 is outside the trained 0.04 … 0.15"),
+        (Pluck(0.3, 4.0, "gaussian", 0.03), "width 0.03 is outside the trained 0.04 … 0.15"),
+        (Pluck(0.3, 4.0, "raised_cosine", 0.06), "width 0.06 is outside the trained 0.08 … 0.3"),
+        (Pluck(0.03, 4.0, "gaussian", 0.06), "position 0.03 is outside"),
+        (Pluck(0.3, 20.0, "gaussian", 0.04), "beyond the trained 50%"),
+    ],
+)
+def test_plucks_of_any_string_are_warned_of_where_the_error_grows(pluck: Pluck, words: str) -> None:
+    found = outside_training(any_string(), pluck)
+    assert len(found) == bool(words)
+    assert words in "".join(found)
+
+
+@pytest.mark.parametrize(("name", "words"), [("bass_e1", ""), ("harp_c6", ""), ("piano_c2", "decay time near 3 kHz")])
+def test_strings_are_warned_of_where_the_error_grows(name: str, words: str) -> None:
+    """Not of a pitch below or above the trained ones."""
+    found = outside_training(any_string(f"studio_any_{name}"), Pluck(0.3, 1.0, "triangular"))
+    assert len(found) == bool(words)
+    assert words in "".join(found)
+
+
+RANGE_FAULTS = {
+    "nothing": (lambda d: d.update(peak_m=None), "peak_m or tension_rise must be given"),
+    "a shape": (lambda d: d.update(width={"square": [0.1, 0.2]}), "width is of 'square', not of one of gaussian"),
+    "an order": (lambda d: d.update(width={"gaussian": [0.2, 0.1]}), r"width.gaussian must be a range from 0 on"),
+    "a table": (lambda d: d.update(width=[0.1, 0.2]), "width: expected a table"),
+}
+
+
+@pytest.mark.parametrize("fault", RANGE_FAULTS)
+def test_a_wrong_trained_range_is_named(preset_file: Path, fault: str) -> None:
+    change, message = RANGE_FAULTS[fault]
+    with pytest.raises(PresetError, match=rf"metadata\.trained_range.*{message}"):
+        load_preset(rewritten(preset_file, info=lambda data: change(data["trained_range"])))

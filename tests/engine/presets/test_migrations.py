@@ -73,6 +73,39 @@ def test_the_input_of_version_3_is_what_every_model_sets_out_from() -> None:
         migrated({"format_version": 3, "model_configuration": {"input": "two_frames"}})
 
 
+@pytest.mark.parametrize(
+    ("initial", "family", "width", "peak_m", "expected"),
+    [
+        ("gaussian", None, [0.02, 0.1], [1e-3, 1e-2], {"gaussian": [0.02, 0.1]}),
+        ("noise", None, None, [1e-3, 1e-2], None),
+        ("pluck", None, [0.03, 0.3], [5e-4, 1e-2], {"gaussian": [0.03, 0.3], "raised_cosine": [0.03, 0.3]}),
+        (
+            "pluck",
+            {"half_width": [0.04, 0.15]},
+            [0.04, 0.3],
+            [5e-4, 1e-2],
+            {"gaussian": [0.04, 0.15], "raised_cosine": [0.08, 0.3]},
+        ),
+    ],
+)
+def test_version_4_states_widths_by_shape_and_no_peak_of_a_family(
+    initial: str, family: Any, width: Any, peak_m: Any, expected: Any
+) -> None:
+    of_plucks = {"position": None, "width": width, "peak_m": peak_m, "tension_rise": 0.5}
+    old = {"format_version": 4, "initial": initial, "family": family, "trained_range": of_plucks}
+    found = migrated(old)
+    assert found["format_version"] == FORMAT_VERSION
+    assert found["trained_range"] == {**of_plucks, "width": expected, "peak_m": None if family else peak_m}
+    assert old["trained_range"] is of_plucks  # what is given stays as it is
+    assert of_plucks["width"] == width
+
+
+@pytest.mark.parametrize("wrong", [None, 5, "wide", [1], {"half_width": "wide"}, {"half_width": [1]}, {}])
+def test_what_is_no_range_is_left_to_the_reader(wrong: Any) -> None:
+    for data in ({"trained_range": wrong}, {"trained_range": {}, "family": wrong}):
+        assert migrated({"format_version": 4, **data})["format_version"] == FORMAT_VERSION
+
+
 @pytest.mark.parametrize("version", [None, 0, -1, "1", True, 1.0, FORMAT_VERSION + 1])
 def test_other_versions_are_refused(version: Any) -> None:
     remedy = "update the program" if version == FORMAT_VERSION + 1 else "get the preset again"
@@ -93,6 +126,7 @@ def test_a_preset_of_version_1_loads_with_the_same_weights(small_preset: Path, t
     del facts["knows"]
     facts["format_version"] = 1
     facts["model_configuration"]["input"] = "displacement"
+    facts["trained_range"]["width"] = facts["trained_range"]["width"]["gaussian"]
     path = tmp_path / "old.safetensors"
     save_file(load_file(small_preset), path, metadata={METADATA_KEY: json.dumps(facts)})
     old, new = load_preset(path), load_preset(small_preset)

@@ -10,7 +10,16 @@ import pytest
 import torch
 
 from engine.pluck import Pluck
-from engine.presets import STRINGS, PresetError, find_preset, find_string, load_preset, of_string, read_string
+from engine.presets import (
+    STRINGS,
+    PresetError,
+    find_preset,
+    find_string,
+    load_preset,
+    of_string,
+    read_described_string,
+    read_string,
+)
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError
 from engine.sources import ModelSource, TruthSource, project
@@ -76,6 +85,14 @@ def test_a_string_file_is_read(tmp_path: Path) -> None:
     assert read_string(tmp_path / "steel.toml") == STEEL
 
 
+def test_a_string_file_may_describe_its_string(tmp_path: Path) -> None:
+    file = tmp_path / "steel.toml"
+    file.write_text('description = """\nSteel of 7850 kg/m³,\n 0.25 mm."""\n' + TOML, encoding="utf-8")
+    assert read_described_string(file) == (STEEL, "Steel of 7850 kg/m³, 0.25 mm.")
+    file.write_text(TOML, encoding="utf-8")
+    assert read_described_string(file) == (STEEL, "")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -83,6 +100,7 @@ def test_a_string_file_is_read(tmp_path: Path) -> None:
         ("length = 1.0", "unknown field 'length'"),
         ("length_m = -1.0", "length_m must be positive"),
         ("length_m = nan", "finite"),
+        ("description = 5", "description must be a text"),
         ("a = " + "[" * 5_000, "not valid TOML"),
         ("# " + "x" * 2**20, "larger than"),
     ],
@@ -117,7 +135,7 @@ def test_a_string_beyond_the_family_is_told() -> None:
     assert family is not None
     assert family.outside(StringParameters()) == []
     low = StringParameters(tension_n=60.97 / 64)
-    assert any(words.startswith("pitch 3") for words in family.outside(low))
+    assert any(one.words.startswith("pitch 3") and not one.error_grows for one in family.outside(low))
 
 
 def test_modes_are_counted_in_closed_form() -> None:
@@ -147,11 +165,12 @@ def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> No
     outside = many.info.family.outside(string)
     expected_words = BEYOND.get(name, ())
     assert len(outside) == len(expected_words)
-    assert all(words.startswith(start) for words, start in zip(outside, expected_words, strict=True))
-    comment = " ".join(line.removeprefix("#").strip() for line in find_string(name).read_text().splitlines())
-    assert ("Beyond the family: " in comment) == (name in BEYOND)
+    assert all(one.words.startswith(start) for one, start in zip(outside, expected_words, strict=True))
+    _, description = read_described_string(find_string(name))
+    assert ("Beyond the family: " in description) == (name in BEYOND)
     own, expected = load_preset(find_preset(f"studio_any_{name}")), of_string(many, string)
     assert own.info.string == string
+    assert own.info.description == f"{description} Played by the model of every string."
     for key, tensor in expected.model.state_dict().items():
         # logarithms differ in their last digit between makes of processor
         torch.testing.assert_close(own.model.state_dict()[key], tensor, rtol=1e-12, atol=1e-15)

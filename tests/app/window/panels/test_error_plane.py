@@ -83,8 +83,20 @@ def test_beyond_the_training_is_told(shown: Any) -> None:
 def test_any_range_of_amplitudes_is_drawn(shown: Any) -> None:
     """A preset may tell that it was trained from no amplitude on, or beyond the map."""
     for trained_mm in ((0.0, 20.0), (1e-9, 1e9), (0.0, 0.0)):
-        shown.map.set_trained((0.1, 0.9), trained_mm)
+        shown.map.set_trained((0.1, 0.9), lambda _, trained_mm=trained_mm: trained_mm)
     assert not shown.map.is_trained(0.5, 3.0)
+
+
+def test_trained_amplitudes_may_depend_on_the_place(shown: Any) -> None:
+    """As where plucks were scaled to a rise of tension, which one near an end reaches with less."""
+    shown.map.set_trained((0.1, 0.9), lambda place: (0.0, 20 * place))
+    assert shown.map.is_trained(0.5, 9.9)
+    assert shown.map.is_trained(0.5, 1e-3)
+    assert not shown.map.is_trained(0.2, 9.9)
+    places, levels = shown.map._outline.getData()
+    highest = {place: max(levels[places == place]) for place in places}
+    assert 10 ** highest[0.1] == pytest.approx(2.0)
+    assert 10 ** highest[0.5] == pytest.approx(10.0)
 
 
 def test_another_shape_is_another_map_and_returning_computes_nothing(
