@@ -6,7 +6,7 @@ import contextlib
 import math
 from dataclasses import dataclass, replace
 
-from app.instrument.effects import body_response
+from app.instrument.effects import Response, body_response
 from app.instrument.loudness import HIGHEST_PEAK_DB, REFERENCE_VELOCITY, gain_of, peak_db
 from app.instrument.strings import KeyString, Strings
 from app.patches.patch import Patch
@@ -39,8 +39,8 @@ class LoudKeys:
         self.patch, self.ear = patch, ear
         self._whole, self._grid_points = replace(ear, solo=0), grid_points
         self._strings = Strings(patch)
-        self._response = body_response(patch) if near is None else near._response
-        self._over_db = self._peaks_over_db() if near is None else near._over_db
+        self._response: Response | None = body_response(patch) if near is None else near._response
+        self._over_db: float = self._peaks_over_db() if near is None else near._over_db
 
     def of_key(self, key: int, string: int | None = None) -> LoudKey | None:
         """None for a key that is silent. `string`: on which of a set it is played, as in `Strings.of_key`.
