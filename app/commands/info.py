@@ -1,4 +1,4 @@
-"""info: the recipe in a WAV file."""
+"""info: what a WAV file is."""
 
 from __future__ import annotations
 
@@ -16,28 +16,30 @@ def info(
     file: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A file that render, batch or the app wrote.")],
     json: Json = False,
 ) -> None:
-    """Show the recipe of a WAV file.
+    """Show what a WAV file is: the recipe of a pluck, or what was played on an instrument.
 
-    `render --recipe FILE.wav` renders it again.
+    `render --recipe FILE.wav` renders a pluck again, `play FILE.mid` what was played.
     """
-    from app.export.recipe import RecipeError, preset_of, read_recipe
+    from app.export.recipe import Recipe, RecipeError, preset_of, read_origin
     from engine.folders import usable_files
 
-    recipe = read_recipe(file)
-    facts = recipe.model_dump(mode="json")
+    origin = read_origin(file)
+    facts = origin.model_dump(mode="json")
     try:
-        path, exact = preset_of(recipe, usable_files())
+        path, exact = preset_of(origin, usable_files())
         here = f"{path}" if exact else f"{path} (another version of it)"
     except RecipeError:
         here = "none; the preset is not here"
     if json:
         print_json({**facts, "preset_file": here})
         return
-    parts = {part: facts.pop(part) or {} for part in ("pluck", "string")}
+    parts = {part: facts.pop(part, None) or {} for part in ("pluck", "string")}
     told = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
     lines = {**told, **facts, "preset file": here}
     width = max(map(len, lines))
     for name, value in lines.items():
         print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")
-    if recipe.source != "truth" and (recipe.decay_db is not None or recipe.seconds > recipe.horizon_s):
-        say(f"note: from {recipe.horizon_s:g} s on, the model is past its training")
+    if not isinstance(origin, Recipe):
+        say(f"note: {one_line(origin.words)}")
+    elif origin.source != "truth" and (origin.decay_db is not None or origin.seconds > origin.horizon_s):
+        say(f"note: from {origin.horizon_s:g} s on, the model is past its training")

@@ -68,6 +68,7 @@ def play(
                 chosen,
                 loaded,
                 song.events,
+                midi.name,
                 source,
                 WavSettings(bits, rate, normalise),
                 seconds,

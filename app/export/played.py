@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
+from app.export.recipe import InstrumentSound, source_words
 from app.export.recording import Recording
 from app.export.wav import Level, WavSettings, write_wav
 from app.instrument.events import TimedEvent
@@ -13,8 +15,8 @@ from app.instrument.midi_file import midi_bytes
 from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import DIFFERENCE
-from engine.presets import Preset
+from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from engine.presets import Preset, preset_digest
 from engine.result_file import whole_file
 
 RATE_HZ = 48_000
@@ -37,19 +39,14 @@ class Played:
         events: `PatchTurned` among them have the pick-up through which it was heard.
         source: that was heard: "model", "truth" or "difference".
         difference_gain_db: the gain of the difference.
+        recorded: when it began; None: not known.
     """
 
     patch: Patch
     events: tuple[TimedEvent, ...]
-    source: str = "model"
+    source: PlayedSource = "model"
     difference_gain_db: float = 0.0
-
-    @property
-    def source_words(self) -> str:
-        """The source for people."""
-        if self.source != DIFFERENCE:
-            return f"the {self.source}"
-        return f"the difference of model and truth at {self.difference_gain_db:+g} dB"
+    recorded: datetime | None = None
 
 
 def write_played(
@@ -57,22 +54,40 @@ def write_played(
     patch: Patch,
     preset: Preset,
     events: Sequence[TimedEvent],
-    source: str = "model",
+    midi: str,
+    source: PlayedSource = "model",
     settings: WavSettings = WavSettings("24", RATE_HZ),  # noqa: B008 - immutable
     seconds: float | None = None,
     advanced: Callable[[float], None] = lambda seconds: None,
     difference_gain_db: float = 0.0,
+    recorded: datetime | None = None,
 ) -> PlayedFile:
-    """Writes a WAV file, whole or not at all. Memory does not grow with its length.
+    """Writes a WAV file, whole or not at all, that carries what it is. Memory does not grow with its length.
 
     Args:
+        midi: the name of the MIDI file with the events.
+        recorded: when they were played; None: they were not.
         source, seconds, advanced, difference_gain_db: see `render_events`.
 
     Raises:
         ValueError: a key has no possible string, or `source` is unknown.
+        PresetError: the preset's file cannot be read any more.
         WriteError: the file cannot be written; raised before the work where the folder cannot be written to.
     """
     rate_hz = settings.rate_hz or RATE_HZ
+    origin = InstrumentSound(
+        program=PROGRAM,
+        version=program_version(),
+        instrument=patch.name,
+        preset=preset.name,
+        preset_sha256=preset_digest(preset.path),
+        source=source,
+        difference_gain_db=difference_gain_db if source == DIFFERENCE else 0.0,
+        rate_hz=rate_hz,
+        bits=settings.bits,
+        midi=midi,
+        recorded=None if recorded is None else recorded.isoformat(timespec="seconds"),
+    )
     with whole_file(path) as file:
         sound = Recording(channels_played(patch, events))
         blocks = render_events(
@@ -80,7 +95,11 @@ def write_played(
         )
         for block in blocks:
             sound.append(block)
-        tags = {"title": f"{path.stem}: {patch.name}", "software": f"{PROGRAM} {program_version()}"}
+        tags = {
+            "title": f"{path.stem}: {patch.name}",
+            "software": f"{PROGRAM} {program_version()}",
+            "comment": origin.model_dump_json(),
+        }
         level = write_wav(file, sound, rate_hz, settings, tags)
     return PlayedFile(len(sound) / rate_hz, level)
 
@@ -106,9 +125,11 @@ def write_recorded(
         played.patch,
         preset,
         played.events,
+        midi_file.name,
         played.source,
         advanced=advanced,
         difference_gain_db=played.difference_gain_db,
+        recorded=played.recorded,
     )
-    level = f"peak {written.level.peak_db:.1f} dBFS"
-    return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s of {played.source_words}, {level}"
+    heard, level = source_words(played.source, played.difference_gain_db), f"peak {written.level.peak_db:.1f} dBFS"
+    return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s of {heard}, {level}"

@@ -1,4 +1,6 @@
-"""The recipe of a WAV file: all choices that its sound follows from, as JSON in the file's comment tag."""
+"""What a WAV file is, as JSON in its comment tag: a pluck, with all choices that its sound follows from (its recipe),
+or what was played on an instrument, whose notes are in a MIDI file.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from app.export.sound import LONGEST_S, SoundRequest
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import Bits, Pickup, Source
+from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.plain_text import one_line
 from engine.pluck import Pluck
@@ -33,8 +35,53 @@ class NoRecipe(RecipeError):
     """A sound file without a recipe: not exported by this program, or its tags were removed."""
 
 
+class NotesElsewhere(RecipeError):
+    """What was played on an instrument: its notes are in a MIDI file."""
+
+
+class InstrumentSound(BaseModel):
+    """What was played on an instrument: recorded in the window, or rendered from a MIDI file.
+
+    Attributes:
+        instrument: the name of the patch, of a recording the one with which it began.
+        source: that is heard.
+        difference_gain_db: the gain of the difference.
+        midi: the name of the MIDI file with the notes.
+        recorded: when the recording began, in ISO 8601; None: it is none.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    format: Literal[1] = 1
+    kind: Literal["instrument"] = "instrument"
+    program: str
+    version: str
+    instrument: str
+    preset: str
+    preset_sha256: str
+    source: PlayedSource
+    difference_gain_db: float = 0.0
+    rate_hz: int = Field(ge=RATE_RANGE_HZ[0], le=RATE_RANGE_HZ[1])
+    bits: Bits
+    midi: str
+    recorded: str | None = None
+
+    @property
+    def words(self) -> str:
+        """What it is, for people."""
+        what, when = ("rendering", "") if self.recorded is None else ("recording", f", {self.recorded[:10]}")
+        return f"a {what} of {self.instrument} ({source_words(self.source, self.difference_gain_db)}{when})"
+
+
+def source_words(source: str, difference_gain_db: float) -> str:
+    """The source of what was played, for people."""
+    if source != DIFFERENCE:
+        return f"the {source}"
+    return f"the difference of model and truth at {difference_gain_db:+g} dB"
+
+
 class Recipe(BaseModel):
-    """See the module. Fields as in `SoundRequest` and `WavSettings`; a field that is absent has its default.
+    """Fields as in `SoundRequest` and `WavSettings`; a field that is absent has its default.
 
     Attributes:
         preset_rate_hz: the rate at which the model played.
@@ -135,12 +182,12 @@ class Recipe(BaseModel):
         return WavSettings(self.bits, self.rate_hz, self.normalise, self.fade_out_s)
 
 
-def read_recipe(path: Path) -> Recipe:
-    """The recipe that a WAV file carries.
+def read_origin(path: Path) -> Recipe | InstrumentSound:
+    """What a WAV file is, as it carries it.
 
     Raises:
-        NoRecipe: it is a sound file without one.
-        RecipeError: the file is missing or no sound file, or its recipe is damaged or of a newer version.
+        NoRecipe: it is a sound file without that.
+        RecipeError: the file is missing or no sound file, or what it carries is damaged or of a newer version.
     """
     try:
         if path.exists() and not path.is_file():  # reading a pipe would block
@@ -157,13 +204,31 @@ def read_recipe(path: Path) -> Recipe:
             f"{path}: has no recipe; it was not exported by {PROGRAM}, or another program has removed its tags"
         )
     try:
-        return Recipe.model_validate(parse_json(text, "the text"))
+        data = parse_json(text, "the text")
+        played = isinstance(data, dict) and "kind" in data
+        return InstrumentSound.model_validate(data) if played else Recipe.model_validate(data)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         field = ".".join(map(str, first["loc"])) or "the text"
         raise _unusable(path, f"{field}: {first['msg']}") from error
     except (ValueError, OverflowError) as error:  # raised for numbers that are too long
         raise _unusable(path, str(error)) from error
+
+
+def read_recipe(path: Path) -> Recipe:
+    """The recipe that a WAV file carries.
+
+    Raises:
+        NotesElsewhere: it was played on an instrument.
+        NoRecipe, RecipeError: as `read_origin`.
+    """
+    found = read_origin(path)
+    if isinstance(found, InstrumentSound):
+        raise NotesElsewhere(
+            f"{path}: is {found.words}. It has no recipe to render again:"
+            f" its notes are in the MIDI file {found.midi}, beside it unless it was moved"
+        )
+    return found
 
 
 def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
@@ -180,8 +245,8 @@ def _unusable(path: Path, why: str) -> RecipeError:
     )
 
 
-def preset_of(recipe: Recipe, presets: Iterable[Path]) -> tuple[Path, bool]:
-    """The preset file of a recipe, found by content, else by name, and whether its content is the same.
+def preset_of(recipe: Recipe | InstrumentSound, presets: Iterable[Path]) -> tuple[Path, bool]:
+    """The preset file of a WAV, found by content, else by name, and whether its content is the same.
 
     Raises:
         RecipeError: there is none.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 Source = Literal["model", "truth", "difference", "both"]
+PlayedSource = Literal["model", "truth", "difference"]  # of an instrument
 Pickup = Literal["displacement", "velocity"]
 PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
 Bits = Literal["16", "24", "32f"]  # of a WAV's samples; f: floating point

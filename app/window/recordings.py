@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -14,7 +15,7 @@ from app.instrument.events import PatchTurned
 from app.playing.live import Live
 from app.presets.library import Library
 from app.session.choices import Session
-from app.session.slots import other_preset
+from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.instrument.patch_bar import PatchBar
 from engine.presets import PresetError, load_preset
 from engine.result_file import WriteError
@@ -40,7 +41,7 @@ class Recordings(QObject):
     def __init__(self, session: Session, library: Library, live: Live, bar: PatchBar, parent: QObject) -> None:
         super().__init__(parent)
         self._session, self._library, self._live, self._bar = session, library, live, bar
-        self._began_s = 0.0
+        self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: list[Played] = []
         self._writers: list[threading.Thread] = []
         self._abandoned = threading.Event()  # what is being written
@@ -58,7 +59,7 @@ class Recordings(QObject):
             self.save()
         else:
             self._live.begin_recording()
-            self._began_s = time.monotonic()
+            self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
 
     def save(self) -> None:
         """Asks for a file for the latest recording. Without one, the recording is kept."""
@@ -150,8 +151,9 @@ class Recordings(QObject):
             self.told.emit("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
-        source = "model" if other_preset(choices.source_heard) else choices.source_heard
-        self._unsaved.append(Played(patch, tuple(events), source, choices.difference_gain_db))
+        heard = choices.source_heard
+        source: PlayedSource = "truth" if heard == "truth" else "difference" if heard == DIFFERENCE else "model"
+        self._unsaved.append(Played(patch, tuple(events), source, choices.difference_gain_db, self._began))
         self._show_unsaved()
         if choices.solo:
             self.informed.emit(f"The recording has all modes, although mode {choices.solo} is soloed.")

@@ -21,7 +21,7 @@ from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
 from app.export.files import ExportError, SoundRequest
-from app.export.recipe import Recipe, RecipeError, read_recipe, request_of
+from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
 from app.export.sampled.store import SampleIndex, StoredSample, read_index
 from app.export.wav import WavSettings
 from app.instrument.bodies import own_bodies
@@ -177,6 +177,21 @@ def wav(folder: Path, comment: str) -> bytes:
 
 def recipe_text(preset: Path) -> str:
     return Recipe.of(SoundRequest(load_preset(preset), Pluck(), 0.37, 0.1), WavSettings()).model_dump_json()
+
+
+def played_text() -> str:
+    return InstrumentSound(
+        program="Learned Strings",
+        version="0.2.0",
+        instrument="Classical guitar",
+        preset="studio_any_string",
+        preset_sha256="0" * 64,
+        source="truth",
+        rate_hz=48_000,
+        bits="24",
+        midi="take.mid",
+        recorded="2026-11-24T11:00:00+01:00",
+    ).model_dump_json()
 
 
 def damaged_wav(whole: bytes, draw: random.Random) -> bytes:
@@ -384,14 +399,18 @@ def test_recipes(of: str, small_preset: Path, tmp_path: Path, rounds: int, seed:
 def test_what_is_dropped(
     small_preset: Path, tmp_path: Path, rounds: int, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sound is a recipe's, a body, or told: the reader that a file is given to is chosen by what is in it."""
+    """A sound is a recipe's, a recording, a body, or told: its reader is chosen by what is in it."""
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
     library = Library([])
-    wholes = (wav(tmp_path, recipe_text(small_preset)), impulse(tmp_path, "WAV", "PCM_16"))
+    recorded = wav(tmp_path, played_text())
+    wholes = (wav(tmp_path, recipe_text(small_preset)), recorded, impulse(tmp_path, "WAV", "PCM_16"))
+    path = tmp_path / "recorded.wav"
+    path.write_bytes(recorded)
+    assert "is a recording of Classical guitar" in receive(path, library).notice
     path = tmp_path / "dropped.wav"
 
     def attack(draw: random.Random) -> None:
-        path.write_bytes(damaged_bytes(draw.choice(wholes), draw))
+        path.write_bytes(damaged_wav(draw.choice(wholes), draw))
         dropped = receive(path, library)
         assert dropped.notice.isprintable() and len(dropped.notice) <= 600
         assert dropped.body in ("", "dropped") or dropped.body.startswith("dropped_")

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED
+from app.shared.version import program_version
+from engine.presets import SHIPPED as PRESETS
 
 
 def test_a_body_that_is_not_here_is_told_and_the_rest_is_played(
@@ -100,3 +102,21 @@ def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_patch(run, tmp_path
         near = round(0.5 * 440 * 2 ** ((key - 69) / 12))
         alone = played("alone", [TimedEvent(0.0, NoteOn(key, 90, 2))])
         assert together[near - 2 : near + 3].max() > 0.5 * alone[near - 2 : near + 3].max()
+
+
+def test_info_says_which_instrument_played(run, tmp_path: Path) -> None:
+    midi, out = tmp_path / "one.mid", tmp_path / "one.wav"
+    midi.write_bytes(midi_bytes(EVENTS))
+    told = ("--patch", "jazz_guitar", "--source", "truth", "--rate", 44_100, "--bits", "16", "--seconds", "0.2")
+    assert run("play", midi, "--out", out, *told).status == 0
+    facts = json.loads(run("info", out, "--json").out)
+    assert facts["preset_file"] == str(PRESETS / "studio_any_string.safetensors")
+    assert (facts["instrument"], facts["preset"], facts["source"]) == ("Jazz guitar", "studio_any_string", "truth")
+    assert (facts["rate_hz"], facts["bits"], facts["midi"]) == (44_100, "16", "one.mid")
+    assert (facts["version"], facts["recorded"]) == (program_version(), None)
+    shown = run("info", out)
+    assert "instrument          Jazz guitar\n" in shown.out
+    assert "a rendering of Jazz guitar (the truth)" in shown.err
+    again = run("render", "--recipe", out, tmp_path / "again.wav").failure
+    assert f"{out}: is a rendering of Jazz guitar (the truth). It has no recipe to render again" in again
+    assert "one.mid" in again

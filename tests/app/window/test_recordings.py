@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,11 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox
 from pytestqt.qtbot import QtBot
 
 from app.export.played import Played
+from app.export.recipe import InstrumentSound, read_origin
+from app.instrument.bodies import own_bodies
 from app.instrument.events import NoteOff, NoteOn, PatchTurned, TimedEvent
 from app.instrument.midi_file import read_midi
+from app.shared.version import program_version
 from app.window import recordings as module
 from app.window.controller import Controller
 
@@ -155,6 +159,31 @@ def test_the_source_that_was_heard_is_written(
     record(played)
     qtbot.waitUntil(lambda: len(told.good) == 1)
     assert words in told.good[0]
+    origin = read_origin(tmp_path / "take.wav")
+    assert isinstance(origin, InstrumentSound)
+    assert (origin.instrument, origin.preset) == ("Steel-string acoustic", "studio_any_string")
+    assert (origin.source, origin.midi) == (source, "take.mid")
+    assert (origin.difference_gain_db, origin.rate_hz) == (40.0 if source == "difference" else 0.0, 48_000)
+    assert origin.version == program_version()
+    assert origin.recorded is not None
+    age = datetime.now(UTC) - datetime.fromisoformat(origin.recorded)
+    assert timedelta(0) <= age < timedelta(minutes=10)
+
+
+def test_a_recording_that_is_dropped_says_what_it_is_and_changes_nothing(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+) -> None:
+    """It is neither a recipe nor a body."""
+    told.answers = [tmp_path / "take.wav"]
+    record(played)
+    qtbot.waitUntil(lambda: len(told.good) == 1)
+    before = played.session.choices
+    played.take_file(tmp_path / "take.wav")
+    notice = played.window.notices.text
+    assert "take.wav: is a recording of Steel-string acoustic (the model, 20" in notice
+    assert "its notes are in the MIDI file take.mid" in notice
+    assert played.session.choices == before
+    assert not own_bodies().exists()
 
 
 def test_that_a_soloed_mode_is_not_recorded_alone_is_told(played: Controller, told: Told) -> None:
