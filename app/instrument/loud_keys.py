@@ -52,6 +52,16 @@ class LoudKeys:
         level = float(10 ** ((self.patch.level_db - self._over_db) / 20))
         return None if found is None else replace(found, gain=found.gain * level)
 
+    def string_of(self, key: int, string: int | None = None) -> KeyString | None:
+        """As `of_key`, the string alone, which takes no time."""
+        found = self._strings.of_key(key, string)
+        if found is not None and any(
+            not found.parameters.decay_rate(mode) < found.parameters.undamped_frequency(mode)
+            for mode in (1, found.modes)  # then of all between: see `engine.bounds.check_motion`
+        ):
+            raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
+        return found
+
     def _peaks_over_db(self) -> float:
         """By how much the peaks of some keys are too high."""
         low, high = self.patch.range

@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from app.instrument import events
@@ -93,6 +92,7 @@ class Struck:
     held: bool = True
     kept: bool = False
     damped: bool = False
+    retuning: threading.Lock = field(default_factory=threading.Lock)  # of its voices, by one thread at a time
 
     @property
     def over(self) -> bool:
@@ -104,23 +104,21 @@ class Struck:
         """Whether the frame for which it was struck is still to come."""
         return self.begin_frame > 0 and all(voice.waits for voice in self.voices.values())
 
-    def resonator_of(self, parameters: StringParameters) -> Resonator:
-        """With as many modes as its voices have."""
+    def retune(self, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
+        """Lets the voices glide to the modes of other parameters, from a frame on. Any thread; the latest counts."""
         own = self.key.resonator
         modes = own.modes
-        return replace(
+        resonator = replace(
             own,
             omega=parameters.undamped_frequencies(modes),
             sigma=parameters.decay_rates(modes),
             coupling=parameters.tension_coupling(modes) if own.tension_modulated else own.coupling,
             stretch=parameters.wavenumbers(modes).square(),
         )
-
-    def retune(self, parameters: StringParameters, resonator: Resonator, seconds: float, frame: int = 0) -> None:
-        """Lets the voices glide to the modes of other parameters, which `resonator_of` gives, from a frame on."""
-        self.parameters = parameters
-        for voice in self.voices.values():
-            voice.retune(resonator, seconds, frame)
+        with self.retuning:
+            self.parameters = parameters
+            for voice in self.voices.values():
+                voice.retune(resonator, seconds, frame)
 
 
 class Player:
@@ -220,18 +218,13 @@ class Player:
     def glide(self, frame: int = 0) -> None:
         """Lets the strings that ring glide to the patch. The lock is held for moments: keys are played meanwhile."""
         for struck in self.sounding():
-            with suppress(ValueError):  # no such string: it stays as it is
-                self._key(struck.event.key, self._on(struck))  # it is known then, where the lock is held
             with self._lock:
                 parameters = self._with_hands(struck)
             if parameters == struck.parameters:
                 continue
-            resonator = struck.resonator_of(parameters)
+            struck.retune(parameters, KNOB_S, frame)
             with self._lock:
-                if self._with_hands(struck) == parameters:
-                    struck.retune(parameters, resonator, KNOB_S, frame)
-                else:  # a wheel or a damper has moved meanwhile
-                    self._retune(struck, KNOB_S)
+                self._retune(struck, KNOB_S)  # where a wheel or a damper has moved meanwhile
 
     @property
     def rate_hz(self) -> int:
@@ -383,7 +376,7 @@ class Player:
         struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own, self._frame)
         parameters = self._with_hands(struck)
         if parameters != own:
-            struck.retune(parameters, struck.resonator_of(parameters), 0.0)
+            struck.retune(parameters, 0.0)
         self._sounding()
         self._ringing[place] = struck
         self._all.append(struck)
@@ -502,11 +495,9 @@ class Player:
         string = struck.key.string.parameters
         on = self._on(struck)
         try:
-            now = self._key(struck.event.key, on) if patch is self._patch else None
-            if now is not None:
-                string = now.string.parameters
-            elif (wheeled := Strings(patch).of_key(struck.event.key, on)) is not None:
-                string = wheeled.parameters
+            strings = self._keys.string_of if patch is self._patch else Strings(patch).of_key
+            if (now := strings(struck.event.key, on)) is not None:
+                string = now.parameters
             string = (slid if self._patch.bend_by == "length" else bent)(string, self._ratio(struck))
             if struck.damped:
                 string = damped(string, self._wheeled("damping").damping.release_t60_s)
@@ -517,7 +508,7 @@ class Player:
     def _retune(self, struck: Struck, seconds: float) -> None:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
-            struck.retune(parameters, struck.resonator_of(parameters), seconds, self._frame)
+            struck.retune(parameters, seconds, self._frame)
 
 
 def is_another(patch: Patch, than: Patch) -> bool:

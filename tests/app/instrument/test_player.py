@@ -485,3 +485,40 @@ def test_the_difference_is_that_of_model_and_truth_with_its_gain(patch: Patch, p
     np.testing.assert_allclose(rendered["difference"], wanted, atol=1e-5)
     with pytest.raises(ValueError, match="source must be model, truth or difference, not 'noise'"):
         next(render_events(patch, preset, note, RATE_HZ, "noise"))
+
+
+def test_a_ringing_string_stays_as_it_is_where_a_knob_would_overdamp_it(patch: Patch, preset: Preset) -> None:
+    struck: list[Struck] = []
+    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
+    player.handle(NoteOn(45, 90))
+    before = struck[0].parameters
+    heavy = replace(STEEL, damping_d3_kg_m_s=2e-2)  # of its highest modes
+    player.set_patch(changed(patch, strings=Fretted(string=physical(heavy))))
+    assert struck[0].parameters == before
+    with pytest.raises(ValueError, match="overdamped"):
+        player.handle(NoteOn(45, 90))
+    player.set_patch(changed(patch, knobs=Knobs(decay=2.0)))
+    assert struck[0].parameters.damping_d1_kg_m_s == pytest.approx(2 * before.damping_d1_kg_m_s)
+
+
+def test_a_wheel_that_moves_while_strings_glide_is_followed(
+    patch: Patch, preset: Preset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whichever is computed first: in the end each string has the patch and the wheel."""
+    struck: list[Struck] = []
+    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
+    for key in (45, 50):
+        player.handle(NoteOn(key, 90))
+    retune = Struck.retune
+
+    def late(self: Struck, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
+        monkeypatch.setattr(Struck, "retune", retune)
+        player.handle(Bend(1.0))  # as in another thread
+        retune(self, parameters, seconds, frame)
+
+    monkeypatch.setattr(Struck, "retune", late)
+    player.set_patch(changed(patch, knobs=Knobs(decay=2.0)))
+    for each in struck:
+        own = each.key.string.parameters
+        assert each.parameters.damping_d1_kg_m_s == pytest.approx(2 * own.damping_d1_kg_m_s)
+        assert each.parameters.tension_n > 1.2 * own.tension_n
