@@ -395,8 +395,7 @@ def test_releases_and_bends_of_a_file_count_at_their_frames(live: Live, sound: A
     assert live._player is not None
     mixer, struck = Mixer(48_000), list[Struck]()
     mixer.render(begin)
-    player = Player(patch, live._player.preset, 48_000, struck.append, ("model",))
-    player.listen(EAR)
+    player = Player(patch, live._player.preset, 48_000, struck.append, ("model",), EAR)
     expected = []
     for frame, event, end in zip(frames, played, (*frames[1:], 28_800), strict=True):
         if isinstance(event, Controller):  # it fades in 20 ms, where one at once fades in 30
