@@ -128,7 +128,7 @@ def evaluate_past_horizon(
             for amplitudes in blocks:
                 last = first + amplitudes.shape[1]
                 predicted, state = model.advance(state, last - first)
-                predicted, truth = predicted.cpu().float(), (amplitudes @ synthesis).float()
+                predicted, truth = predicted.float().cpu(), (amplitudes @ synthesis).float()
                 string.add(predicted, truth, first)
                 heard = torch.stack([predicted @ ear, truth @ ear])
                 sound.add(heard[0], heard[1], first)

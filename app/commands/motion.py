@@ -133,10 +133,10 @@ def predict(
 
 
 def _outside_family(info: PresetInfo, initial: Tensor) -> list[str]:
-    """In which respects a string and its displacements lie outside those that a preset of many has learned."""
+    """How a string and its displacements differ from those of a preset of many where the error grows."""
     if info.family is None:
         return []
-    found = [each.words for each in info.family.outside(info.string) if each.error_grows]
+    found = info.family.warnings(info.string)
     rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(initial)).max())
     if rise > (limit := info.family.tension_rise[1]):
         found.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")

@@ -156,13 +156,12 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
     else:
         found = _beyond("width", pluck.width, width)
     peak_mm = None if trained.peak_m is None else info.trained_amplitudes_mm(pluck)
-    beyond = info.family.outside(info.string) if info.family else []
     return [
         *_beyond("position", pluck.position, trained.position),
         *found,
         *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
         *_too_tense(info, pluck),
-        *(one.words for one in beyond if one.error_grows),
+        *(info.family.warnings(info.string) if info.family else []),
     ]
 
 

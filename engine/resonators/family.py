@@ -74,6 +74,10 @@ class StringFamily:
             if not any(low / NEAR <= value <= high * NEAR for low, high in trained)
         ]
 
+    def warnings(self, string: StringParameters) -> list[str]:
+        """As `outside`, in words, where the error of a model is known to grow."""
+        return [one.words for one in self.outside(string) if one.error_grows]
+
 
 def inharmonicity(string: StringParameters) -> float:
     """B = EIπ²/(T₀ℓ²)."""

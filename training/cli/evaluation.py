@@ -140,8 +140,8 @@ def evaluate(
             measured = {HELD_OUT if name == "all" else name: measurement.of(name) for name in splits}
         if file is not None:
             file.write(_csv(loaded.name, measured).encode())
-    for each in info.family.outside(info.string) if info.family is not None and on is None else ():
-        say(f"warning: {each.words}")
+    for words in info.family.warnings(info.string) if info.family is not None and on is None else ():
+        say(f"warning: {words}")
     if json:
         first = next(iter(measured.values()))
         facts = {

@@ -4,6 +4,7 @@ import errno
 import json
 import math
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -288,7 +289,7 @@ def test_a_preset_of_many_strings_predicts_the_string_that_is_named(run, folder:
 
 def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
     np.save(folder / "u.npy", Pluck(0.3, 1.0).displacement(101)[None].numpy())
-    (folder / "mine.toml").write_text(find_string(STEEL_E4).read_text())
+    (folder / "mine.toml").write_bytes(find_string(STEEL_E4).read_bytes())
     told = ("--string", folder / "mine.toml", "--rate", 22_050, "--modes", 12, "--steps", 40)
     assert run("predict", "studio_any_string", folder / "u.npy", folder / "m.npy", *told).status == 0
     assert np.load(folder / "m.npy").shape == (1, 41, 101)
@@ -296,12 +297,15 @@ def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
 
 def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> None:
     np.save(folder / "u.npy", Pluck(0.3, 20.0, "triangular").displacement(101)[None].numpy())
-    text = find_string(STEEL_E4).read_text()
-    (folder / "slack.toml").write_text(text.replace("tension_n = 72.592", "tension_n = 0.72592"))
+    text = find_string(STEEL_E4).read_text(encoding="utf-8")
+    slack = text.replace("tension_n = 72.592", "tension_n = 0.72592")
+    slack = re.sub("d3_kg_m_s = .*", "d3_kg_m_s = 1e-8", slack)
+    (folder / "slack.toml").write_text(slack, encoding="utf-8")
     files = (folder / "u.npy", folder / "m.npy")
     found = run("predict", "studio_any_string", *files, "--string", folder / "slack.toml", "--steps", 9)
     assert found.status == 0
-    assert "pitch" in found.err
+    assert "decay time near 3 kHz" in found.err
+    assert "pitch" not in found.err  # below the trained ones, where the error does not grow
     assert "raises the tension" in found.err
 
 
@@ -316,9 +320,9 @@ def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> N
 )
 def test_an_impossible_string_is_one_line(run, folder: Path, old: str, new: str, words: str) -> None:
     np.save(folder / "u.npy", Pluck().displacement(101)[None].numpy())
-    text = find_string(STEEL_E4).read_text()
+    text = find_string(STEEL_E4).read_text(encoding="utf-8")
     assert old in text
-    (folder / "bad.toml").write_text(text.replace(old, new))
+    (folder / "bad.toml").write_text(text.replace(old, new), encoding="utf-8")
     files = (folder / "u.npy", folder / "m.npy")
     found = run("predict", "studio_any_string", *files, "--string", folder / "bad.toml", "--steps", 9)
     assert found.status == 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from app.commands.benchmarks.tune import chord_of
 
 from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.loudness import REFERENCE_VELOCITY
@@ -13,6 +12,7 @@ from app.patches.library import SHIPPED, find_patch, list_patches
 from app.patches.patch import Patch
 from engine.kernels.limiter import CEILING
 from engine.presets import Preset
+from tests.bench.tune import chord_of
 
 RATE_HZ = 48_000
 E_MAJOR = (40, 47, 52, 56, 59, 64)

@@ -178,7 +178,7 @@ def test_a_fault_is_told_and_the_others_go_on(
 ) -> None:
     voice, told = make()
     with monkeypatch.context() as broken:
-        broken.setattr(KoopmanVar, "release", lambda *_: 1 / 0)
+        broken.setattr(KoopmanVar, "encode", lambda *_: 1 / 0)
         ahead.render(voice)
         wait(lambda: told.errors != [])
     assert isinstance(told.errors[0], ZeroDivisionError)

@@ -21,8 +21,8 @@ IN_JACK = """
 import faulthandler, json, sys, threading, time
 from pathlib import Path
 faulthandler.dump_traceback_later(120, exit=True)
-from app.commands.benchmarks.play.children import Missing
-from app.commands.benchmarks.play.midi import cable
+from tests.bench.play.children import Missing
+from tests.bench.play.midi import cable
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn
 from app.playing.midi_port import MidiInput, MidiUnavailable
 

@@ -497,7 +497,7 @@ def test_a_model_that_fails_is_told(
     wait: Wait,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(KoopmanVar, "release", lambda *_: 1 / 0)
+    monkeypatch.setattr(KoopmanVar, "encode", lambda *_: 1 / 0)
     note = notes.strike(stroke_of(small_preset, position=0.41))
     wait(lambda: note.over and reports != [])
     assert "cannot be rendered" in reports[0][0]

@@ -115,11 +115,11 @@ def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
     qtbot: QtBot, heard: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken: list[object] = []
-    monkeypatch.setattr(heard.performance.live, "handle", taken.append)
+    monkeypatch.setattr(heard.performance.live, "handle", lambda event, due: taken.append(event))
     dialog = open_test(qtbot, heard)
     let_go = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
     for event in (events.NoteOn(52, 90), *let_go):
-        heard._handle(event)
+        heard._handle(event, None)
     assert taken == let_go
     dialog.abandon()
 

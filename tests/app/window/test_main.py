@@ -49,8 +49,8 @@ def watch(controller):
     live, struck = controller.performance.live, []
     handle = live.handle
 
-    def noted(event):
-        made = handle(event)
+    def noted(event, due=None):
+        made = handle(event, due)
         if isinstance(event, NoteOn):
             struck.append([event.key, made is not None])
         return made

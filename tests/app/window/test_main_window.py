@@ -329,7 +329,7 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_the_views(
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
     assert window.instrument.knobs.isVisible()
     for view, least in (
-        (window._string, window._string.minimumHeight()),
+        (window._string, window._string.minimumSizeHint().height()),
         (window.left, window.left.minimumSizeHint().height()),
         (window.right, window.right.minimumSizeHint().height()),
     ):

@@ -279,13 +279,15 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     played.take_file(tmp_path / "short.toml")
     assert "short.toml: area_m2, " in told[-1]
     assert "are missing" in told.pop()
-    steel = (STRINGS / "steel_g3.toml").read_text()
-    (tmp_path / "heavy.toml").write_text(steel.replace("d1_kg_m_s = 0.00098472", "d1_kg_m_s = 900.0"))
+    steel = (STRINGS / "steel_g3.toml").read_text(encoding="utf-8")
+    heavy = steel.replace("d1_kg_m_s = 0.00098472", "d1_kg_m_s = 900.0")
+    (tmp_path / "heavy.toml").write_text(heavy, encoding="utf-8")
     played.take_file(tmp_path / "heavy.toml")
     assert "heavy.toml: " in told[-1]
     assert "overdamped" in told.pop()
     assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
-    (tmp_path / "slack.toml").write_text(steel.replace("tension_n = 74.173", "tension_n = 0.74173"))
+    slack = steel.replace("tension_n = 74.173", "tension_n = 0.74173")
+    (tmp_path / "slack.toml").write_text(slack, encoding="utf-8")
     played.take_file(tmp_path / "slack.toml")
     assert "Beyond training: pitch" in informed.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
