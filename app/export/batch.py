@@ -7,8 +7,7 @@ after every pluck; files that have no row yet, because the process was killed, a
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,15 +17,14 @@ from app.export.batch_index import INDEX, BatchIndex, BatchRow
 from app.export.files import ExportError, WavReport, default_file_name, export_sounds, settings_of
 from app.export.recipe import Recipe, RecipeError, read_recipe
 from app.export.recording import blocks
-from app.export.sound import Cancelled, ExportCancelled, SoundRequest, Voices
+from app.export.sound import SoundRequest, Voices
 from app.export.wav import WavSettings
 from app.shared.vocabulary import Pickup, Source
+from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.presets import Preset, load_preset, of_string, outside_training
 from engine.resonators.string import StringParameters
 from engine.sources import Runaway
-
-BatchProgress = Callable[[float, str, float | None], None]  # share done, what is rendered, seconds left if known
 
 
 @dataclass(frozen=True)
@@ -146,11 +144,7 @@ class _Job:
     sources: tuple[Source, ...]
 
 
-def run_batch(
-    plan: BatchPlan,
-    progress: BatchProgress = lambda share, text, left_s: None,
-    cancelled: Cancelled = lambda: False,
-) -> list[BatchRow]:
+def run_batch(plan: BatchPlan, progress: Progress = lambda *_: None) -> list[BatchRow]:
     """Renders the files and writes the index, in the plan's folder, which is made if needed.
 
     Where a preset or a pluck fails, its row says why, and the others are still rendered.
@@ -159,7 +153,7 @@ def run_batch(
         A row for each file.
 
     Raises:
-        ExportCancelled: `cancelled` returned True; whole files and their rows stay.
+        Cancelled: `progress` raised it; whole files and their rows stay.
         ExportError: the folder or the index cannot be written.
     """
     try:
@@ -169,20 +163,17 @@ def run_batch(
     index = BatchIndex(plan.folder / INDEX)
     jobs, rows = _sorted_out(plan, index)
     index.add(rows)
-    started = time.monotonic()
     loaded: Instrument | None = None
     for done, job in enumerate(jobs):
         if job.instrument != loaded:
             preset, loaded = plan.load(job.instrument), job.instrument
         text = f"{job.instrument.name}, position {job.pluck.position:g}, {job.pluck.amplitude_mm:g} mm"
 
-        def part(share: float, done: int = done, text: str = text) -> None:
-            whole = (done + share) / len(jobs)
-            spent_s = time.monotonic() - started
-            progress(whole, text, spent_s * (1 - whole) / whole if whole > 0 else None)
+        def part(share: float, *_: object, done: int = done, text: str = text) -> None:
+            progress((done + share) / len(jobs), text)
 
         part(0.0)
-        made = _rendered(plan, preset, job, part, cancelled)
+        made = _rendered(plan, preset, job, part)
         rows += made
         index.add(made)
     return rows
@@ -237,22 +228,18 @@ def _essence(recipe: Recipe) -> dict[str, object]:
     return recipe.model_dump(exclude={"program", "version"})
 
 
-def _rendered(
-    plan: BatchPlan, preset: Preset, job: _Job, progress: Callable[[float], None], cancelled: Cancelled
-) -> list[BatchRow]:
+def _rendered(plan: BatchPlan, preset: Preset, job: _Job, progress: Progress) -> list[BatchRow]:
     blank = {s: _row(plan, job.instrument, preset.info.rate_hz, job.pluck, s) for s in job.sources}
     paths = {source: plan.folder / row.file for source, row in blank.items()}
     request = plan.request(preset, job.pluck, job.sources[0])
     try:
-        reports, voices = export_sounds(
-            request, paths, plan.settings, measured=True, progress=progress, cancelled=cancelled
-        )
+        reports, voices = export_sounds(request, paths, plan.settings, measured=True, progress=progress)
     except Runaway as error:
         failed = [replace(row, message=str(error)) for source, row in blank.items() if source != "truth"]
         if "truth" not in blank:
             return failed
         truth = replace(job, sources=("truth",))
-        return [*failed, *_rendered(plan, preset, truth, progress, cancelled)]
+        return [*failed, *_rendered(plan, preset, truth, progress)]
     except ExportError as error:
         return [replace(row, message=str(error)) for row in blank.values()]
     errors, told = _errors(preset, voices), _outside(job, preset)
@@ -322,4 +309,4 @@ def _row(
     )
 
 
-__all__ = ["INDEX", "BatchPlan", "BatchRow", "ExportCancelled", "NamedString", "run_batch"]
+__all__ = ["INDEX", "BatchPlan", "BatchRow", "NamedString", "run_batch"]

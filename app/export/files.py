@@ -19,10 +19,7 @@ from app.export.recording import Sound
 from app.export.sound import (
     LONGEST_S,
     SOURCES,
-    Cancelled,
-    ExportCancelled,
     Mixed,
-    Progress,
     SoundRequest,
     Source,
     Voices,
@@ -32,6 +29,7 @@ from app.export.sound import (
 from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, write_wav
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import BITS, Bits
+from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.presets import PresetError
 from engine.result_file import WriteError, explain, whole_file
@@ -77,17 +75,16 @@ def export_sound(
     path: Path,
     settings: WavSettings | None = None,
     *,
-    progress: Progress = lambda share: None,
-    cancelled: Cancelled = lambda: False,
+    progress: Progress = lambda *_: None,
 ) -> WavReport:
     """Renders and writes a WAV file, whole or not at all.
 
     Raises:
         ExportError: the file cannot be written, or the preset's file cannot be read any more.
-        ExportCancelled: `cancelled` returned True.
+        Cancelled: `progress` raised it; no file is left.
         Runaway: the model's output grew without bound or is not finite.
     """
-    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress, cancelled=cancelled)[0]
+    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress)[0]
     return report
 
 
@@ -97,8 +94,7 @@ def export_sounds(
     settings: WavSettings | None = None,
     *,
     measured: bool = False,
-    progress: Progress = lambda share: None,
-    cancelled: Cancelled = lambda: False,
+    progress: Progress = lambda *_: None,
 ) -> tuple[list[WavReport], Voices]:
     """Renders a pluck once and writes a file for each source, model and truth with one gain.
 
@@ -125,14 +121,8 @@ def export_sounds(
         opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
         try:
-            voices = render_voices(
-                request,
-                paths,
-                rate_hz,
-                all_voices=measured or settings.normalise,
-                progress=progress,
-                cancelled=cancelled,
-            )
+            both = measured or settings.normalise
+            voices = render_voices(request, paths, rate_hz, all_voices=both, progress=progress)
         except OSError as error:  # the recordings lie in temporary files
             raise ExportError(explain(Path(tempfile.gettempdir()), error)) from error
         sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
@@ -207,7 +197,6 @@ __all__ = [
     "RATE_RANGE_HZ",
     "SOURCES",
     "Bits",
-    "ExportCancelled",
     "ExportError",
     "SoundRequest",
     "Source",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
+from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
@@ -29,12 +30,6 @@ DECAYED_FOR_SURE_DB = 30.0  # rendering goes on until the whole string is so far
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does not depend on phase
 
 Samples = NDArray[np.float64]
-Progress = Callable[[float], None]  # called with the share that is done, 0 … 1
-Cancelled = Callable[[], bool]
-
-
-class ExportCancelled(Exception):
-    """The user stopped the export. No file is left."""
 
 
 @dataclass(frozen=True)
@@ -131,23 +126,17 @@ def voices_of(source: Source) -> tuple[Voice, ...]:
     return ("model",) if source == "model" else ("truth",) if source == "truth" else VOICES
 
 
-def render_sound(
-    request: SoundRequest,
-    rate_hz: int = 0,
-    *,
-    progress: Progress = lambda share: None,
-    cancelled: Cancelled = lambda: False,
-) -> Samples:
+def render_sound(request: SoundRequest, rate_hz: int = 0, *, progress: Progress = lambda *_: None) -> Samples:
     """The samples of a request, (frames,) or (frames, 2).
 
     Args:
         rate_hz: 0 for the preset's own.
 
     Raises:
-        ExportCancelled: `cancelled` returned True.
+        Cancelled: `progress` raised it.
         Runaway: the model's output grew without bound or is not finite.
     """
-    voices = render_voices(request, (request.source,), rate_hz, progress=progress, cancelled=cancelled)
+    voices = render_voices(request, (request.source,), rate_hz, progress=progress)
     return voices.samples(request.source, request.difference_gain_db)
 
 
@@ -157,8 +146,7 @@ def render_voices(
     rate_hz: int = 0,
     *,
     all_voices: bool = False,
-    progress: Progress = lambda share: None,
-    cancelled: Cancelled = lambda: False,
+    progress: Progress = lambda *_: None,
 ) -> Voices:
     """Renders model and truth once for any number of sources of one pluck; `request.source` is ignored.
 
@@ -179,7 +167,7 @@ def render_voices(
             progress((place + share) / len(wanted))
 
         with suppress(*(() if voice in needed else (Runaway,))):
-            sounds[voice] = _render(request, voice, rate_hz, part, cancelled)
+            sounds[voice] = _render(request, voice, rate_hz, part)
     if request.decay_db is None:
         return Voices(sounds)
     ends = [decayed_frames(sound, rate_hz, request.decay_db) for sound in sounds.values()]
@@ -208,17 +196,11 @@ def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
     return min(len(sound), last * window)
 
 
-def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progress, cancelled: Cancelled) -> Recording:
+def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callable[[float], None]) -> Recording:
     """The samples (frames, points) of the voice that a device would play."""
     preset, info = request.preset, request.preset.info
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
     ear = Ear(request.points, request.pickup)
-
-    def advanced(share: float) -> None:
-        if cancelled():
-            raise ExportCancelled
-        progress(share)
-
     recording = Recording(len(request.points))
     for block in voice_blocks(
         program,
@@ -227,7 +209,7 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Progres
         request.pluck,
         ear,
         request.seconds,
-        advanced,
+        progress,
         None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB,
     ):
         recording.append(block)

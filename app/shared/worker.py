@@ -10,7 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from app.shared.thread_priority import Rank, step_back
 
@@ -21,6 +21,13 @@ REPORT_EVERY_S = 0.05  # shares of progress; results so far are reported at once
 
 class Cancelled(Exception):
     """The result of a computation is no longer wanted."""
+
+
+class Progress(Protocol):
+    """Called by long work; may raise `Cancelled`, which ends the work. `Job.progress` is one."""
+
+    def __call__(self, share: float, text: str = "", left_s: float | None = None, /) -> None:
+        """`share`: done, 0 … 1; `text`: what is being done; `left_s`: seconds left, None where not known."""
 
 
 class Job:
@@ -66,11 +73,22 @@ class Job:
             Cancelled: see `wait`.
         """
         self.wait(BREATH_S)
+        self._report(share, text, so_far, at_once=so_far is not None)
+
+    def progress(self, share: float, text: str = "", left_s: float | None = None, /) -> None:
+        """Reports as a `Progress`, without a breath: for compiled work. In place of a result: the seconds left.
+
+        Raises:
+            Cancelled: see `wait`.
+        """
+        self._report(share, text, left_s)
+
+    def _report(self, share: float, text: str, more: object, at_once: bool = False) -> None:
         self.check()
         now_s = time.monotonic()
-        if so_far is not None or now_s - self._reported_s >= REPORT_EVERY_S:
+        if at_once or now_s - self._reported_s >= REPORT_EVERY_S:
             self._reported_s = now_s
-            self._say(self, "progressed", share, text, so_far)
+            self._say(self, "progressed", share, text, more)
 
 
 Work = Callable[[Job], Any]

@@ -16,7 +16,7 @@ class Background(QObject):
     Args: see `Worker`.
     """
 
-    progressed = Signal(float, str, object)  # share of the job, what is done, a result so far or None
+    progressed = Signal(float, str, object)  # share of the job, what is done, a result so far, seconds left, or None
     finished = Signal(object)
     failed = Signal(str, str)  # message, details
     cancelled = Signal()  # the job gave up after `stop`

@@ -260,6 +260,7 @@ class Controller(QObject):
             self.window,
         )
         dialog.exec()
+        dialog.accept()  # ends a job that still runs, where the program was quit
         self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
     def listening_test(self) -> None:

@@ -14,13 +14,15 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.export.choices import ExportChoices
-from app.export.files import Source, WavReport
+from app.export.files import Source
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
+from app.shared.worker import Job
+from app.views.background import Background
 from app.views.controls.drag_button import DragButton
 from app.views.dialogs.chosen_sound import export_chosen, suggested_name
-from app.views.dialogs.export_job import ExportJob
 from app.views.dialogs.export_pages import as_heard
+from app.views.dialogs.job_dialog import EXPECTED
 
 _SOUND = {"string", "position", "amplitude_mm", "shape", "width", "listen", "listen_right", "stereo", "pickup"}
 
@@ -41,7 +43,9 @@ class DraggedExport(QObject):
         self._button, self._chosen = button, chosen
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._rendered = 0
-        self._job: ExportJob | None = None
+        self._rendering = Background("dragged-export", self, expected=EXPECTED)
+        self._rendering.finished.connect(self._carry)
+        self._rendering.failed.connect(self._failed)
         self._kept: tuple[object, list[Path]] = (None, [])  # what was rendered last, and its files
         button.drag_began.connect(self._begin)
         button.drag_ended.connect(self._end)
@@ -49,6 +53,7 @@ class DraggedExport(QObject):
     def close(self) -> None:
         """Cancels the rendering, and removes all files; may be called again."""
         self._end()
+        self._rendering.close(None)
         if self._folder is not None:
             self._folder.cleanup()
             self._folder = None
@@ -75,13 +80,12 @@ class DraggedExport(QObject):
             where, why = tempfile.gettempdir(), error.strerror
             self.told.emit(f"{where}: no folder can be created there ({why}); free some space.")
             return
-        self._job = job = ExportJob(
-            lambda tell, cancelled: export_chosen(preset, choices, export, paths, lambda share: None, cancelled)
-        )
-        job.finished.connect(lambda reports: self._rendered_all(job, wish, reports))
-        job.failed.connect(lambda message: self._failed(job, message))
+
+        def work(job: Job) -> tuple[object, list[Path]]:
+            return wish, [each.path for each in export_chosen(preset, choices, export, paths, job.progress)]
+
         QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
-        job.start()
+        self._rendering.start(work)
 
     def _paths(
         self, preset: PresetEntry, choices: Choices, export: ExportChoices, sources: tuple[Source, ...]
@@ -94,25 +98,17 @@ class DraggedExport(QObject):
         folder.mkdir()
         return {source: folder / suggested_name(preset, choices, export.rate_hz, source) for source in sources}
 
-    def _rendered_all(self, job: ExportJob, wish: object, reports: list[WavReport]) -> None:
-        if job is self._job:  # not one that was cancelled meanwhile
-            self._kept = wish, [report.path for report in reports]
-            self._wait()
-            self._button.carry(self._kept[1])
+    def _carry(self, rendered: tuple[object, list[Path]]) -> None:
+        QApplication.restoreOverrideCursor()
+        self._kept = rendered
+        self._button.carry(self._kept[1])
 
-    def _failed(self, job: ExportJob, message: str) -> None:
-        if job is self._job:
-            self._wait()
-            self.told.emit(message)
+    def _failed(self, message: str) -> None:
+        QApplication.restoreOverrideCursor()
+        self.told.emit(message)
 
     def _end(self) -> None:
         """The button was released: cancels the rendering."""
-        if self._job is not None:
-            self._job.cancel()
-            self._wait()
-
-    def _wait(self) -> None:
-        if self._job is not None:
-            job, self._job = self._job, None
-            job.wait()
+        if self._rendering.busy:
+            self._rendering.cancel()
             QApplication.restoreOverrideCursor()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from app.export.played import Played, recorded_files, write_recorded
@@ -16,16 +15,13 @@ from app.playing.live import Live
 from app.presets.library import Library
 from app.session.choices import Session
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.views.background import Background
 from app.views.instrument.patch_bar import PatchBar
-from engine.presets import PresetError, load_preset
+from engine.presets import load_preset
 from engine.result_file import WriteError
 
 FILES = "WAV and MIDI (*.wav)"
 WAIT_S = 30.0  # for files that are being written, when the window is closed
-
-
-class _Abandoned(Exception):
-    """The window is closed before the sound is written, as the user wanted."""
 
 
 class Recordings(QObject):
@@ -36,20 +32,16 @@ class Recordings(QObject):
 
     told = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
-    _written, _not_written = Signal(str), Signal(object, str)  # from the thread that writes
 
     def __init__(self, session: Session, library: Library, live: Live, bar: PatchBar, parent: QObject) -> None:
         super().__init__(parent)
         self._session, self._library, self._live, self._bar = session, library, live, bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: list[Played] = []
-        self._writers: list[threading.Thread] = []
-        self._abandoned = threading.Event()  # what is being written
+        self._writers: list[Background] = []  # one for each recording
         bar.record_asked.connect(self.record)
         bar.recording_save_asked.connect(self.save)
         bar.recording_discard_asked.connect(self.discard)
-        self._written.connect(self.informed, Qt.ConnectionType.QueuedConnection)
-        self._not_written.connect(self._take_back, Qt.ConnectionType.QueuedConnection)
 
     def record(self) -> None:
         """Begins to record; or ends it and asks for a file, as it does for a recording that is not saved yet."""
@@ -92,23 +84,15 @@ class Recordings(QObject):
         if entry is None:
             self._take_back(played, f"The preset {played.patch.preset}, which plays the patch, was not found.")
             return
+        for ended in [each for each in self._writers if not each.busy]:
+            ended.close()
+            self._writers.remove(ended)
         preset_file = entry.path
-
-        def go_on(seconds: float) -> None:
-            if self._abandoned.is_set():
-                raise _Abandoned
-
-        def work() -> None:
-            try:
-                self._written.emit(write_recorded(path, played, load_preset(preset_file), go_on))
-            except _Abandoned:
-                pass
-            except (ValueError, PresetError, WriteError, OSError) as error:
-                self._not_written.emit(played, str(error).splitlines()[0])
-
-        thread = threading.Thread(target=work, name="performance-writer", daemon=True)
-        self._writers = [*(each for each in self._writers if each.is_alive()), thread]
-        thread.start()
+        writer = Background("performance-writer", self, expected=(ValueError, WriteError, OSError))
+        writer.finished.connect(self.informed.emit)
+        writer.failed.connect(lambda message, details: self._take_back(played, message.splitlines()[0]))
+        self._writers.append(writer)
+        writer.start(lambda job: write_recorded(path, played, load_preset(preset_file), lambda seconds: job.check()))
 
     def tick(self, now_s: float) -> None:
         """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
@@ -128,19 +112,19 @@ class Recordings(QObject):
         answer = QMessageBox.question(self._bar, "Recording not saved", " ".join([*lost, question]))
         if answer != QMessageBox.StandardButton.Yes:
             return False
-        if self._writing:
-            self._abandoned.set()
+        for writer in self._writers:
+            writer.cancel()
         return True
 
     @property
     def _writing(self) -> bool:
-        return any(thread.is_alive() for thread in self._writers)
+        return any(writer.busy for writer in self._writers)
 
     def close(self) -> None:
         """Waits until files are written, WAIT_S at most; may be called again."""
         until_s = time.monotonic() + WAIT_S
-        for thread in self._writers:
-            thread.join(max(0.0, until_s - time.monotonic()))
+        for writer in self._writers:
+            writer.close(max(0.0, until_s - time.monotonic()), cancel=False)
 
     def _end(self) -> None:
         events = self._live.end_recording()

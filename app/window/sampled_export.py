@@ -47,7 +47,7 @@ class SampledExport(QObject):
     def close(self) -> None:
         """Ends an export that has begun; its samples are kept. May be called again."""
         if self.dialog is not None:
-            self.dialog.abandon()
+            self.dialog.accept()
 
     def _played(self) -> tuple[Patch, PresetEntry] | None:
         patch = self._session.choices.patch

@@ -18,8 +18,8 @@ from app.export.sampled.levels import headroom_db
 from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
-from app.export.sampled.store import INDEX, SampledProgress, SampleStore, read_index
-from app.export.sound import Cancelled, ExportCancelled
+from app.export.sampled.store import INDEX, SampleStore, read_index
+from app.shared.worker import Cancelled, Progress
 from engine.result_file import WriteError, explain, whole_file
 
 if TYPE_CHECKING:
@@ -81,26 +81,21 @@ def planned(plan: SampledPlan, out: Path) -> SampledPlan:
 
 
 def export_sampled(
-    plan: SampledPlan,
-    out: Path,
-    render: NoteRenderer,
-    *,
-    progress: SampledProgress = lambda share, text, left_s: None,
-    cancelled: Cancelled = lambda: False,
+    plan: SampledPlan, out: Path, render: NoteRenderer, *, progress: Progress = lambda *_: None
 ) -> SampledReport:
     """Renders the samples of a plan and writes OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
 
     Raises:
         ValueError: see `planned`.
-        ExportCancelled: `cancelled` returned True; whole samples stay for the next time, without any no folder stays.
+        Cancelled: `progress` raised it; whole samples stay for the next time, without any no folder stays.
         ExportError: a file cannot be written, or a note not rendered.
     """
     plan = planned(plan, out)
     store = SampleStore(sample_folder(out), out.name)
     with store.locked():
         try:
-            samples, rendered = store.fill(plan, render, progress, cancelled)
-        except ExportCancelled:
+            samples, rendered = store.fill(plan, render, progress)
+        except Cancelled:
             if store.empty:
                 store.remove()
             raise
@@ -110,7 +105,7 @@ def export_sampled(
                     file.write(sfz_text(plan, samples, store.folder.name).encode())
                     gain_db = sfz_gain_db(plan.patch, samples)
                 else:
-                    gain_db = write_sf2(file, plan, samples, store.folder, cancelled)
+                    gain_db = write_sf2(file, plan, samples, store.folder, progress)
             size = out.stat().st_size
             if out.suffix.lower() == ".sfz":
                 size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)

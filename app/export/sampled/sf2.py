@@ -19,10 +19,10 @@ import soundfile
 from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.store import StoredSample
-from app.export.sound import Cancelled, ExportCancelled
 from app.export.wav import quantised
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
+from app.shared.worker import Progress
 from engine.plain_text import one_line
 
 ZEROS_BEHIND = 46  # frames after each sample (6.1)
@@ -80,7 +80,7 @@ def write_sf2(
     plan: SampledPlan,
     samples: Mapping[Zone, StoredSample],
     folder: Path,
-    cancelled: Cancelled = lambda: False,
+    progress: Progress = lambda *_: None,
 ) -> float:
     """Writes the whole file; the stored samples are read one after the other.
 
@@ -88,7 +88,7 @@ def write_sf2(
         By how much the whole was raised, in dB: the loudest sample is at the full level of 16 bits.
 
     Raises:
-        ExportCancelled: `cancelled` said so; the file is not whole.
+        Cancelled: `progress`, called before each sample, raised it; the file is not whole.
         OSError, soundfile.LibsndfileError: a sample cannot be read, or the file not written.
     """
     channels = _channels(samples)
@@ -106,8 +106,7 @@ def write_sf2(
     }
     gain_db = -max(levels_db.values())
     for zone in samples:
-        if cancelled():
-            raise ExportCancelled
+        progress(1.0, "writing the SoundFont")
         sound, _ = soundfile.read(folder / plan.file_name(zone), dtype="float64", always_2d=True)
         steps, _ = quantised(sound * 10 ** ((levels_db[zone] + gain_db) / 20), "16")
         silence = bytes(2 * ZEROS_BEHIND)

@@ -8,6 +8,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -16,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.export.files import ExportError
 from app.export.sampled.plan import NoteRenderer, SampledPlan, Zone
 from app.export.sampled.sample import INAUDIBLE_DBFS, PEAK_DBFS, encoded, sample_of
-from app.export.sound import Cancelled, ExportCancelled
+from app.shared.worker import Progress
 from engine import bounds
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
@@ -26,7 +27,6 @@ from engine.schema import parse_json
 INDEX = "index.json"
 LOCK = ".index.lock"
 LARGEST_INDEX_BYTES = 8 * 2**20  # of every key at the most layers: 2 MiB
-SampledProgress = Callable[[float, str, float | None], None]  # share, what is rendered, seconds left where known
 _OURS = re.compile(r"key\d{3}_vel\d{3}\.(flac|wav)")
 _DIGEST = Field(pattern="^[0-9a-f]{64}$")
 
@@ -112,11 +112,7 @@ class SampleStore:
         return self.folder / name
 
     def fill(
-        self,
-        plan: SampledPlan,
-        render: NoteRenderer,
-        progress: SampledProgress = lambda share, text, left_s: None,
-        cancelled: Cancelled = lambda: False,
+        self, plan: SampledPlan, render: NoteRenderer, progress: Progress = lambda *_: None
     ) -> tuple[dict[Zone, StoredSample], int]:
         """Renders what is not there yet; samples that the plan does not hold are removed.
 
@@ -124,29 +120,24 @@ class SampleStore:
             What the folder holds, by zone, and how many of them were rendered now.
 
         Raises:
-            ExportCancelled: `cancelled` said so; whole files and the index stay.
+            Cancelled: `progress` raised it; whole files and the index stay.
             ExportError: a file cannot be written, or a note is not finite.
         """
         self._write_index()  # before any sample: it says whose they are
-
-        def check(_: object = None) -> None:
-            if cancelled():
-                raise ExportCancelled
-
         wanted = []
         for zone in plan.zones:
-            check()
+            progress(0.0, "checking samples")
             if not self._keeps(plan, zone):
                 wanted.append(zone)
         started = time.monotonic()
         for done, zone in enumerate(wanted):
-            check()
-            share = done / len(wanted)
+            share, text = done / len(wanted), f"key {zone.key}, velocity {zone.velocity}"
             if done == 1:
                 started = time.monotonic()  # the first note also loads and compiles
             left_s = (time.monotonic() - started) * (len(wanted) - done) / (done - 1) if done > 1 else None
-            progress(share, f"key {zone.key}, velocity {zone.velocity}", left_s)
-            self._add(plan, zone, render, check)
+            report = partial(progress, share, text, left_s)
+            report()
+            self._add(plan, zone, render, report)
         self._remove_all_but({plan.file_name(zone) for zone in plan.zones})
         return {zone: self._index.samples[plan.file_name(zone)] for zone in plan.zones}, len(wanted)
 
@@ -169,11 +160,11 @@ class SampleStore:
         except OSError:
             return False
 
-    def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer, advanced: Callable[[float], None]) -> None:
+    def _add(self, plan: SampledPlan, zone: Zone, render: NoteRenderer, check: Callable[[], None]) -> None:
         name = plan.file_name(zone)
         try:
             note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
-            sample = sample_of(render(*note, advanced=advanced), plan.rate_hz)
+            sample = sample_of(render(*note, advanced=lambda seconds: check()), plan.rate_hz)
         except ValueError as error:
             raise ExportError(f"{self.path(name)}: {error}") from error
         data = encoded(sample, plan.rate_hz, plan.format, plan.bits)

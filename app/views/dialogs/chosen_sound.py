@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from app.export.choices import ExportChoices
 from app.export.files import SoundRequest, Source, WavReport, default_file_name, export_sounds
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
+from app.shared.worker import Progress
 from app.views.dialogs.sound_form import wav_settings
 from engine.presets import load_preset, of_string
 
@@ -30,15 +31,12 @@ def export_chosen(
     choices: Choices,
     export: ExportChoices,
     paths: Mapping[Source, Path],
-    progress: Callable[[float], None],
-    cancelled: Callable[[], bool],
+    progress: Progress,
 ) -> list[WavReport]:
     """Renders the pluck of a string once, and writes a file for each source. Any thread.
 
     Args:
         paths: the files to write, by source.
-        progress: is called with the share done, 0 … 1.
-        cancelled: whether to stop; asked now and then.
 
     Raises:
         PresetError: the preset cannot be used, or cannot play the string that is chosen.
@@ -60,4 +58,4 @@ def export_chosen(
         export.decay_db if export.until_decayed else None,
     )
     settings = wav_settings(export)
-    return export_sounds(request, paths, settings, progress=progress, cancelled=cancelled)[0]
+    return export_sounds(request, paths, settings, progress=progress)[0]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QTabBar, QWidget
 
 from app.export.batch import INDEX, BatchRow, run_batch
@@ -78,7 +77,7 @@ class ExportDialog(JobDialog):
         self.adjustSize()
 
     def _show_choices(self) -> None:
-        if self._job is not None:
+        if self._job.busy:
             return
         export = self.export_choices()
         self.sound.suggest_name(export.rate_hz)
@@ -105,19 +104,16 @@ class ExportDialog(JobDialog):
         export = self.export_choices()
         if self._is_batch:
             plan = self.batch.plan(export)
-            self._run(
-                lambda tell, cancelled: run_batch(plan, tell, cancelled),
-                self._tell_batch,
-                self._tell_cancelled,
-                plan.folder,
-            )
+            self._run(lambda job: run_batch(plan, job.progress), self._tell_batch, self._tell_cancelled, plan.folder)
             return
         preset, choices, paths = self._preset, self._choices, self.sound.paths()
 
-        def work(tell: Callable[..., None], cancelled: Callable[[], bool]) -> list[WavReport]:
-            return export_chosen(preset, choices, export, paths, lambda share: tell(share, "Rendering"), cancelled)
-
-        self._run(work, self._tell_sound, self._tell_cancelled, next(iter(paths.values())).parent)
+        self._run(
+            lambda job: export_chosen(preset, choices, export, paths, job.progress),
+            self._tell_sound,
+            self._tell_cancelled,
+            next(iter(paths.values())).parent,
+        )
 
     def _tell_cancelled(self) -> None:
         kept = "finished files are kept; export again to resume." if self._is_batch else "no file was written."
@@ -145,9 +141,3 @@ class ExportDialog(JobDialog):
         messages = list(dict.fromkeys(row.message for row in rows if row.message))
         failed = f"\n{messages[0]}" + (f"\n… {INDEX} has the others" if len(messages) > 1 else "") if messages else ""
         self._end(f"{text}{level}{failed}", failed=bool(messages), saved=True)
-
-    def closeEvent(self, event: QCloseEvent) -> None:
-        if self._job is not None:
-            self._job.cancel()
-            self._job.wait()
-        super().closeEvent(event)

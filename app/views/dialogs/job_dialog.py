@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,9 +12,16 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
+from app.export.files import ExportError
+from app.export.recipe import RecipeError
+from app.shared.worker import Work
+from app.views.background import Background
 from app.views.controls.parts import label
-from app.views.dialogs.export_job import ExportJob, Work
 from engine.plain_text import duration
+from engine.presets import PresetError
+from engine.sources import Runaway
+
+EXPECTED = (ExportError, PresetError, RecipeError, Runaway, ValueError)  # their messages are for the user
 
 
 class JobDialog(QDialog):
@@ -34,7 +42,11 @@ class JobDialog(QDialog):
         self.setMinimumWidth(width)
         self._meanwhile = f". {meanwhile}" if meanwhile else ""
         self._borrower = parent.window() if parent is not None and meanwhile else None  # of the keyboard
-        self._job: ExportJob | None = None
+        self._job = Background(title, self, expected=EXPECTED)
+        self._job.progressed.connect(self._tell_progress)
+        self._job.finished.connect(self._finish)
+        self._job.failed.connect(self._fail)
+        self._job.cancelled.connect(self._give_up)
         self._shown_folder = Path()
         self._choosers: tuple[QWidget, ...] = ()
 
@@ -90,11 +102,8 @@ class JobDialog(QDialog):
     ) -> None:
         """Starts work in its thread; one of `told`, with what it returned, and `cancelled` is to call `_end`."""
         self._shown_folder = folder
-        self._job = ExportJob(work)
-        self._job.progressed.connect(self._tell_progress)
-        self._job.finished.connect(told)
-        self._job.failed.connect(lambda message: self._end(message, failed=True))
-        self._job.cancelled.connect(cancelled)
+        self._started_s = time.monotonic()
+        self._told, self._cancelled = told, cancelled
         for part in (*self._choosers, self.save):
             part.setEnabled(False)
         self.show_folder.hide()
@@ -102,7 +111,7 @@ class JobDialog(QDialog):
         self.bar.setValue(0)
         self.bar.show()
         self._say(begins)
-        self._job.start()
+        self._job.start(work)
         self._lend_keyboard(True)
 
     def _lend_keyboard(self, lent: bool) -> None:
@@ -116,7 +125,7 @@ class JobDialog(QDialog):
 
     def event(self, event: QEvent) -> bool:
         """Passes keys on to the parent's window while a job lends it the keyboard, all but Escape."""
-        if isinstance(event, QKeyEvent) and self._job is not None and self._borrower is not None:
+        if isinstance(event, QKeyEvent) and self._job.busy and self._borrower is not None:
             if event.key() == Qt.Key.Key_Escape:
                 event.accept()  # no shortcut of the window
             elif event.type() != QEvent.Type.ShortcutOverride:
@@ -125,17 +134,30 @@ class JobDialog(QDialog):
 
     def _tell_progress(self, share: float, text: str, left_s: float | None) -> None:
         self.bar.setValue(round(1000 * share))
-        left = "" if left_s is None else f", about {duration(left_s)} left"
-        self._say(f"{text}{left}{self._meanwhile}")
+        left_s = self._left_s(share) if left_s is None else left_s
+        left = f", about {duration(left_s)} left" if left_s else ""
+        self._say(f"{text or 'Rendering'}{left}{self._meanwhile}")
 
-    def _wait(self) -> None:
-        if self._job is not None:
-            self._job.wait()
-            self._job = None
+    def _left_s(self, share: float) -> float:
+        """The time left by the share that is done; 0 where it is not known."""
+        return (time.monotonic() - self._started_s) * (1 - share) / share if share > 0 else 0.0
+
+    def _finish(self, result: object) -> None:
+        self._told(result)
+
+    def _fail(self, message: str) -> None:
+        self._end(message, failed=True)
+
+    def _give_up(self) -> None:
+        self._cancelled()
+
+    def done(self, result: int) -> None:
+        """Closes the dialog. A job under way is cancelled and waited for; what is whole is kept."""
+        self._job.close(None)
+        super().done(result)
 
     def _end(self, text: str, failed: bool = False, saved: bool = False) -> None:
         """The job is over, with this result. `saved`: there are files to show."""
-        self._wait()
         self._lend_keyboard(False)
         self.bar.hide()
         for part in (*self._choosers, self.save):
@@ -155,8 +177,8 @@ class JobDialog(QDialog):
             self._say(f"No file manager was found here; the folder is {self._shown_folder}.")
 
     def _cancel_or_close(self) -> None:
-        if self._job is not None:
-            self._job.cancel()
+        if self._job.busy:
+            self._job.stop()
         else:
             self.accept()
 

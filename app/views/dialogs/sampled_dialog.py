@@ -5,7 +5,6 @@ It does not block the window: several minutes are for playing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from shutil import disk_usage
@@ -31,6 +30,7 @@ from app.instrument.bodies import body_digest
 from app.instrument.effects import body_problem
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
+from app.shared.worker import Job
 from app.views.controls.parts import label
 from app.views.dialogs.job_dialog import JobDialog
 from app.views.dialogs.sampled_form import SampledForm
@@ -74,7 +74,7 @@ class SampledDialog(JobDialog):
             except (OSError, PresetError):  # told when it is to be played
                 self._digest = ""
         self._patch, self._preset = patch, preset
-        if self._job is None:
+        if not self._job.busy:
             problem = body_problem(patch)
             self.what.setText(f"{patch.name}, played by {preset.title}" + (f"\n{problem}" if problem else ""))
             self.form.show_patch(patch, self.form.keys())
@@ -91,7 +91,7 @@ class SampledDialog(JobDialog):
     def _update(self) -> None:
         """What would be written. Nothing is, until it begins."""
         self._settled.stop()
-        if self._job is not None:
+        if self._job.busy:
             return
         self.show_folder.hide()
         try:
@@ -126,9 +126,9 @@ class SampledDialog(JobDialog):
             return
         plan, out, preset = self._plan(), self.form.out, self._preset.path
 
-        def work(tell: Callable[..., None], cancelled: Callable[[], bool]) -> SampledReport:
+        def work(job: Job) -> SampledReport:
             render = note_renderer(load_preset(preset), plan.source)
-            return export_sampled(plan, out, render, progress=tell, cancelled=cancelled)
+            return export_sampled(plan, out, render, progress=job.progress)
 
         self._run(
             work,
@@ -139,7 +139,6 @@ class SampledDialog(JobDialog):
         )
 
     def _tell_cancelled(self, plan: SampledPlan, out: Path) -> None:
-        self._wait()
         try:
             kept = kept_samples(plan, out)
         except ExportError as error:
@@ -157,11 +156,3 @@ class SampledDialog(JobDialog):
         for note in notes(plan, report, "Dry leaves"):
             lines.append(f"{note[0].upper()}{note[1:]}.")
         self._end("\n".join(lines), saved=True)
-
-    def abandon(self) -> None:
-        """Closes it, and waits for an export that has begun; samples that are whole are kept."""
-        if self._job is not None:
-            self._job.blockSignals(True)  # nobody is there to be told
-            self._job.cancel()
-        self._wait()
-        self.accept()

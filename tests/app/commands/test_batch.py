@@ -13,8 +13,9 @@ import pytest
 import soundfile
 
 from app.export import batch, sound
-from app.export.batch import BatchPlan, ExportCancelled, run_batch
+from app.export.batch import BatchPlan, run_batch
 from app.export.files import SoundRequest, export_sound
+from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import find_string, load_preset
 from engine.sources import Runaway
@@ -144,21 +145,29 @@ def test_a_model_that_runs_away_leaves_the_truth(
 
 
 def test_cancelling_keeps_whole_files_and_their_rows(small_preset: Path, folder: Path) -> None:
-    seen: list[tuple[float, str, float | None]] = []
-    with pytest.raises(ExportCancelled):
-        run_batch(plan(small_preset, folder), lambda *told: seen.append(told), lambda: seen[-1][0] > 0.3)
+    seen: list[tuple[float, str]] = []
+
+    def progress(share: float, text: str) -> None:
+        seen.append((share, text))
+        if share > 0.3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        run_batch(plan(small_preset, folder), progress)
     assert 0 < len(index(folder)) < 8
     assert sorted(row["file"] for row in index(folder)) == sorted(p.name for p in (folder / "out").glob("*.wav"))
-    assert [share for share, _, _ in seen] == sorted(share for share, _, _ in seen)
+    assert seen == sorted(seen, key=lambda one: one[0])
     assert "position 0.3, 1 mm" in seen[0][1]
-    assert any(left_s is not None for _, _, left_s in seen)
     assert {row.status for row in run_batch(plan(small_preset, folder))} == {"kept", "written"}
     assert list((folder / "out").glob(".*.unfinished")) == []
 
 
 def test_cancelling_before_the_first_file_leaves_no_index(small_preset: Path, folder: Path) -> None:
-    with pytest.raises(ExportCancelled):
-        run_batch(plan(small_preset, folder), cancelled=lambda: True)
+    def progress(*_: object) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        run_batch(plan(small_preset, folder), progress)
     assert list((folder / "out").iterdir()) == []
 
 

@@ -15,7 +15,6 @@ import torch
 from app.export import files as export
 from app.export import sound
 from app.export.files import (
-    ExportCancelled,
     ExportError,
     SoundRequest,
     Source,
@@ -29,6 +28,7 @@ from app.export.recipe import Recipe
 from app.export.sound import Voices
 from app.export.wav_chunks import Marker
 from app.playing.ahead import AheadVoice
+from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
 from engine.pluck import FULL_SCALE_M_S, Pluck
 from engine.presets import SHIPPED, load_preset
@@ -147,20 +147,25 @@ def test_the_gain_of_a_file_does_not_depend_on_what_is_written_beside_it(
 def test_progress_rises_to_one(request_: SoundRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(offline, "BLOCK_FRAMES", 100)
     shares: list[float] = []
-    export_sound(replace(request_, source="difference"), tmp_path / "a.wav", progress=shares.append)
+    export_sound(
+        replace(request_, source="difference"), tmp_path / "a.wav", progress=lambda share, *_: shares.append(share)
+    )
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1)
 
 
 def test_cancelling_leaves_no_file(request_: SoundRequest, tmp_path: Path) -> None:
-    with pytest.raises(ExportCancelled):
-        export_sound(request_, tmp_path / "a.wav", cancelled=lambda: True)
+    def cancel(*_: object) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        export_sound(request_, tmp_path / "a.wav", progress=cancel)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_refuses_is_told_before_the_work(request_: SoundRequest, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"missing.a\.wav: cannot be written .*; make the folder first"):
-        export_sound(request_, tmp_path / "missing" / "a.wav", progress=lambda share: pytest.fail("rendered"))
+        export_sound(request_, tmp_path / "missing" / "a.wav", progress=lambda *_: pytest.fail("rendered"))
 
 
 def test_a_full_disk_leaves_what_was_there(

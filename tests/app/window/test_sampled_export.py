@@ -13,11 +13,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.export.files import ExportCancelled
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.patches.library import find_patch
 from app.session.instrument import choices_of
+from app.shared.worker import Cancelled
 from app.views.dialogs.sampled_dialog import SampledDialog
 from app.window.controller import Controller
 from app.window.settings import load_settings
@@ -79,11 +79,11 @@ def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
     """Its dialog, which had the focus when the export began; it ends when it is cancelled."""
     begun = threading.Event()
 
-    def export(plan, out, render, progress, cancelled):
+    def export(plan, out, render, progress):
         begun.set()
-        while not cancelled():
+        while True:
+            progress(0.0)
             time.sleep(0.01)
-        raise ExportCancelled
 
     monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
     qtbot.waitUntil(lambda: patched.performance.live.ready)
@@ -143,12 +143,15 @@ def test_what_was_chosen_is_remembered(qtbot: QtBot, patched: Controller, tmp_pa
 def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
     begun, ended = threading.Event(), threading.Event()
 
-    def export(plan, out, render, progress, cancelled):
+    def export(plan, out, render, progress):
         begun.set()
-        while not cancelled():
-            time.sleep(0.01)
-        ended.set()
-        raise ValueError("told to nobody")
+        try:
+            while True:
+                progress(0.0)
+                time.sleep(0.01)
+        except Cancelled:
+            ended.set()
+            raise ValueError("told to nobody") from None
 
     monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
     dialog = open_dialog(qtbot, patched)
@@ -157,4 +160,4 @@ def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypat
     patched.window.close()
     assert ended.is_set()
     QApplication.processEvents()
-    assert not [thread for thread in threading.enumerate() if thread.name == "export"]
+    assert not [thread for thread in threading.enumerate() if thread.name == "Export instrument"]

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from app.export.files import ExportCancelled, ExportError
+from app.export.files import ExportError
 from app.export.sampled import sf2
 from app.export.sampled.job import export_sampled, kept_samples, sample_folder
 from app.export.sampled.plan import MOST_LAYERS, SampledPlan
 from app.export.sampled.store import INDEX, LOCK, SampleIndex, StoredSample, read_index
 from app.export.wav import quantised
 from app.patches.patch import Patch
+from app.shared.worker import Cancelled
 
 Render = Callable[..., np.ndarray]
 KINDS = pytest.mark.parametrize("kind", ["sfz", "sf2"])
@@ -48,6 +49,16 @@ KILLED = """
     patch = Patch.model_validate_json(Path(sys.argv[1]).read_text())
     export_sampled(SampledPlan(patch, (50, 54), layers=2, seconds=0.3), Path(sys.argv[2]), render)
 """
+
+
+def cancelled(when: Callable[[], bool]) -> Callable[..., None]:
+    """Progress that cancels once `when` is so."""
+
+    def progress(*_: object) -> None:
+        if when():
+            raise Cancelled
+
+    return progress
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -138,11 +149,17 @@ def test_a_soundfont_leaves_no_folder(patch: Patch, render: Render, tmp_path: Pa
 @KINDS
 def test_cancelling_keeps_what_is_whole(kind: str, patch: Patch, render: Render, tmp_path: Path) -> None:
     told: list[tuple[float, str, float | None]] = []
+
+    def progress(share: float, text: str, left_s: float | None = None) -> None:
+        if text == "checking samples":
+            return
+        if len(told) > 3:
+            raise Cancelled
+        told.append((share, text, left_s))
+
     out = tmp_path / f"a.{kind}"
-    with pytest.raises(ExportCancelled):
-        export_sampled(
-            small(patch), out, render, progress=lambda *one: told.append(one), cancelled=lambda: len(told) > 3
-        )
+    with pytest.raises(Cancelled):
+        export_sampled(small(patch), out, render, progress=progress)
     assert not out.exists()
     assert [share for share, _, _ in told] == [0.0, 0.1, 0.2, 0.3]
     assert told[0][1:] == (f"key 50, velocity {small(patch).zones[0].velocity}", None)
@@ -158,8 +175,8 @@ def test_cancelling_keeps_what_is_whole(kind: str, patch: Patch, render: Render,
 def test_cancelled_before_a_whole_sample_nothing_is_left(
     kind: str, patch: Patch, render: Render, tmp_path: Path
 ) -> None:
-    with pytest.raises(ExportCancelled):
-        export_sampled(small(patch), tmp_path / f"a.{kind}", render, cancelled=lambda: True)
+    with pytest.raises(Cancelled):
+        export_sampled(small(patch), tmp_path / f"a.{kind}", render, progress=cancelled(lambda: True))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -173,8 +190,8 @@ def test_cancelling_ends_within_a_note(patch: Patch, render: Render, tmp_path: P
         return render(*note)
 
     out = tmp_path / "a.sfz"
-    with pytest.raises(ExportCancelled):
-        export_sampled(small(patch), out, slow, cancelled=lambda: len(reached_s) == 35)
+    with pytest.raises(Cancelled):
+        export_sampled(small(patch), out, slow, progress=cancelled(lambda: len(reached_s) == 35))
     assert reached_s[-1] == 0.05  # of the second note
     assert kept_samples(small(patch), out) == 1
 
@@ -185,8 +202,8 @@ def test_cancelling_ends_while_a_soundfont_is_written(
     written: list[object] = []
     monkeypatch.setattr(sf2, "quantised", lambda *words: written.append(1) or quantised(*words))
     out = tmp_path / "a.sf2"
-    with pytest.raises(ExportCancelled):
-        export_sampled(small(patch), out, render, cancelled=lambda: len(written) == 2)
+    with pytest.raises(Cancelled):
+        export_sampled(small(patch), out, render, progress=cancelled(lambda: len(written) == 2))
     assert not out.exists()
     assert kept_samples(small(patch), out) == 10
 

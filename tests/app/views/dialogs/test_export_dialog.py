@@ -238,7 +238,8 @@ def test_a_batch_that_is_cancelled_keeps_what_is_whole(qtbot: QtBot, made, tmp_p
     dialog = made({"seconds": 2, "batch": {"positions": positions}})
     dialog.tabs.setCurrentIndex(1)
     dialog.save.click()
-    qtbot.waitUntil(lambda: len(wavs(tmp_path / "strings")) > 1)
+    qtbot.waitUntil(lambda: len(wavs(tmp_path / "strings")) > 1 and " left" in dialog.state.text())
+    assert ", 4 mm, about " in dialog.state.text()
     dialog.close_button.click()
     qtbot.waitUntil(lambda: "Cancelled; finished files are kept" in dialog.state.text())
     assert 1 < len(wavs(tmp_path / "strings")) < 60

@@ -87,7 +87,7 @@ def made(
     yield make
     notes.gate.set()
     for dialog in dialogs:
-        dialog.abandon()
+        dialog.accept()
 
 
 def settle(qtbot: QtBot, dialog: SampledDialog) -> None:
@@ -195,7 +195,7 @@ def test_a_body_that_is_not_here_is_told(made, patch: Patch, preset: PresetEntry
 def test_progress_is_shown_and_the_choices_wait(
     qtbot: QtBot, made, notes: Notes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.views.dialogs.export_job.TELL_EVERY_S", 0.0)
+    monkeypatch.setattr("app.shared.worker.REPORT_EVERY_S", 0.0)
     notes.last = 3
     dialog = made()
     dialog.save.click()
@@ -244,9 +244,7 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     dialog.close_button.click()
     notes.gate.set()
-    job = dialog._job
-    assert job is not None
-    job.wait()  # what it tells has not arrived
+    dialog._job._worker.close(None)  # what it tells has not arrived
     (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
     qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text())
     assert dialog.state.objectName() == "warning"
@@ -354,6 +352,16 @@ def test_an_error_of_the_work_is_one_line(qtbot: QtBot, made, notes: Notes, fold
     assert dialog.save.isEnabled()
     assert dialog.show_folder.isHidden()
     assert notes.rendered == []
+
+
+def test_an_unforeseen_error_ends_the_work(qtbot: QtBot, made, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.views.dialogs.sampled_dialog.load_preset", lambda path: {}["absent"])
+    dialog = made()
+    run(qtbot, dialog, "failed: 'absent'")
+    assert dialog.state.objectName() == "warning"
+    assert dialog.save.isEnabled()
+    dialog.close_button.click()
+    assert not dialog.isVisible()
 
 
 def test_a_preset_that_is_gone_is_told(qtbot: QtBot, made, preset: PresetEntry) -> None:
