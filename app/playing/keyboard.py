@@ -41,7 +41,6 @@ _PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
     _UPPER_LETTERS[n]: s for n, s in _BLACK.items()
 }
 LOWEST_C = 48  # the MIDI key that A plays at octave 0
-SPAN = max(_WHITE)  # semitones from the lowest to the highest of the computer's keys
 OCTAVE_STEPS = {"Z": -1, "X": 1}
 LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
 
@@ -116,8 +115,8 @@ def letters_of(octave: int) -> dict[int, str]:
 
 
 def octaves_of(low: int, high: int) -> tuple[int, int]:
-    """The lowest and the highest octave with a computer's key for one of the MIDI keys from `low` to `high`."""
-    lowest, highest = -((LOWEST_C + SPAN - low) // 12), (high - LOWEST_C) // 12
+    """The octaves, counted as those of the computer's keys, of the MIDI keys `low` and `high`."""
+    lowest, highest = (low - LOWEST_C) // 12, (high - LOWEST_C) // 12
     return max(min(lowest, HIGHEST_OCTAVE), LOWEST_OCTAVE), max(min(highest, HIGHEST_OCTAVE), LOWEST_OCTAVE)
 
 

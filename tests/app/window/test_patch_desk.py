@@ -65,7 +65,7 @@ def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
 
 def test_octave_keys_stop_where_no_key_sounds_and_the_strip_says_so(qtbot: QtBot, played: Controller) -> None:
     played.patches.choose("toy_wires")  # C3 to D♯6
-    for key, octave, words in ((Qt.Key.Key_Z, -1, "Lowest"), (Qt.Key.Key_X, 3, "Highest")):
+    for key, octave, words in ((Qt.Key.Key_Z, 0, "Lowest"), (Qt.Key.Key_X, 3, "Highest")):
         QToolTip.hideText()
         for _ in range(6):
             press(qtbot, played, key)
