@@ -62,8 +62,8 @@ def test_systems_that_readme_leaves_out_have_no_wheels() -> None:
     older = ["x86_64-manylinux_2_33", "aarch64-manylinux_2_38", "x86_64-apple-darwin", "aarch64-pc-windows-msvc"]
     found = resolved([(PYTHONS[0], system) for system in older])
     reason = "no wheels with a matching platform tag"
-    told = {system: " ".join(done.stderr.split()) for (_, system), done in found.items()}  # uv wraps its lines
-    assert {system: why for system, why in told.items() if reason not in why} == {}
+    answers = {system: " ".join(done.stderr.split()) for (_, system), done in found.items()}  # uv wraps its lines
+    assert {system: why for system, why in answers.items() if reason not in why} == {}
 
 
 def test_readme_names_these_pythons_and_systems() -> None:
