@@ -20,6 +20,7 @@ from app.patches.patch import Body, Patch, Room
 from app.patches.tuning import A4_KEY
 from app.shared.version import PROGRAM, program_version
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM
+from engine.presets import PresetInfo
 from engine.resonators.sine_transform import mode_shapes, to_modes
 from engine.result_file import whole_file
 from engine.voices import Ear
@@ -33,28 +34,33 @@ VOICES = 16
 NUMBERS_A_LINE = 8
 
 
-def write_faust(path: Path, patch: Patch, grid_points: int, most_modes: int | None = None) -> int:
+def write_faust(path: Path, patch: Patch, preset: PresetInfo, most_modes: int | None = None) -> int:
     """Writes the program, and returns how many modes it has.
 
     Args:
-        grid_points: of the model that plays the patch.
+        preset: that plays the patch.
         most_modes: the lowest of them, for a program that costs less; default all below 20 kHz.
 
     Raises:
         ValueError: no key has a string.
         WriteError: the file cannot be written.
     """
-    text, modes = faust_program(patch, grid_points, most_modes)
+    text, modes = faust_program(patch, preset, most_modes)
     with whole_file(path) as file:
         file.write(text.encode())
     return modes
 
 
-def faust_program(patch: Patch, grid_points: int, most_modes: int | None = None) -> tuple[str, int]:
+def faust_program(patch: Patch, preset: PresetInfo, most_modes: int | None = None) -> tuple[str, int]:
     """The program's text and how many modes it has, as `write_faust` writes it. Raises ValueError as it does."""
     patch = Patch.model_validate({**dict(patch), "body": Body(), "room": Room()})
     ear = Ear(tuple(patch.pickup.points), patch.pickup.kind)
-    loud = LoudKeys(patch, ear, grid_points)
+    if preset.recorded is not None:
+        raise ValueError(
+            f"{patch.name}: its string was learned from a recording, which a Faust program has no modes for"
+        )
+    grid_points = preset.grid_points
+    loud = LoudKeys(patch, ear, preset)
     low, high = patch.range
     keys = [_possible(loud, key) for key in range(low, high + 1)]
     sounding = [key for key in keys if key is not None]

@@ -102,9 +102,9 @@ def _mono(samples: Array) -> Array:
     sound = np.asarray(samples, np.float64)
     if sound.ndim == 1:
         return sound
-    if sound.shape[1] == 2 and np.isfinite(sound).all() and (sound.std(0) > 0).all():
-        if float(np.corrcoef(sound.T)[0, 1]) > ALIKE:
-            return sound.mean(1)
+    heard = sound.shape[1] == 2 and bool(np.isfinite(sound).all() and (sound.std(0) > 0).all())
+    if heard and float(np.corrcoef(sound.T)[0, 1]) > ALIKE:
+        return sound.mean(1)
     loudest = int(np.argmax(np.nansum(np.where(np.isfinite(sound), sound, 0.0) ** 2, axis=0)))
     return sound[:, loudest]
 

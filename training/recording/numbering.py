@@ -222,8 +222,7 @@ def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> t
             continue
         peaks = peaks_of(note.part(begin, begin + length), note.rate_hz, note.noise_power)
         series = number(peaks, f0_range_hz)
-        if series is not None and (best is None or best[0] is None or series.score > best[0].score + 0.1):
-            best = series, peaks
-        elif best is None:
+        better = series is not None and best is not None and (best[0] is None or series.score > best[0].score + 0.1)
+        if best is None or better:
             best = series, peaks
     return best if best is not None else (None, peaks_of(note.samples, note.rate_hz, note.noise_power))

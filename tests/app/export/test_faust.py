@@ -43,7 +43,7 @@ def preset() -> Preset:
 
 def compiled(patch: Patch, preset: Preset, folder: Path) -> Path:
     source, cpp, program = (folder / f"string.{ending}" for ending in ("dsp", "cpp", "out"))
-    write_faust(source, patch, preset.info.grid_points)
+    write_faust(source, patch, preset.info)
     subprocess.run(["faust", "-lang", "cpp", "-a", str(DRIVER), str(source), "-o", str(cpp)], check=True)
     subprocess.run(["g++", "-w", str(cpp), "-o", str(program)], check=True)
     return program
@@ -57,7 +57,7 @@ def played(program: Path, freq_hz: float, channels: int) -> NDArray[np.float64]:
 
 def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     patch = quiet("classical_guitar")
-    keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info.grid_points)
+    keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
     key = keys.of_key(60)
     assert key is not None
     t, b, c, d, loud = (np.array(column) for column in key_tables([key, None]))
@@ -68,7 +68,7 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
 
 
 def test_the_program_says_what_it_is(preset: Preset) -> None:
-    text, modes = faust_program(quiet("classical_guitar", author='A "b" c'), preset.info.grid_points, 12)
+    text, modes = faust_program(quiet("classical_guitar", author='A "b" c'), preset.info, 12)
     assert modes == 12
     assert "its quiet string, 12 modes" in text.splitlines()[0]
     assert 'declare author "A b c";' in text
@@ -79,7 +79,7 @@ def test_the_program_says_what_it_is(preset: Preset) -> None:
 def test_a_patch_without_a_string_is_told(preset: Preset) -> None:
     patch = quiet("classical_guitar", range=(127, 127), tuning=TuningChoice(transpose=48))
     with pytest.raises(ValueError, match="none of its keys"):
-        faust_program(patch, preset.info.grid_points)
+        faust_program(patch, preset.info)
 
 
 @needs_faust
