@@ -132,7 +132,7 @@ class PresetInfo:
         )
 
     def modes_of(self, partials: int) -> int:
-        """How many modes it plays so many partials with: of a recorded string two for each, as far as its grid goes."""
+        """How many modes it plays so many partials with: of a recorded string two for each, if its grid allows."""
         return min(partials * (2 if self.recorded is not None else 1), self.grid_points - 2)
 
     def tension_rise(self, pluck: Pluck) -> float:
