@@ -5,27 +5,30 @@ Each check is one function of what is heard; all are made, so that a musician re
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
 from training.recording.note import Note, envelope
-from training.recording.numbering import Peaks, Series, distances, number, peaks_of, tolerance
+from training.recording.numbering import Peaks, Series, chance, distances, number, tolerance
 
 Array = NDArray[np.float64]
 
 CLIPPED_RUNS = 3  # of so many equal samples at the peak
 CLIPPED_SAMPLES = 4
 SHORTEST_RINGING_S = 0.4
-LEAST_SNR_DB = 15.0
+LEAST_SNR_DB = 18.0
 ONSET_RISE_DB = 6.0
 LEAST_PARTIALS = 4
 LEAST_EXPLAINED = 0.3
 MOST_MISSING = 0.45
-SECOND_SERIES = 0.2
-REVERBERANT_DB = 3.0
+SECOND_SERIES = 0.28  # see `second_series`
+LOUD_DB = -30.0  # of a second note's three loudest partials, below the loudest peak
+SLOWEST_ATTACK_S = 0.12
+LEAST_FILLED_DB = 20.0  # between partials, below them, half a second after the attack
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ def examine(samples: Array, note: Note, series: Series | None, peaks: Peaks) -> 
     found = [
         clipped(samples),
         already_playing(note),
+        slow_attack(note),
+        reverberant(note, series),
         too_short(note),
         looped(note),
         more_onsets(note, series),
@@ -70,22 +75,57 @@ def clipped(samples: Array) -> Finding | None:
 
 
 def already_playing(note: Note) -> Finding | None:
-    """Sound at the very beginning that is no attack: the first milliseconds are as loud as what follows."""
-    rate = note.rate_hz
-    if note.onset > round(0.01 * rate):
+    """Whether the waveform does not start from rest."""
+    if note.onset > round(0.01 * note.rate_hz):
         return None
-    level = envelope(note.samples, rate, 0.002)
-    loudest = float(level[: round(0.3 * rate)].max())
-    first = float(level[: round(0.001 * rate) + 1].mean())
-    if first < 0.35 * loudest:
+    loudest = float(np.abs(note.samples[: round(0.3 * note.rate_hz)]).max())
+    if float(np.abs(note.samples[:3]).max()) < 0.2 * loudest:
         return None
     return Finding(
         "playing", "the note is already playing where the file begins", "keep the silence before the attack"
     )
 
 
+def slow_attack(note: Note) -> Finding | None:
+    """A level that rises for longer than any pluck: reversed, faded in, or bowed."""
+    level = envelope(note.samples, note.rate_hz, 0.02)
+    peak = int(np.argmax(level))
+    quiet = np.flatnonzero(level[:peak] < 0.3 * level[peak])
+    rise_s = (peak - (int(quiet[-1]) if len(quiet) else 0)) / note.rate_hz
+    if rise_s < SLOWEST_ATTACK_S:
+        return None
+    return Finding(
+        "edited",
+        f"its level rises for {rise_s:.2f} s: reversed, faded in or bowed",
+        "give a plucked note as it was recorded",
+    )
+
+
+def reverberant(note: Note, series: Series | None) -> Finding | None:
+    """Sound between the partials half a second after the attack, well above the noise: the room's."""
+    if series is None or note.seconds < 0.9 or len(series.present) < LEAST_PARTIALS:
+        return None
+    part = note.part(0.3, 0.9)
+    power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
+    hz = np.fft.rfftfreq(len(part), 1 / note.rate_hz)
+    noise = note.noise_power * float(np.sum(np.hanning(len(part)) ** 2))
+    partials = series.partials_hz(max(series.present))
+    ratios = []
+    for low, high in pairwise(partials[:12]):
+        quarter = 0.25 * (high - low)
+        between = float(np.median(power[(hz > low + quarter) & (hz < high - quarter)]))
+        peak = float(power[(hz > low - quarter) & (hz < low + quarter)].max())
+        if peak > 100 * noise:
+            ratios.append(10 * np.log10(peak / max(between - noise, 1e-30)))
+    if len(ratios) < 3 or float(np.median(ratios)) > LEAST_FILLED_DB:
+        return None
+    return Finding("reverberant", "a room rings between its partials", "record closer, or in a drier room")
+
+
 def too_short(note: Note) -> Finding | None:
     """How long it stands out of its noise, and by how much."""
+    if note.seconds < SHORTEST_RINGING_S:
+        return Finding("short", f"it lasts only {note.seconds:.2f} s", "let the note ring for two seconds or more")
     level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
     noise = np.sqrt(note.noise_power)
     snr_db = 20 * np.log10(float(level.max()) / max(noise, 1e-12))
@@ -170,20 +210,14 @@ def second_series(note: Note, series: Series, peaks: Peaks) -> Finding | None:
     """Whether what the first series leaves is a second one, or the series is the common sub-octave of two."""
     rest = peaks.without(series)
     other = number(rest) if len(rest.hz) >= 4 else None
-    if other is not None and _counts(other, rest, peaks, series):
-        return Finding(
-            "chord",
-            f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz",
-            "record one note alone",
-        )
-    return None
-
-
-def _counts(other: Series, rest: Peaks, peaks: Peaks, series: Series) -> bool:
+    if other is None:
+        return None
     near = np.abs(distances(rest.hz, other.f0_hz, other.stiffness)) < tolerance(rest.hz, other.f0_hz, rest.width_hz)
-    loud = rest.level_db[near]
-    strong = int(np.sum(loud > peaks.level_db.max() - 40))
-    return strong >= 3 and other.missing < 0.4 and other.explained > SECOND_SERIES
-
-
-__all__ = ["Finding", "examine", "peaks_of", "replace"]
+    if near.sum() < 3:
+        return None
+    loud_db = float(np.sort(rest.level_db[near])[-3:].mean() - peaks.level_db.max())
+    # what it explains more than any series of its spacing would, and how loud it is
+    if other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB) < SECOND_SERIES:
+        return None
+    words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz"
+    return Finding("chord", words, "record one note alone")

@@ -6,7 +6,7 @@ and pays for partials that it predicts and the spectrum lacks; so neither an oct
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,7 @@ class Peaks:
     level_db: Array
     width_hz: float
     highest_hz: float
+    hidden_hz: Array = field(default_factory=lambda: np.zeros(0))  # where a peak would not be seen
 
     @property
     def strength(self) -> Array:
@@ -75,7 +76,8 @@ class Peaks:
         """The peaks that a series does not explain."""
         distance = distances(self.hz, series.f0_hz, series.stiffness)
         kept = np.abs(distance) > tolerance(self.hz, series.f0_hz, self.width_hz)
-        return Peaks(self.hz[kept], self.above_db[kept], self.level_db[kept], self.width_hz, self.highest_hz)
+        hidden = series.partials_hz(MOST_PARTIALS)
+        return Peaks(self.hz[kept], self.above_db[kept], self.level_db[kept], self.width_hz, self.highest_hz, hidden)
 
 
 def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
@@ -137,7 +139,8 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Seri
             tried = series_at(peaks, f0, float(stiffness))
             if best is None or tried.score > best.score:
                 best = tried
-    assert best is not None
+    if best is None:
+        return None
     for _ in range(3):
         best = max((_refined(peaks, best), best), key=lambda each: each.score)
     return best
@@ -187,8 +190,14 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     share = np.cumsum(best) / best.sum()
     last = int(np.searchsorted(share, 0.93))
     count = max(last, 1)
-    missing = float((best[1 : count + 1] <= 0.02).sum() / count)
-    first = 0.12 * float(best[1] <= 0.02)
+    absent = best[1 : count + 1] <= 0.02
+    if len(peaks.hidden_hz):
+        # near a partial of the other series nothing would be seen
+        expected = partials_hz(f0_hz, stiffness, count)
+        nearest = np.abs(expected[:, None] - peaks.hidden_hz[None]).min(1)
+        absent &= nearest > 1.5 * tolerance(expected, f0_hz, peaks.width_hz)
+    missing = float(absent.sum() / count)
+    first = 0.12 * float(absent[0])
     score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
     return score, explained, missing, tuple(int(each) for each in present)
 
@@ -211,6 +220,13 @@ def _refined(peaks: Peaks, series: Series) -> Series:
         residual = np.abs((hz / k) ** 2 - rows @ np.array([square, slope])) * k / hz
         scale = weight * k / hz / np.maximum(1.0, residual / (2 * np.median(residual) + 1e-9))
     return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+
+
+def chance(peaks: Peaks, series: Series) -> float:
+    """The share of peaks that a series of this spacing would explain wherever they lay."""
+    return (
+        float(np.mean(2 * tolerance(peaks.hz, series.f0_hz, peaks.width_hz) / series.f0_hz)) if len(peaks.hz) else 1.0
+    )
 
 
 def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> tuple[Series | None, Peaks]:
