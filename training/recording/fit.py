@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
 from training.recording.glide import Glide, glide_of_phases
+from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
 from training.recording.numbering import Series
 from training.recording.refine import Fit, Pole
@@ -36,6 +37,7 @@ class LearnedNote:
     stiffness: float
     glide: Glide
     poles: tuple[Pole, ...]
+    spreads: dict[int, Spread] = field(default_factory=dict)
 
     def render(self, t: Array) -> Array:
         """The sound at times in s after the beginning of the fit."""
@@ -97,7 +99,7 @@ def fit_note(
         fit.sweep(2)
         fit.sweep_free(2)
     fit.sweep(1)
-    return LearnedNote(rate, series.f0_hz, series.stiffness, fit.glide, tuple(fit.every()))
+    return LearnedNote(rate, series.f0_hz, series.stiffness, fit.glide, tuple(fit.every()), spreads(fit))
 
 
 def _plain(hz: float, number: int) -> Pole:

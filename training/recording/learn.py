@@ -14,7 +14,7 @@ from training.recording.gate import Finding, examine
 from training.recording.note import FIT_LASTS_S, Note, RecordingError, note_of
 from training.recording.numbering import Series, number_note
 from training.recording.physics import Kind, Physics, Strung, physics_of, strung
-from training.recording.preset import Source, recorded_note
+from training.recording.preset import Source
 from training.recording.report import Report, report_of
 
 Array = NDArray[np.float64]
@@ -85,6 +85,6 @@ def learn(
     )
     physics = physics_of(fitted)
     chosen = strung(physics, kind, length_m, gauge_mm)
-    report = report_of(note, fitted, physics, recorded_note(note, fitted, source))
+    report = report_of(note, fitted, physics)
     progress(1.0)
     return Learned(source, note, series, fitted, physics, chosen, report, findings, time.monotonic() - started)

@@ -52,7 +52,7 @@ class Partial:
     """One partial of the note.
 
     Attributes:
-        hz: energy-weighted mean of its poles.
+        hz: mean over its energy.
         decay: σ of the one exponential with the same centre of energy in time.
         amplitude: |a| of its poles, summed.
         energy: ∫ |z|².
@@ -118,8 +118,7 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
         moment = float((pairs / sums**2).sum().real)
         if energy <= 0 or moment <= 0:
             continue
-        weights = np.abs(a) ** 2 / np.abs(s.real)
-        hz = float((weights * s.imag).sum() / weights.sum() / (2 * math.pi))
+        hz = float((-pairs * s[:, None] / sums).sum().imag / energy / (2 * math.pi))
         found.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
     loudest = max((each.energy for each in found), default=0.0)
     return tuple(each for each in found if each.energy > LEAST_SHARE * loudest)

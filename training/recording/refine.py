@@ -33,6 +33,7 @@ GLIDE_FIRMNESS = 100.0  # how many times a residual counts that is correlated fr
 OVERLAP = 0.5  # of a band's width, by which its fit looks into its neighbours
 LEAK_HZ = 4_000.0  # how far the strongest pole is followed into other bands
 COARSE = 8  # times fewer samples for free poles
+MOST_GLIDE = (-0.02, 0.08)  # of each share
 LARGEST_STEP = 60.0  # of ω in rad/s
 SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
 REST = 3  # sweeps, for such a band
@@ -178,14 +179,14 @@ class Fit:
 
     def solve(self, poles: list[Pole], target: Complex, where: slice) -> tuple[float, list[Pole], Complex]:
         """Amplitudes by least squares; the energy that they leave, the poles with them, and the residual."""
-        columns, _ = self._columns(poles, where)
-        amplitudes = _basis(columns) @ _real(target)
+        columns, _ = self.columns(poles, where)
+        amplitudes = _basis(columns) @ real_rows(target)
         pairs = amplitudes.reshape(-1, 2)
         solved = [replace(pole, a=complex(*pair)) for pole, pair in zip(poles, pairs, strict=True)]
         residual = target - columns @ amplitudes
         return float(np.vdot(residual, residual).real), solved, residual
 
-    def _columns(self, poles: list[Pole], where: slice) -> tuple[Complex, Complex]:
+    def columns(self, poles: list[Pole], where: slice) -> tuple[Complex, Complex]:
         """Of Re a, Im a of each pole, and of log σ, ω: (bins, 2 poles) each."""
         linear, bent = [], []
         for pole in poles:
@@ -200,11 +201,11 @@ class Fit:
     ) -> tuple[list[Pole], float, float]:
         """Poles after one step towards a target, the energy that is left, and the next damping."""
         left, poles, residual = self.solve(poles, target, where)
-        columns, bent = self._columns(poles, where)
-        outside = bent - columns @ (_basis(columns) @ _real(bent))
-        jacobian = _real(outside)
+        columns, bent = self.columns(poles, where)
+        outside = bent - columns @ (_basis(columns) @ real_rows(bent))
+        jacobian = real_rows(outside)
         square = jacobian.T @ jacobian
-        slope = jacobian.T @ _real(residual)
+        slope = jacobian.T @ real_rows(residual)
         scale = np.diag(np.diag(square) + 1e-9 * np.trace(square) + 1e-300)
         for _ in range(tries):
             step = np.linalg.solve(square + damping * scale, slope).reshape(-1, 2)
@@ -278,6 +279,17 @@ class Fit:
 
     def step_glide(self) -> Glide:
         """The glide that leaves less, to first order, when every pole of the string may follow."""
+        square, right, prior, _ = self._border()
+        step = np.linalg.solve(square + np.diag(prior), right - prior * self.glide.shares)
+        return Glide(np.clip(self.glide.shares + step, *MOST_GLIDE))
+
+    def glide_covariance(self) -> Array:
+        """Of the shares, (3, 3)."""
+        square, _, prior, variance = self._border()
+        return np.asarray(variance * np.linalg.inv(square + np.diag(prior)))
+
+    def _border(self) -> tuple[Array, Array, Array, float]:
+        """The glide's normal equations once all poles are eliminated, its prior, and the residual's variance."""
         residual = self.data - self.model()
         slope = self.model(self.gliding(), derivative=True)
         slope = fft.irfft(np.pad(slope, (0, self.size // 2 + 1 - len(slope))), self.size)
@@ -288,27 +300,27 @@ class Fit:
         for number, where in enumerate(self.bands):
             if not self.poles[number]:
                 continue
-            own = np.concatenate([_real(part) for part in self._columns(self.poles[number], where)], 1)
+            own = np.concatenate([real_rows(part) for part in self.columns(self.poles[number], where)], 1)
             own = own / (np.linalg.norm(own, axis=0) + 1e-300)
-            border, rest = _real(columns[where]), _real(residual[where])
+            border, rest = real_rows(columns[where]), real_rows(residual[where])
             inverse = np.linalg.pinv(own.T @ own, rcond=1e-9)
             border, rest = border - own @ (inverse @ (own.T @ border)), rest - own @ (inverse @ (own.T @ rest))
             square += border.T @ border
             right += border.T @ rest
             left += float(rest @ rest)
             bins += 2 * (where.stop - where.start)
-        prior = left / max(bins, 1) * GLIDE_FIRMNESS / (PRIOR_CENTS * CENTS) ** 2
-        step = np.linalg.solve(square + np.diag(prior), right - prior * self.glide.shares)
-        return Glide(np.clip(self.glide.shares + step, -0.02, 0.08))
+        variance = left / max(bins, 1)
+        return square, right, variance * GLIDE_FIRMNESS / (PRIOR_CENTS * CENTS) ** 2, variance
 
 
-def _real(columns: Complex) -> Array:
+def real_rows(columns: Complex) -> Array:
+    """Real parts above imaginary ones."""
     return np.concatenate([columns.real, columns.imag])
 
 
 def _basis(columns: Complex) -> Array:
     """(2 poles, 2 bins): from real values to the amplitudes of their projection."""
-    a = _real(columns)
+    a = real_rows(columns)
     square = a.T @ a
     square[np.diag_indices_from(square)] *= 1 + RIDGE
     square[np.diag_indices_from(square)] += 1e-300

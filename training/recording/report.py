@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
 
-from engine.resonators.recorded import RecordedNote
 from training.recording.fit import LearnedNote
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
 from training.recording.physics import Physics
@@ -56,22 +55,67 @@ class Band:
 
 
 @dataclass(frozen=True)
+class PartialReport:
+    """One partial: at rest, with 95 % intervals.
+
+    Attributes:
+        cents: from the law of f0 and B.
+        level_db: of its energy, below the loudest partial's.
+        decay: σ in 1/s of the one exponential with the same centre of energy.
+        poles: that it is made of.
+    """
+
+    number: int
+    hz: float
+    hz_interval: tuple[float, float]
+    cents: float
+    level_db: float
+    level_interval_db: tuple[float, float]
+    decay: float
+    decay_interval: tuple[float, float]
+    poles: int
+
+
+@dataclass(frozen=True)
 class Report:
     """Of one learned note."""
 
     errors: Errors
     noise_esr: float
     bands: tuple[Band, ...]
-    physics: Physics
+    partials: tuple[PartialReport, ...]
 
 
-def report_of(note: Note, learned: LearnedNote, physics: Physics, recorded: RecordedNote) -> Report:
+def report_of(note: Note, learned: LearnedNote, physics: Physics) -> Report:
     """Compares a note with its recording."""
     truth = note.fitted()
     found = learned.render(np.arange(len(truth)) / note.rate_hz)
     errors = errors_of(truth, found, note.rate_hz, note.noise_power)
     noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
-    return Report(errors, noise, bands_of(truth, found, note.rate_hz, note.noise_power), physics)
+    return Report(
+        errors, noise, bands_of(truth, found, note.rate_hz, note.noise_power), partials_in(learned, physics)
+    )
+
+
+def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, ...]:
+    """The partials of a note that have an interval."""
+    spreads = learned.spreads
+    levels = {number: sum(each.level_db) / 2 for number, each in spreads.items()}
+    loudest = max(levels.values(), default=0.0)
+    found = []
+    for number in sorted(spreads):
+        each = spreads[number]
+        law = number * physics.f0_hz * math.sqrt(1 + physics.stiffness * number**2)
+        hz = sum(each.hz) / 2
+        low, high = each.level_db
+        decay = math.sqrt(each.decay[0] * each.decay[1])
+        poles = sum(pole.partial == number for pole in learned.poles)
+        interval = low - loudest, high - loudest
+        cents = 1200 * math.log2(hz / law)
+        found.append(
+            PartialReport(number, hz, each.hz, cents, levels[number] - loudest, interval, decay, each.decay, poles)
+        )
+    return tuple(found)
 
 
 def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
