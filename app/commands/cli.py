@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, batch, faust, info, listing, motion, patches, play, render, sampled
+from app.commands import abx, batch, faust, info, learn, listing, motion, patches, play, render, sampled
 from app.shared.thread_priority import wait_asleep
 from engine.result_file import explain
 from training.cli import evaluation, family, sweep, tables, training
@@ -64,6 +64,8 @@ for command in (
     motion.simulate,
     motion.predict,
     render.render,
+    learn.learn,
+    learn.judge,
     play.play,
     batch.batch,
     sampled.sampled,

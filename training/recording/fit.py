@@ -23,7 +23,7 @@ HIGHEST_HZ = 10_000.0
 FREE_POLES = 10
 FREE_RANGE_HZ = (25.0, 1_500.0)
 SWEEPS = 6
-LAST_SWEEPS = 4
+LAST_SWEEPS = 6
 WORTH = 3.0  # times the bits that BIC asks of a second pole
 Progress = Callable[[float], None]
 
@@ -95,9 +95,12 @@ def fit_note(
         if glides and number % 2:
             fit.set_glide(fit.step_glide())
         progress(0.6 + 0.3 * (number + 1) / free)
-    for _ in range(LAST_SWEEPS):
+    for round_ in range(LAST_SWEEPS):
         fit.sweep(2)
         fit.sweep_free(2)
+        if glides and round_ < LAST_SWEEPS - 1:
+            fit.set_glide(fit.step_glide())
+        progress(0.9 + 0.1 * (round_ + 1) / LAST_SWEEPS)
     fit.sweep(1)
     return LearnedNote(rate, series.f0_hz, series.stiffness, fit.glide, tuple(fit.every()), spreads(fit))
 

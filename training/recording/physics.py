@@ -26,7 +26,8 @@ SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
 MOST_NODES = 24
 MOST_SPLIT_CENTS = 25.0  # between two polarisations
 MOST_DECAYS_APART = 8.0
-LEAST_SHARE = 1e-5  # of the strongest partial's energy, for a partial whose decay counts
+MOST_BESIDE_SMOOTH = 5.0
+LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
 
 
 @dataclass(frozen=True)
@@ -274,7 +275,10 @@ def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[f
         place = each.number - 1
         first = each.poles[0]
         cents[place] = 1200 * math.log2(abs(first.s) / omega[place])
-        ratio[place] = first.decay / smooth[place]
+        apart = first.decay / smooth[place]
+        if not 1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH:
+            continue  # of noise or the body, not of the string: it decays as its neighbours do
+        ratio[place] = apart
         if len(each.poles) == 2:
             second = each.poles[1]
             second_cents[place] = _split(each.poles)

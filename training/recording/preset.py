@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 BASE = "studio_any_string"  # whose curves play every string
 LEAST_GRID = 101
 BODY_S = 0.25
-BODY_RANGE_DB = 36.0
+BODY_RANGE_DB = 70.0
 COMB_FLOOR = 0.15  # partials that the pluck hardly excites say nothing of the body
 
 

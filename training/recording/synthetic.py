@@ -58,7 +58,7 @@ def synthetic_note(seed: int, seconds: float = 2.8, snr_db: float = 50.0, rise_c
     string = StringParameters(length, area, second, mass / area, modulus, d1, d3, tension)
     law = string.resonator(count, grid_points=count + 2)
     split = 2 ** (random.uniform(0.4, 2.0, count) / 1200)
-    slower = random.uniform(0.4, 1.0, count)
+    slower = np.exp(random.uniform(-0.7, 0.7, count))  # than the first, or faster
     pair = torch.arange(2 * count) // 2
     omega = np.stack([law.omega.numpy(), law.omega.numpy() * split], 1).ravel()
     sigma = np.stack([law.sigma.numpy(), law.sigma.numpy() * slower], 1).ravel()
