@@ -1,9 +1,9 @@
 """Intervals of what is learned of each partial: frequency at rest, decay, level.
 
 The covariance of a band's poles follows from its Jacobian and the residual in it, that of the glide from the border
-of all bands. Draws from both give the spread of any figure of a partial. `CORRELATED` widens them, as
-what a fit leaves is not white. It was set, and is tested, on synthetic notes of the project's own solver with body, noise and a second
-polarisation (`synthetic`, `coverage`).
+of all bands. Draws from both give the spread of any figure of a partial. What a fit leaves is not white, and models
+are never quite true: factors and floors widen the intervals. They were set, and are tested, on synthetic notes of the
+project's own solver with body, noise and a second polarisation (`synthetic`, `coverage`).
 """
 
 from __future__ import annotations
