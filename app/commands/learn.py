@@ -69,10 +69,12 @@ def learn(
 
 
 def judge(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Of recordings, one note each.")],
-    instrument: InstrumentOption = "guitar",
+    folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Of recordings, one note each.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only the own note, without baselines and halves.")] = False,
     most: Annotated[int | None, typer.Option("--most", min=1, metavar="N", help="The first N files alone.")] = None,
+    synthetic: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, and how intervals hold them.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Print how well a folder's recordings are learned: own note, baselines, unseen half, takes, gate.
@@ -80,7 +82,16 @@ def judge(
     Takes are told by their names: files whose names differ in the last letter alone are takes of one note.
     """
     from app.audio.note_file import NoteFileError, read_note
+    from training.recording.coverage import FIRST_SEED, coverage
     from training.recording.evaluate import evaluate, table
+
+    if synthetic is not None:
+        with progress("judge") as report:
+            held = coverage(range(FIRST_SEED, FIRST_SEED + synthetic), lambda done: report(done / synthetic))
+        print_json(held) if json else print_table(tuple(held), [tuple(held.values())])
+        return
+    if folder is None or not folder.is_dir():
+        raise typer.BadParameter("give a folder of recordings, or --synthetic", param_hint="FOLDER")
 
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".wav", ".flac", ".aif", ".aiff"))
     if not files:

@@ -19,9 +19,9 @@ from training.recording.refine import Fit, real_rows
 
 Array = NDArray[np.float64]
 
-CORRELATED = 1.0  # factor of all standard errors
+FACTORS = {"cents": 28.0, "decay": 13.0, "level_db": 18.0}  # of the standard error, for 95 %
+FLOORS = {"cents": 2.3, "decay": 0.034, "level_db": 0.26}  # cents; a share; dB: of notes without noise
 DRAWS = 400
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,14 @@ def spreads(fit: Fit) -> dict[int, Spread]:
         )
         seen = 2 * centre[1][0] / (2 * centre[1][0] + 1 / TIMES_S)  # the mean of each rise over the partial's energy
         hz_error = math.hypot(_spread(hz), centre[0][0] * math.sqrt(float(seen @ glide @ seen)))
+        cents = math.log(2) / 1200
+        value, rate, loud = (float(each[0]) for each in centre)
+        octaves = _interval(math.log(value), hz_error / value / cents, "cents", cents)
+        decays = _interval(math.log(rate), _spread(np.log(mean_decay)), "decay")
         found[number + 1] = Spread(
-            _interval(float(centre[0][0]), hz_error),
-            tuple(math.exp(each) for each in _interval(math.log(centre[1][0]), _spread(np.log(mean_decay)))),  # type: ignore[arg-type]
-            _interval(float(centre[2][0]), _spread(level)),
+            (math.exp(octaves[0]), math.exp(octaves[1])),
+            (math.exp(decays[0]), math.exp(decays[1])),
+            _interval(loud, _spread(level), "level_db"),
         )
     return found
 
@@ -91,6 +95,7 @@ def _spread(values: Array) -> float:
     return float(high - low) / 2
 
 
-def _interval(value: float, error: float) -> tuple[float, float]:
-    reach = NORMAL_95 * CORRELATED * error
+def _interval(value: float, error: float, kind: str, unit: float = 1.0) -> tuple[float, float]:
+    """`error` and the floor in units of `unit`, which is of the value's."""
+    reach = unit * math.hypot(FACTORS[kind] * error, FLOORS[kind])
     return value - reach, value + reach
