@@ -112,10 +112,10 @@ class PresetInfo:
 
     def resonator_of(self, string: StringParameters, modes: int) -> Resonator:
         """The modes of another string that it plays; of a recorded one with what the recording adds to the law."""
-        sizes = {"tension_modulated": self.tension_modulated, "grid_points": self.grid_points}
+        modulated, points = self.tension_modulated, self.grid_points
         if self.recorded is not None:
-            return self.recorded.resonator(string, modes, **sizes)
-        return string.resonator(modes, **sizes)
+            return self.recorded.resonator(string, modes, tension_modulated=modulated, grid_points=points)
+        return string.resonator(modes, tension_modulated=modulated, grid_points=points)
 
     def retuned(self, resonator: Resonator, string: StringParameters) -> Resonator:
         """A resonator of `resonator_of` with the frequencies, decays and coupling of another string; same shapes."""

@@ -82,7 +82,7 @@ def glide_of_phases(bands: list[tuple[float, float, NDArray[np.complex128]]], du
         off = np.angle(turned) / (2 * math.pi * hz * step)
         weight = np.sqrt(np.abs(turned)) * hz
         # beats turn the phase where the envelope is small; a common offset is the partial's own frequency
-        t = (np.arange(len(off)) + 0.5) * step
+        t = np.asarray((np.arange(len(off)) + 0.5) * step, np.float64)
         columns = np.concatenate([rate_basis(t), np.ones((len(t), 1))], 1)
         own = weight / (weight.max() + 1e-30) * np.sqrt(step)
         mean = columns[:, -1:]

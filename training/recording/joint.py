@@ -35,7 +35,7 @@ def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedSt
     smooth = [np.log(own.smooth_ratio)]
     smooth += [np.interp(hz, np.log(each["smooth_hz"]), np.log(each["smooth_ratio"])) for each in others]
     same = [each for each, one in zip(others, learned[1:], strict=True) if abs(_cents(first, one)) < SAME_PITCH_CENTS]
-    shared = {
+    shared: dict[str, Any] = {
         name: tuple(
             float(np.median([own_value, *(each[name][place] for each in same if place < len(each[name]))]))
             for place, own_value in enumerate(getattr(own, name))

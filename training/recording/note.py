@@ -103,7 +103,7 @@ def _mono(samples: Array) -> Array:
     if sound.ndim == 1:
         return sound
     heard = sound.shape[1] == 2 and bool(np.isfinite(sound).all() and (sound.std(0) > 0).all())
-    if heard and float(np.corrcoef(sound.T)[0, 1]) > ALIKE:
+    if heard and float(np.ravel(np.corrcoef(sound.T))[1]) > ALIKE:
         return sound.mean(1)
     loudest = int(np.argmax(np.nansum(np.where(np.isfinite(sound), sound, 0.0) ** 2, axis=0)))
     return sound[:, loudest]

@@ -208,7 +208,7 @@ class Fit:
         slope = jacobian.T @ real_rows(residual)
         scale = np.diag(np.diag(square) + 1e-9 * np.trace(square) + 1e-300)
         for _ in range(tries):
-            step = np.linalg.solve(square + damping * scale, slope).reshape(-1, 2)
+            step: Array = np.asarray(np.linalg.solve(square + damping * scale, slope), np.float64).reshape(-1, 2)
             moved = [self._moved(pole, each, number) for pole, each in zip(poles, step, strict=True)]
             after, moved, _ = self.solve(moved, target, where)
             if after < left:
@@ -324,4 +324,4 @@ def _basis(columns: Complex) -> Array:
     square = a.T @ a
     square[np.diag_indices_from(square)] *= 1 + RIDGE
     square[np.diag_indices_from(square)] += 1e-300
-    return np.linalg.solve(square, a.T)
+    return np.asarray(np.linalg.solve(square, a.T), np.float64)

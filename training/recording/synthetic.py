@@ -103,5 +103,5 @@ def _truth(amplitude: Array, omega: Array, sigma: Array) -> tuple[TruePartial, .
 
     s = -sigma + 1j * np.sqrt(omega**2 - sigma**2)
     a = amplitude * np.exp(s.real * FIT_BEGINS_S)
-    hz, decay, level = figures_of(a.reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2))
+    hz, decay, level = figures_of(a.astype(complex).reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2))
     return tuple(TruePartial(n + 1, float(hz[n]), float(decay[n]), float(level[n])) for n in range(len(hz)))
