@@ -76,8 +76,6 @@ class Cell:
             raise ValueError(f"horizon must be at least 1 frame, not {self.horizon}")
         if self.seed < 0:
             raise ValueError(f"seed must be at least 0, not {self.seed}")
-        if self.recipe not in recipe_names():
-            raise ValueError(f"recipe {self.recipe!r} is not one of {', '.join(recipe_names())}")
 
     @property
     def string_kind(self) -> str:
@@ -188,6 +186,8 @@ def configuration_of(
         SchemaError: the recipe's file, or a field given here, is wrong.
     """
     path = RECIPES / f"{cell.recipe}.toml"
+    if not path.is_file():
+        raise SchemaError(f"{cell.name}: recipe {cell.recipe!r} is not one of {', '.join(recipe_names())}")
     book = read(RecipeBook, read_toml(path), str(path))
     settings: dict[str, Any] = dict(book.default)
     sizes: dict[str, Any] = {}

@@ -119,9 +119,11 @@ def test_any_splitting_into_blocks_gives_the_same_errors(data: Dataset) -> None:
 
 def test_some_trajectories_and_the_progress(data: Dataset) -> None:
     told: list[float] = []
-    found = evaluate_past_horizon(Truth(data), data, "validation", 0.05, trajectories=1, report=told.append)
+    found = evaluate_past_horizon(Truth(data), data, "validation", 0.05, trajectories=slice(1), report=told.append)
     assert len(found.string.per_trajectory()[0]) == 1
-    partials = evaluate_partials(Truth(data), data, "validation", [(0, 0.05)], trajectories=1, report=told.append)
+    partials = evaluate_partials(
+        Truth(data), data, "validation", [(0, 0.05)], trajectories=slice(1), report=told.append
+    )
     assert partials.energy.shape == (1, 1, 10)
     assert told.count(1.0) == 2
     assert max(told) == 1

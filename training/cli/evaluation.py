@@ -17,7 +17,7 @@ import typer
 from engine.pluck import DEFAULT_LISTEN
 from training.cli import arguments
 from training.cli.arguments import Cache, Json, check_range, open_preset_of_string
-from training.cli.console import Failure, Shares, number, print_json, print_table, progress, say
+from training.cli.console import Shares, number, print_json, print_table, progress, say
 from training.cli.training import load_data
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ class _Measurement:
             self.past_s,
             horizon=info.horizon_steps,
             windows_s=[(0.0, info.horizon_s), *windows],
-            trajectories=self.trajectories,
+            trajectories=slice(self.trajectories),
             report=self.report.next(),
         )
         whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
@@ -258,7 +258,12 @@ class _Measurement:
         horizon_s, end_s = self.preset.info.horizon_s, windows[-1][1]
         windows = [(0.0, horizon_s), *([(horizon_s, end_s)] if self.past_s else []), *windows]
         errors = evaluate_partials(
-            self.preset.model, self.data, split, windows, trajectories=self.trajectories, report=self.report.next()
+            self.preset.model,
+            self.data,
+            split,
+            windows,
+            trajectories=slice(self.trajectories),
+            report=self.report.next(),
         )
         return [
             {
@@ -297,9 +302,9 @@ def _on(preset: Preset, run: str) -> Preset:
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
     """The data set of a preset, or of a run; for a string of many, of plucks as hard as the family's."""
-    from engine.schema import SchemaError
     from training.by_name import load
-    from training.configuration import DatasetConfiguration, read_configuration
+    from training.configuration import DatasetConfiguration
+    from training.row_errors import data_of
 
     info = preset.info
     if on is not None:
@@ -317,17 +322,7 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
             string=info.string,
             largest_tension_rise=info.family.tension_rise[1],
         )
-    try:
-        data = read_configuration(info.training, f"{preset.path}: metadata.training").data
-    except SchemaError as error:
-        raise Failure(f"{error}; without it the preset's data set cannot be made") from error
-    for name in ("rate_hz", "modes"):
-        if getattr(data, name) != getattr(info, name):
-            raise Failure(
-                f"{preset.path}: metadata.training.data.{name} is {getattr(data, name)}, the model's is "
-                f"{getattr(info, name)}; get the preset again"
-            )
-    return data
+    return data_of(preset)
 
 
 def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: tuple[str, ...]) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -14,24 +13,8 @@ from engine.result_file import whole_file
 from training.cli.arguments import check_range, open_preset
 from training.cli.console import Failure, progress, say
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from engine.presets import Preset
-    from training.cli.console import Report
-
 figure = typer.Typer(help="Draw figures of presets beside the truth, as PNG, SVG or PDF.", no_args_is_help=True)
 
-PresetNames = Annotated[
-    list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
-]
-Trajectory = Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")]
-Listen = Annotated[
-    float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
-]
-Output = Annotated[
-    Path | None, typer.Option(help="The file; its suffix gives the format. Default FIGURE.png in this folder.")
-]
 MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
 LISTEN_RANGE = (0.01, 0.99)
 
@@ -86,101 +69,42 @@ def _before(document: Path) -> str:
 
 
 @figure.command()
-def evolution(
-    presets: PresetNames,
-    trajectory: Trajectory = 0,
-    seconds: Annotated[float, typer.Option(metavar="S", help="Time shown, from the start, in s.")] = 0.1,
-    listen: Listen = DEFAULT_LISTEN,
-    output: Output = None,
-) -> None:
-    """Figure 2 of the paper: displacement, errors and spectra.
-
-    Of the whole string over time.
-    """
-    from training.figures import evolution as drawing
-
-    check_range("--listen", listen, *LISTEN_RANGE)
-    check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    _write(
-        presets,
-        output,
-        "evolution",
-        lambda loaded, report: drawing.evolution(loaded, trajectory, seconds, listen, report),
-    )
-
-
-@figure.command()
 def extrapolation(
-    presets: PresetNames,
+    presets: Annotated[
+        list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
+    ],
     seconds: Annotated[
         float | None, typer.Option(metavar="S", help="Time shown, in s; default twice the training horizon.")
     ] = None,
-    trajectory: Trajectory = 0,
+    trajectory: Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")] = 0,
     trajectories: Annotated[
         int, typer.Option(min=1, help="How many of the validation set the error is taken over, from the first on.")
     ] = 10,
-    listen: Listen = DEFAULT_LISTEN,
-    output: Output = None,
+    listen: Annotated[
+        float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
+    ] = DEFAULT_LISTEN,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="The file; its suffix gives the format. Default extrapolation.png in this folder."),
+    ] = None,
 ) -> None:
     """Figure 3 of the paper: past the training horizon.
 
     Waveforms, spectra and errors, up to the horizon and past it.
     """
     from training.figures import extrapolation as drawing
+    from training.figures.style import check_format, figure_bytes
 
     check_range("--listen", listen, *LISTEN_RANGE)
     if seconds is not None:
         check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    _write(
-        presets,
-        output,
-        "extrapolation",
-        lambda loaded, report: drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report),
-    )
-
-
-@figure.command()
-def error(
-    presets: PresetNames,
-    seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="Time shown, in s; default 1.5 times the training horizon.")
-    ] = None,
-    trajectories: Annotated[
-        int | None, typer.Option(min=1, help="How many of the validation set, from the first on; default all.")
-    ] = None,
-    output: Output = None,
-) -> None:
-    """Figure 4 of the paper: relative error in each time step.
-
-    Over the validation set.
-    """
-    from training.figures import error as drawing
-
-    if seconds is not None:
-        check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    _write(presets, output, "error", lambda loaded, report: drawing.error(loaded, seconds, trajectories, report))
-
-
-@figure.command()
-def eigenvalues(presets: PresetNames, output: Output = None) -> None:
-    """Learned eigenvalues beside the linear string's.
-
-    In the unit circle, and as decay rates over frequency.
-    """
-    from training.figures import eigenvalues as drawing
-
-    _write(presets, output, "eigenvalues", lambda loaded, report: drawing.eigenvalues(loaded))
-
-
-def _write(names: list[str], output: Path | None, kind: str, draw: Callable[[list[Preset], Report], Figure]) -> None:
-    from training.figures.style import check_format, figure_bytes
-
-    path = output or Path(f"{kind}.png")
+    path = output or Path("extrapolation.png")
     try:
         check_format(path)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--output") from error
-    loaded = [open_preset(name) for name in names]
-    with whole_file(path) as file, progress(f"figure {kind}") as report:
-        file.write(figure_bytes(draw(loaded, report), path.suffix))
+    loaded = [open_preset(name) for name in presets]
+    with whole_file(path) as file, progress("figure extrapolation") as report:
+        drawn = drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report)
+        file.write(figure_bytes(drawn, path.suffix))
     print(path)

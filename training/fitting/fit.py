@@ -30,7 +30,7 @@ from training.evaluate import evaluate_model
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import training_loss
 from training.fitting.soap import SOAP
-from training.start import LEAST_SQUARES, begin, initialisation_of
+from training.start import LEAST_SQUARES, begin
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 TELL_EVERY_S = 5.0  # within an epoch
@@ -104,7 +104,7 @@ def fit(
         Diverged: the loss became infinite or not a number, or no validation error was ever a number.
         ValueError: the checkpoint there is damaged or of another configuration.
     """
-    if initialisation_of(configuration) == LEAST_SQUARES:
+    if configuration.start == LEAST_SQUARES:
         return _fit_at_once(configuration, dataset, report)
     begun = time.monotonic()
     run = _Run(configuration, dataset, torch.device(device))

@@ -64,7 +64,7 @@ def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, 
 
 def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs: Path) -> None:
     """The start is epoch 0: a result is never worse."""
-    configuration = small("koopman_integrated", epochs=2, peak_learning_rate=1.0, initialisation="averaging")
+    configuration = small("koopman_integrated", epochs=2, peak_learning_rate=1.0, start="averaging")
     seen: list[Progress] = []
     found = fit(configuration, small_dataset, runs, report=seen.append)
     assert found.start is not None
