@@ -98,7 +98,7 @@ def train(
                 folder,
                 cache=cache,
                 device=_device(device),
-                report=_training_report(report),
+                report=training_report(report),
                 waits=lambda: say(f"{folder / name}: another process trains there; waiting for its end"),
                 preset=file,
             )
@@ -151,7 +151,7 @@ def _device(wanted: Device) -> str:
     return "cpu"
 
 
-def _training_report(report: Report) -> Callable[[Progress], None]:
+def training_report(report: Report) -> Callable[[Progress], None]:
     """Step, epoch, horizon, loss and the last validation as progress."""
     last = ""
 
