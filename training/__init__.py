@@ -1,6 +1,6 @@
 """Training: data sets from the reference solver, and models fitted to them, down to a preset file.
 
-`configuration`  what a run is; `cell` and `by_name` have it from a name
+`configuration`  what a run is; `cell` has it from a name
 `start`          how its model starts, and what that is given of the string
 `run`            a whole run: fit, errors, preset, and its row in `results`
 `evaluate`       the errors of a model

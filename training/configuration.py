@@ -90,9 +90,7 @@ class Recipe:
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
     grow_until: float = 0.5  # … over this share of the run
-    prediction_weight: float = 1.0  # α₁ of the paper's loss
-    encoding_weight: float = 1.0  # α₂
-    consistency_weight: float = 0.01  # α₃
+    consistency_weight: float = 0.01  # α₃ of the paper's loss, whose α₁ and α₂ are 1
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
@@ -193,7 +191,7 @@ def digest_of(plain: dict[str, Any]) -> str:
 
 
 # fields of earlier versions, and the only value that they ever had in a run that was kept
-RETIRED = {"random_start": False, "koopman_terms": "text"}
+RETIRED = {"random_start": False, "koopman_terms": "text", "prediction_weight": 1.0, "encoding_weight": 1.0}
 
 
 def read_configuration(plain: Any, where: str) -> TrainingConfiguration:

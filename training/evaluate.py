@@ -9,12 +9,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from engine.metrics import ErrorSums
+from engine.metrics import ErrorSums, RelativeError
 from engine.models import StringModel
 from engine.partials import (
     PartialErrors,
@@ -35,6 +36,7 @@ from training.fitting.losses import KoopmanModel
 TRAJECTORIES_AT_ONCE = 10
 FRAMES_AT_ONCE = 1000
 ALL = slice(None)
+RISE_PARTS = (0.0, 0.5, 0.75, 0.9, 0.95, 1.0)  # of the trajectories, from the softest to the hardest
 
 Windows = Sequence[tuple[float, float]]  # (start, stop) of each, in s
 
@@ -191,6 +193,45 @@ def evaluate_partials(
                 report((part + (first + truth.shape[1]) / steps) / len(parts))
             found.append(partial_errors(PartialTrack.join(tracks), c.rate_hz, linear_hz, windows_s))
     return PartialErrors.join(found)
+
+
+@dataclass(frozen=True)
+class RiseErrors(RelativeError):
+    """The errors of the trajectories between two rises of the tension.
+
+    Attributes:
+        trajectories: how many.
+        from_rise, to_rise: ΔT/T₀ at the release.
+        share: of the split's squared error that is theirs.
+        largest: of the split's squared error, the share of the one among them that has most.
+    """
+
+    trajectories: int
+    from_rise: float
+    to_rise: float
+    share: float
+    largest: float
+
+
+def errors_by_rise(sums: ErrorSums, configuration: DatasetConfiguration, split: str) -> list[RiseErrors]:
+    """The errors of a split's trajectories, as far as `sums` has them, in groups of growing rise, none empty."""
+    shares = sums.shares()
+    initial = draw_initial(configuration)[split_rows(configuration.count, split)][: len(shares)]
+    rise = configuration.resonator.relative_tension_rise(initial)
+    order = torch.argsort(rise).tolist()
+    edges = [round(part * len(order)) for part in RISE_PARTS]
+    groups = [order[first:last] for first, last in pairwise(edges) if last > first]
+    return [
+        RiseErrors(
+            **vars(sums.of(rows)),
+            trajectories=len(rows),
+            from_rise=float(rise[rows[0]]),
+            to_rise=float(rise[rows[-1]]),
+            share=float(shares[rows].sum()),
+            largest=float(shares[rows].max()),
+        )
+        for rows in groups
+    ]
 
 
 @contextmanager

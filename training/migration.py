@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from engine.models import MODELS, RETIRED, read_model_configuration
 from engine.schema import SchemaError, write
-from training.by_name import load
+from training.cell import load
 from training.configuration import DATA_VERSION, TrainingConfiguration, digest_of, unlike_default
 from training.results import Row
 from training.start import BLIND_PURSUIT, PHASES, STARTS

@@ -81,7 +81,7 @@ def _trained(
         raise
     _plot(log.path)
     model = result.model.cpu()
-    sums = {split: evaluate_model(model, dataset, split, configuration.steps) for split in ("validation", "test")}
+    sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
     figures = row_errors(model, dataset, sums, configuration.steps)
     save_preset(output, preset_info(configuration, dataset, result, figures), model)
     weights = load_preset(output).model.state_dict()

@@ -50,7 +50,7 @@ from engine.sources import ModelSource, Runaway, TruthSource, project
 from engine.voices import Ear, model_program, render_voice, truth_program
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
-from training.by_name import load
+from training.cell import load
 from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard

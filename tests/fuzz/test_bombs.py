@@ -32,7 +32,7 @@ from engine.presets import PresetError, load_preset, preset_digest, read_string
 from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read_toml
 from tests.fuzz.costs import MOST_MB, Costs
-from training.by_name import load
+from training.cell import load
 from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard

@@ -21,7 +21,7 @@ from app.patches.patch import Patch
 from app.window.settings import Settings, save_settings
 from engine.kernels import warm
 from engine.presets import SHIPPED, load_preset
-from training.by_name import load
+from training.cell import load
 from training.results import read_results
 from training.run import run_row
 

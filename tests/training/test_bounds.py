@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from engine.schema import SchemaError
-from training.by_name import load
+from training.cell import load
 from training.results import read_results
 from training.sweeping.plan import load_plan
 

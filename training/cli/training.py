@@ -33,7 +33,7 @@ def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> N
 
     A data set that is in the cache is not made again.
     """
-    from training.by_name import load
+    from training.cell import load
     from training.data.dataset import dataset_folder, dataset_key, draw_initial
 
     configuration = load(config).data
@@ -78,8 +78,7 @@ def train(
     import torch
 
     from engine.presets import SHIPPED
-    from training.by_name import load
-    from training.cell import Cell
+    from training.cell import Cell, load
     from training.run import default_runs, run_row
 
     configuration = load(config)

@@ -118,6 +118,3 @@ def _log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> fl
 
 def _either(random: np.random.Generator, bounds: tuple[tuple[float, float], ...]) -> float:
     return _log_uniform(random, bounds[int(random.integers(len(bounds)))])
-
-
-__all__ = ["COLUMNS", "FAMILY", "Column", "PluckedString", "displacement_m", "draw_from", "draw_string", "string_of"]

@@ -19,7 +19,7 @@ from torch import Tensor
 from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from engine.metrics import RelativeError
+from engine.metrics import ErrorSums, RelativeError
 from engine.models import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
@@ -72,13 +72,14 @@ class FitResult:
 
     Attributes:
         best_epoch: 0 where training did not beat the start.
+        validation: the error sums of the model.
         seconds: of all of it, what it starts from and the measuring among it.
         start: validation error of the untrained model; None where there is none: a fit in one go, a start whose
             latents are still to be learned, or a model that runs away.
     """
 
     model: StringModel[Any]
-    validation: RelativeError
+    validation: ErrorSums
     epochs: int
     best_epoch: int
     seconds: float
@@ -174,6 +175,7 @@ class _Run:
         self._total = torch.zeros((), device=device)  # of this epoch's losses
         self._start: RelativeError | None = None
         self._best: RelativeError | None = None
+        self._best_sums: ErrorSums | None = None  # None where they were measured before the last checkpoint
         self._best_epoch = 0
         self._best_model = _copy(self._model)
 
@@ -265,9 +267,11 @@ class _Run:
     def validate(self) -> RelativeError:
         """The validation error; the best model so far is kept."""
         model = self._measured()
-        error = evaluate_model(model, self._dataset, "validation", self._configuration.steps).total()
+        sums = evaluate_model(model, self._dataset, "validation", self._configuration.steps)
+        error = sums.total()
         if _is_finite(error) and (self._best is None or error.rel_mae < self._best.rel_mae):
-            self._best, self._best_epoch, self._best_model = error, self.epoch, _copy(model)
+            self._best, self._best_sums = error, sums
+            self._best_epoch, self._best_model = self.epoch, _copy(model)
         return error
 
     def measure_start(self) -> None:
@@ -281,7 +285,8 @@ class _Run:
             raise Diverged("the validation error was never a number; lower peak_learning_rate")
         model = self._measured()
         model.load_state_dict(self._best_model)
-        return FitResult(model.eval(), self._best, self.epoch, self._best_epoch, self.seconds, self._start)
+        sums = self._best_sums or evaluate_model(model, self._dataset, "validation", self._configuration.steps)
+        return FitResult(model.eval(), sums, self.epoch, self._best_epoch, self.seconds, self._start)
 
     def checkpoint(self) -> Checkpoint:
         facts = {
@@ -335,7 +340,8 @@ def _fit_at_once(
     """Of a model whose start is all there is."""
     started = time.monotonic()
     model, _ = begin(configuration, dataset)
-    error = evaluate_model(model, dataset, "validation", configuration.steps).total()
+    sums = evaluate_model(model, dataset, "validation", configuration.steps)
+    error = sums.total()
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
@@ -344,7 +350,7 @@ def _fit_at_once(
     with torch.no_grad():
         loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
     report(Progress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
-    return FitResult(model.eval(), error, 1, 1, seconds)
+    return FitResult(model.eval(), sums, 1, 1, seconds)
 
 
 def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer:

@@ -10,7 +10,6 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from engine.schema import write
 from training.provenance import now
@@ -55,8 +54,8 @@ class Options:
         )
 
 
-class Watch(Protocol):
-    """Is told what happens in a sweep."""
+class Watch:
+    """Is told what happens in a sweep, and shows nothing: the base of what does."""
 
     def started(self, run: Run) -> None:
         """A run was handed to the workers."""
@@ -69,15 +68,6 @@ class Watch(Protocol):
 
     def finished(self, row: Row) -> None:
         """A run has ended, and its row is in the results file."""
-
-
-class Unwatched:
-    """A `Watch` that says nothing."""
-
-    def started(self, run: Run) -> None: ...
-    def progressed(self, event: Progressed) -> None: ...
-    def noted(self, event: Noted) -> None: ...
-    def finished(self, row: Row) -> None: ...
 
 
 def group_of(plan: Plan) -> str:
@@ -112,7 +102,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = 
             runs' folders too.
         WorkersError: the workers are gone.
     """
-    watch = watch or Unwatched()
+    watch = watch or Watch()
     file = options.results or results_of(plan, options.runs)
     rows = {row.digest: row for row in add_rows(file, ())}  # a file that cannot be written is told before the work
     waiting = deque(unfinished(plan, rows.values()))

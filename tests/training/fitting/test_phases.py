@@ -110,7 +110,9 @@ def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
     untrained = integrated_phase()
     start_from_phases(untrained, found_modes(small_dataset, STEPS), recipe.seed)
     expected = evaluate_model(untrained, small_dataset, "validation", STEPS).total()
-    assert fit(configuration, small_dataset, runs).validation.rel_mae == pytest.approx(expected.rel_mae, rel=1e-2)
+    assert fit(configuration, small_dataset, runs).validation.total().rel_mae == pytest.approx(
+        expected.rel_mae, rel=1e-2
+    )
 
 
 def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
