@@ -59,8 +59,13 @@ class Sources:
             return load_preset(subject)
         return of_string(self.load(subject.path).preset, subject.string)
 
-    def program(self, subject: Subject, kind: str, rate_hz: int) -> Program:
-        """The program of a voice; `kind`: "model" or "truth", `rate_hz`: of the device. Raises PresetError."""
+    def program(self, subject: Subject, source: str, rate_hz: int) -> Program:
+        """The program of a voice: the truth's, or for any other `source` the model's. Raises PresetError.
+
+        Args:
+            rate_hz: of the device.
+        """
+        kind = "truth" if source == "truth" else "model"
         key = (subject, kind, rate_hz)
         if (found := self._programs.get(key)) is not None:
             return found
@@ -75,11 +80,12 @@ class Sources:
                     self._programs[key] = found
             return found
 
-    def begin(self, subject: Subject, kind: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+    def begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
         """A pluck's displacement (grid_points,) in m, and the start of a voice of the program. Both are kept.
 
         Raises PresetError.
         """
+        kind = "truth" if source == "truth" else "model"
         key = (subject, kind, rate_hz, pluck)
         with self._lock:
             found = self._begins.pop(key, None)
