@@ -131,12 +131,6 @@ class Keys:
                 self._player.cancel()
             self.recorder.cancel()
 
-    def stop(self) -> None:
-        """All strings fade out."""
-        with self._lock:
-            if self._player is not None:
-                self._player.stop()
-
     def sounding(self) -> dict[int, float]:
         """Key -> how loud its string rings: 0 at SEEN_DB below full scale, 1 at full scale."""
         found: dict[int, float] = {}

@@ -105,31 +105,22 @@ class Choices(Monitor, Listener, PluckedString):
         if "preset" in changes:
             changes["instrument"] = SingleString(preset=changes.pop("preset"))
         if "patch" in changes:
-            patch = changes.pop("patch")
-            changes["instrument" if patch is not None and _plays(self, changes) else "kept"] = patch
-            if patch is None and _plays(self, changes):
-                changes["instrument"] = SingleString(preset=self.preset)
+            changes["instrument" if self.plays_patch else "kept"] = changes.pop("patch")
         elif self.plays_patch and "instrument" in changes:
-            changes = {"kept": self.instrument, **changes}
+            changes.setdefault("kept", self.instrument)
         try:  # of the other fields, which are valid, only the slots: without them `heard` is read as an old one
             checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
         found = self.model_copy(update={name: getattr(checked, name) for name in changes})
-        if found.plays_patch and found.kept is not None:
-            found = found.model_copy(update={"kept": None})
+        follow: dict[str, Any] = {"kept": None} if found.plays_patch else {}
         if found.preset != self.preset and "string" not in changes:
-            found = found.model_copy(update={"string": None})
-        return _with_one_pickup(found, changes)
+            follow["string"] = None
+        return _with_one_pickup(found.model_copy(update=follow), changes)
 
 
 OBSERVED = (*Choices.model_fields, "preset", "patch")  # names that `Session.changed` carries
-
-
-def _plays(choices: Choices, changes: Mapping[str, Any]) -> bool:
-    """Whether a patch is played after these changes."""
-    return isinstance(changes.get("instrument", choices.instrument), Patch)
 
 
 def migrated(data: dict[str, Any]) -> dict[str, Any]:
@@ -184,10 +175,10 @@ class Session:
         Raises:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
         """
-        patch = changes.get("patch", self._choices.patch)
+        patch = self._choices.patch
         if patch is not None and changes.get("preset") == patch.preset:
-            changes = {name: value for name, value in changes.items() if name not in ("preset", "patch")}
-            changes["instrument"] = patch
+            changes = {"instrument": patch, **changes}
+            del changes["preset"]
         if names := self._take(changes):
             self.changed.emit(names)
 

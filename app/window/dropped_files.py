@@ -88,20 +88,20 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
     """
     found: dict[str, Any] = {
-        "position": recipe.pluck.position,
-        "amplitude_mm": recipe.pluck.amplitude_mm,
-        "shape": recipe.pluck.shape,
-        "width": recipe.pluck.width,
-        "listen": recipe.listen,
+        **asdict(recipe.pluck),
         "string": None if recipe.string is None else asdict(recipe.string),
+        "listen": recipe.listen,
+        "stereo": recipe.listen_right is not None,
+        "pickup": recipe.pickup,
+        "solo": 0,
+        "a": "difference" if recipe.source == "difference" else "model",
+        "b": "truth",
+        "heard": "b" if recipe.source == "truth" else "a",
     }
-    if recipe.decay_db is None:
-        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
-    found |= {"a": "model", "b": "truth", "heard": "b" if recipe.source == "truth" else "a", "solo": 0}
-    if recipe.source == "difference":
-        gain_db = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
-        found |= {"a": "difference", "difference_gain_db": gain_db}
-    found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
     if recipe.listen_right is not None:
         found["listen_right"] = recipe.listen_right
+    if recipe.decay_db is None:
+        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
+    if recipe.source == "difference":
+        found["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
     return found
