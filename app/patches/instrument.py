@@ -25,8 +25,8 @@ PATCH, SINGLE = "Patch", "SingleString"  # in the paths of faults
 
 
 def _kind(value: Any) -> str:
-    fields = value if isinstance(value, dict) else dict(value) if isinstance(value, BaseModel) else {}
-    return PATCH if "strings" in fields or "name" in fields else SINGLE
+    more = value.keys() - {"preset"} if isinstance(value, dict) else isinstance(value, Patch)
+    return PATCH if more else SINGLE
 
 
 Instrument = Annotated[

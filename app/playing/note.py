@@ -54,6 +54,7 @@ class Note:
         self.mixer: Mixer | None = None
         self.cut = False
         self.timed = False  # its latency has been noted
+        self.ahead_of_event = False  # it was handed over before its event is due, and may be cancelled until then
 
     def subject(self, source: str) -> Subject:
         """The preset or string whose sound a source is."""

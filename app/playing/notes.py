@@ -63,6 +63,7 @@ class Notes:
 
     Attributes:
         keys: what the keys of a patch sound with.
+        latest: the note that an event began last.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class Notes:
         self._notes: list[Note] = []
         self._monitor = Monitor()
         self._ear: Ear | None = None
+        self.latest: Note | None = None
         self._chosen: RenderRequest | None = None
         self._reach: Reach | None = None  # of a single string, which is played; None: a patch is
         self._dry = False
@@ -149,34 +151,44 @@ class Notes:
         presets must be loaded or a model is rendered ahead.
         """
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
-        reach, chosen = self._reach, self._chosen
-        if reach is not None and chosen is not None and isinstance(event, NoteOn) and event.velocity > 0:
-            event = PluckAt(reach.pluck(event.key, event.velocity, chosen.pluck))
-        if not isinstance(event, PluckAt):
-            return self.keys.handle(event, due, lambda struck, string: self._adopt(struck, string, struck_s, due))
-        with self._lock:
-            if self._chosen is not None:
-                self._chosen = replace(self._chosen, pluck=event.pluck)
-        return self.ring(begin_frame=0 if due is None else due.frame_in(self._sound.mixer), struck_s=struck_s)
+        placed = self._place(event)
+        if not isinstance(placed, PluckAt):
+            note = self.keys.handle(placed, due, lambda struck, string: self._adopt(struck, string, struck_s, due))
+        else:
+            with self._lock:
+                if self._chosen is None:
+                    return None
+                chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
+            frame = 0 if due is None else due.frame_in(self._sound.mixer)
+            note = self._ring(chosen, 0.0, frame, struck_s, due is not None)
+        self.latest = note or self.latest
+        return note
 
-    def ring(
-        self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False, struck_s: float = 0.0
-    ) -> Note | None:
+    def _place(self, event: Event) -> Event:
+        """The pluck that a key of a single string is; any other event as it is."""
+        reach, chosen = self._reach, self._chosen
+        if reach is None or not isinstance(event, NoteOn) or event.velocity <= 0:
+            return event
+        return PluckAt(reach.pluck(event.key, event.velocity, Pluck() if chosen is None else chosen.pluck))
+
+    def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> Note | None:
         """Begins a note of the chosen pluck, while others ring on; None where nothing is chosen.
 
         Args:
             from_s: where in its motion it begins.
             begin_frame: the frame of the mixer at which it begins; 0: at once.
             alone: whether the other notes fade out.
-            struck_s: when the gesture was, by the sound's clock; 0 where there was none.
         """
-        chosen = self._chosen
-        if chosen is None:
-            return None
-        gain = self.keys.gain_of(string_of(chosen.preset))
-        note = Note(chosen, self._voices_of(chosen), gain, from_s, begin_frame)
         if alone:
             self.stop(REPLACED_S)
+        return None if self._chosen is None else self._ring(self._chosen, from_s, begin_frame)
+
+    def _ring(
+        self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
+    ) -> Note:
+        gain = self.keys.gain_of(string_of(chosen.preset))
+        note = Note(chosen, self._voices_of(chosen), gain, from_s, begin_frame)
+        note.ahead_of_event = waits
         with self._lock:
             self._notes.append(note)
         begin = partial(self._begin, note, struck_s)
@@ -199,7 +211,7 @@ class Notes:
         self.keys.cancel()
         with self._lock:
             for note in self._notes:
-                if note.begin_frame > 0 and note.struck is None and not note.began:
+                if note.ahead_of_event and not note.began:
                     note.release(0.0)
 
     def stop(self, seconds: float = STOP_S) -> None:

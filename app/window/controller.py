@@ -234,7 +234,7 @@ class Controller(QObject):
         """An event of the instrument; called in the thread of the event."""
         if self._abx is not None and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.performance.handle(event, due)
+        return self.performance.notes.handle(event, due)
 
     def play_or_stop(self) -> None:
         if self._abx is None:

@@ -1,7 +1,7 @@
 """The note that is played and the pluck that is shown.
 
 An event begins a note, which sounds at once; the picture follows: the render worker makes the motion of the same
-pluck, and the views show it at the note's own time. All but `handle` runs in the window's thread.
+pluck, and the views show it at the note's own time. All but `play_preset` runs in the window's thread.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
-from app.instrument.events import Event, PluckAt
+from app.instrument.events import PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
-from app.playing.due import Due
 from app.playing.keyboard import Reach
 from app.playing.note import Note
 from app.playing.notes import Notes
@@ -61,7 +60,6 @@ class Performance(QObject):
         self._panels = panels
         self._asked: RenderRequest | None = None
         self._shown = _Shown()
-        self._latest: Note | None = None  # struck last
         self._next_turn: Note | None = None  # of the loop, which waits in the mixer for its frame
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
@@ -124,25 +122,18 @@ class Performance(QObject):
     @property
     def match(self) -> Mapping[str, float] | None:
         """By source, the factor that brings the latest note to the level of the truth; None: not known yet."""
-        return None if self._latest is None else self._latest.match
+        return None if self.notes.latest is None else self.notes.latest.match
 
     # Intents
 
-    def handle(self, event: Event, due: Due | None = None) -> Note | None:
-        """Plays an event of any instrument. Any thread; `follow` then shows it. None where it began no note."""
-        note = self.notes.handle(event, due)
-        if note is not None:
-            self._latest = note
-        return note
-
     def pluck(self) -> None:
         """Plucks the string as chosen, and shows it."""
-        self.handle(PluckAt(self._session.choices.pluck))
+        self.notes.handle(PluckAt(self._session.choices.pluck))
         self.follow()
 
     def follow(self) -> None:
         """Shows the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
-        latest = self._latest
+        latest = self.notes.latest
         if latest is None or latest is self._shown.note or latest.released or latest.over:
             return
         if self.ready and self._is_chosen(latest):
@@ -171,7 +162,7 @@ class Performance(QObject):
         self._forget_turn()
         self._shown.note, self._shown.parked_s = None, position_s
         if self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
-            self._latest = self._shown.note = note
+            self.notes.latest = self._shown.note = note
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Applies changed fields of `Choices` to the notes, and asks for another motion where that has changed."""
@@ -241,7 +232,7 @@ class Performance(QObject):
 
     def _waiting(self) -> str:
         """When a model that is rendered before it is heard will sound; "" where none waits."""
-        latest = self._latest
+        latest = self.notes.latest
         if latest is None or not latest.waits_s:
             return ""
         entry = self._library.find(path_of(latest.request.preset).stem)
@@ -251,12 +242,12 @@ class Performance(QObject):
     def _turn(self) -> None:
         """Hands the next turn of the loop to the mixer, shortly before it begins."""
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
-        note, take, turn = self._shown.note or self._latest, self._shown.take, self._next_turn
+        note, take, turn = self._shown.note or self.notes.latest, self._shown.take, self._next_turn
         if note is None or take is None or not note.began:
             return
         if turn is not None:
             if turn.began and not turn.cut:
-                self._latest = turn
+                self.notes.latest = turn
                 if self._is_chosen(turn):
                     self._shown.note = turn
             if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another

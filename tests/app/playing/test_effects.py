@@ -98,3 +98,17 @@ def test_a_body_that_is_not_here_is_told_once_however_its_knobs_are_turned(
     (told,) = stage.reports
     assert "is played without its body: the body a cello is not here" in told
     assert all(effects is None or effects.body is None for effects in stage.effects)
+
+
+def test_a_single_string_has_none_even_where_a_patch_is_kept_beside_it(
+    stage: Stage, patch: Patch, wait: Wait
+) -> None:
+    stage.notes.set_instrument(patch, EAR)
+    stage.settle(wait)
+    assert stage.effects[-1] is not None
+    stage.notes.set_instrument(SingleString(), EAR, patch)
+    stage.settle(wait)
+    assert stage.effects[-1] is None
+    stage.notes.set_instrument(patch, EAR)
+    stage.settle(wait)
+    assert stage.effects[-1] is not None

@@ -461,3 +461,13 @@ def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(played: No
     for channel in (0, KEYS):
         struck, _ = strike(played, NoteOn(57, 60, channel))
         assert struck.parameters == struck.key.string.parameters
+
+
+def test_a_patch_that_is_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(
+    played: Notes, patch: Patch
+) -> None:
+    played.set_instrument(SingleString(preset="gone"), EAR, patch)
+    assert played.handle(NoteOn(45, 60)) is None
+    assert played.handle(NoteOff(45)) is None
+    played.set_instrument(patch, EAR)
+    strike(played, NoteOn(45, 60))

@@ -120,7 +120,7 @@ def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
     qtbot: QtBot, heard: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken: list[object] = []
-    monkeypatch.setattr(heard.performance, "handle", lambda event, due: taken.append(event))
+    monkeypatch.setattr(heard.performance.notes, "handle", lambda event, due: taken.append(event))
     dialog = open_test(qtbot, heard)
     let_go = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
     for event in (events.NoteOn(52, 90), *let_go):

@@ -50,7 +50,7 @@ def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, 
     played.window.instrument.pressed.emit(52, 100)
     (struck,) = played.performance.notes.keys.player.sounding()  # type: ignore[union-attr]
     qtbot.waitUntil(lambda: played.session.choices.string is not None)
-    note = played.performance.handle(PluckAt(played.session.choices.pluck))
+    note = played.performance.notes.handle(PluckAt(played.session.choices.pluck))
     assert note is not None
     assert note.struck is None
     assert string_of(note.request.preset) == struck.key.string.parameters
