@@ -178,6 +178,7 @@ class PatchDesk(QObject):
         """Chooses a patch, unless it is there already, maybe changed, and plays a note in the middle of its range."""
         if self.entry is None or self.entry.name != name:
             self.choose(name)
+        self._session.play_patch()
         if self.patch is not None:
             key = sum(self.patch.range) // 2
             self._playback.play(_note(key))
