@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 from engine.bounds import brief
 from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read
-from engine.whole_file import whole_file
+from engine.whole_file import naming, whole_file
 
 T = TypeVar("T")
 
@@ -119,3 +119,9 @@ def write_table(path: Path, kind: type, records: Iterable[Any]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns_of(kind))
         writer.writerows(map(texts_of, records))
+
+
+def append_record(path: Path, record: Any) -> None:
+    """Adds a line to a table. Raises OSError."""
+    with naming(path), path.open("a", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerow(texts_of(record))

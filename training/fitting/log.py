@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from engine.schema import SchemaError
-from engine.table import read_table, write_table
+from engine.table import append_record, read_table, write_table
 from training.fitting.fit import Progress
 
 LARGEST_BYTES = 2**24
@@ -43,7 +43,7 @@ class TrainingLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._epochs = read_log(path) if path.exists() else []
+        self._trimmed = False
 
     def add(self, progress: Progress) -> None:
         """Adds the epoch that has ended; later ones of an earlier run are dropped."""
@@ -57,9 +57,12 @@ class TrainingLog:
             _rounded(validation.rel_mae) if validation else None,
             round(progress.seconds, 2),
         )
-        self._epochs = [*(epoch for epoch in self._epochs if epoch.epoch < ended.epoch), ended]
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        write_table(self.path, Epoch, self._epochs)
+        if not self._trimmed:
+            kept = [line for line in read_log(self.path) if line.epoch < ended.epoch] if self.path.exists() else []
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_table(self.path, Epoch, kept)
+            self._trimmed = True
+        append_record(self.path, ended)
 
 
 def _rounded(value: float) -> float | None:
