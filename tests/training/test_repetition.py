@@ -37,7 +37,10 @@ def digest(model: torch.nn.Module) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_run_repeats_bit_for_bit(kind: str, small_dataset: Dataset, tmp_path: Path) -> None:
+def test_a_run_repeats_bit_for_bit(
+    kind: str, small_dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("training.fitting.pursuit.POLISH_ITERATIONS", 5)
     cell = Cell.parse(f"nylon_nonlinear_gaussian_4k_{kind}")
     assert cell is not None
     made = configuration_of(cell, DATA, {"epochs": 2, **KINDS[kind]})
