@@ -96,7 +96,7 @@ def evaluate(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Draw a dot for each string, by rise and inharmonicity: .png, .svg, .pdf.",
+            help="Draw the distribution of errors by rise of tension: .png, .svg, .pdf.",
         ),
     ] = None,
     rate: Rate = 48_000,
@@ -144,10 +144,11 @@ def evaluate(
         for rises, edges, part in (by_cell(own, RISES, INHARMONICITIES) if error_map else ())
     ]
     if picture is not None:
-        from training.figures.family_map import family_map
+        from training.figures.family_errors import family_errors
         from training.figures.style import save_figure
 
-        save_figure(family_map(own, loaded.name), picture)
+        columns = {column: errors[loaded.name].strings for column, errors in measured.items()}
+        save_figure(family_errors(columns, loaded.name), picture)
     if json:
         told_map = {"map": cells} if error_map else {}
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found, **told_map})

@@ -43,30 +43,35 @@ def table(
         typer.Option(help="Only runs of this recipe of training/recipes."),
     ] = "all",
     format: Annotated[
-        Literal["markdown", "csv"], typer.Option(help="csv has a line for each cell (tidy data).")
-    ] = "markdown",
-    rows: Annotated[
-        bool, typer.Option("--rows", help="List the runs behind the figures, with the command that repeats each.")
-    ] = False,
+        Literal["compact", "full", "csv"],
+        typer.Option(
+            help="compact and full are Markdown, full with deviations; csv has a line per cell (tidy data)."
+        ),
+    ] = "compact",
+    metric: Annotated[
+        Literal["mse", "mae"], typer.Option(help="Relative error of the compact tables; the others have both.")
+    ] = "mse",
     output: Annotated[Path | None, typer.Option(help="Write to this file instead of standard output.")] = None,
     into: Annotated[
         Path | None,
         typer.Option(metavar="FILE.md", help=f"Replace all that follows the line {MARKER} in this file."),
     ] = None,
 ) -> None:
-    """Print the paper's two tables with our results beside its figures."""
-    if rows and format == "csv":
-        raise typer.BadParameter("is for markdown; in CSV each line names its runs", param_hint="--rows")
+    """Print the paper's two tables with our results."""
     if into is not None and (format == "csv" or output is not None):
-        raise typer.BadParameter("takes Markdown, and goes without --output", param_hint="--into")
+        raise typer.BadParameter("takes Markdown and excludes --output", param_hint="--into")
     from training.results import RESULTS, read_results
+    from training.tables.compact import as_compact
     from training.tables.markdown import as_markdown
     from training.tables.tidy_csv import as_csv
 
     found = read_results(results or RESULTS)
     if not found:
         say(f"note: {results or RESULTS} has no rows; the tables hold the paper's figures only")
-    text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe, listing=rows)
+    if format == "compact":
+        text = as_compact(found, recipe, f"rel_{metric}")
+    else:
+        text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe)
     if into is not None:
         text, output = _before(into) + text, into
     if output is None:
@@ -172,7 +177,26 @@ def eigenvalues(presets: PresetNames, output: Output = None) -> None:
     _write(presets, output, "eigenvalues", lambda loaded, report: drawing.eigenvalues(loaded))
 
 
+@figure.command()
+def ratios(
+    results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
+    metric: Annotated[Literal["mse", "mae"], typer.Option(help="Relative error.")] = "mae",
+    output: Output = None,
+) -> None:
+    """Heat map of our errors over the paper's."""
+    from training.figures.ratios import ratios as drawing
+    from training.results import RESULTS, read_results
+
+    rows = read_results(results or RESULTS)
+    _save(output, "ratios", lambda report: drawing(rows, f"rel_{metric}"))
+
+
 def _write(names: list[str], output: Path | None, kind: str, draw: Callable[[list[Preset], Report], Figure]) -> None:
+    loaded = [open_preset(name) for name in names]
+    _save(output, kind, lambda report: draw(loaded, report))
+
+
+def _save(output: Path | None, kind: str, draw: Callable[[Report], Figure]) -> None:
     from training.figures.style import check_format, figure_bytes
 
     path = output or Path(f"{kind}.png")
@@ -180,7 +204,6 @@ def _write(names: list[str], output: Path | None, kind: str, draw: Callable[[lis
         check_format(path)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--output") from error
-    loaded = [open_preset(name) for name in names]
     with whole_file(path) as file, progress(f"figure {kind}") as report:
-        file.write(figure_bytes(draw(loaded, report), path.suffix))
+        file.write(figure_bytes(draw(report), path.suffix))
     print(path)

@@ -4,7 +4,8 @@
 `extrapolation`  past the end of training (Fig. 3)
 `error`          error per time step (Fig. 4)
 `eigenvalues`    what was learned, in the unit circle
-`family_map`     errors of a model of many strings, a dot each string
+`ratios`         our errors over the paper's, a heat map
+`family_errors`  errors of a model of many strings, by rise of tension
 `run_plot`       the course of a run, from its log
 `style`          how they look, and their files
 """
