@@ -1,4 +1,4 @@
-"""Pages of the site that are generated: command line, presets, API, tables of fields, notebooks, repository documents.
+"""Generated pages of the site: command line, presets, API, tables of fields, notebooks, repository documents.
 
 A hook of MkDocs; `python3 run.py docs` builds the site.
 """
@@ -9,12 +9,12 @@ import contextlib
 import importlib
 import io
 import json
+import math
 import re
 import shutil
 from pathlib import Path
 from typing import Any
 
-import click
 import typer
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -62,7 +62,9 @@ def command_line() -> str:
 
 def help_texts(command: Any, name: str, words: tuple[str, ...] = ()) -> list[tuple[tuple[str, ...], str]]:
     """Names and help of all commands below `command`, groups before their commands."""
-    context = click.Context(command, info_name=" ".join((name, *words)), max_content_width=100, terminal_width=100)
+    context = command.context_class(
+        command, info_name=" ".join((name, *words)), max_content_width=100, terminal_width=100
+    )
     found = [(words, command.get_help(context).strip())] if words else []
     for part, below in getattr(command, "commands", {}).items():
         found += help_texts(below, name, (*words, part))
@@ -73,7 +75,10 @@ def benchmarks() -> str:
     from tests.bench.cli import bench
 
     commands = typer.main.get_command(bench).commands  # type: ignore[attr-defined]
-    rows = [f"| `{name}` | {' '.join((each.help or '').split(chr(10) + chr(10))[0].split())} |" for name, each in commands.items()]
+    rows = [
+        f"| `{name}` | {' '.join((each.help or '').split(chr(10) + chr(10))[0].split())} |"
+        for name, each in commands.items()
+    ]
     return "\n".join(["| name | measures |", "|---|---|", *rows])
 
 
@@ -84,7 +89,9 @@ def presets() -> str:
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         assert main(["presets", "--json"]) == 0
-    parts = ["# Presets\n\nErrors are relative, over the training horizon. *Heard* is past it: see [results](results.md)."]
+    parts = [
+        "# Presets\n\nErrors are relative, over the training horizon. *Heard* is past it: see [results](results.md)."
+    ]
     parts += [card(each) for each in json.loads(printed.getvalue())]
     return "\n\n".join(parts)
 
@@ -93,9 +100,10 @@ def card(preset: dict[str, Any]) -> str:
     from engine.presets import find_preset, load_preset
 
     info = load_preset(find_preset(preset["name"])).info
+    string = info.string
     errors = [preset[name] for name in ("rel_mse", "test_rel_mse", "rel_mae", "test_rel_mae")]
     validation, test, mae, test_mae = ("—" if value is None else f"{value:.2g}" for value in errors)
-    pitch_hz = float(info.resonator.eigenvalues()[0].imag) / (2 * 3.141592653589793)
+    pitch_hz = float(info.resonator.eigenvalues()[0].imag) / math.tau
     return "\n".join(
         [
             f"## {info.title}\n",
@@ -103,7 +111,7 @@ def card(preset: dict[str, Any]) -> str:
             "| | |",
             "|---|---|",
             f"| model | {preset['model']}, {preset['parameters']} parameters |",
-            f"| string | {preset['string']}, {pitch_hz:.1f} Hz, {info.string.length_m:g} m, {info.string.tension_n:g} N |",
+            f"| string | {preset['string']}, {pitch_hz:.1f} Hz, {string.length_m:g} m, {string.tension_n:g} N |",
             f"| rate, horizon | {info.rate_hz} Hz, {info.horizon_s:g} s |",
             f"| MSE, validation; test | {validation}; {test} |",
             f"| MAE, validation; test | {mae}; {test_mae} |",
@@ -129,7 +137,7 @@ def fields() -> str:
     from app.shared.parameters import OF_PATCHES
 
     rows = [
-        f"| `{each.id}` | {each.limits[0]:g} … {each.limits[1]:g} | {each.default:g} | {each.tip.replace('|', chr(92) + '|')} |"
+        f"| `{each.id}` | {each.limits[0]:g} … {each.limits[1]:g} | {each.default:g} | {each.tip} |"
         for each in OF_PATCHES.values()
     ]
     return "\n".join(["| field | range | default | meaning |", "|---|---|---|---|", *rows])

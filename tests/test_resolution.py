@@ -1,4 +1,4 @@
-"""Everything that run.py installs has wheels, resolved by uv for each Python and system that docs/install.md names."""
+"""Everything that run.py installs has wheels, resolved by uv for each Python and system of docs/install.md."""
 
 from __future__ import annotations
 

@@ -81,7 +81,9 @@ def test_words_are_understood(run, words, meant, monkeypatch, tmp_path):
     assert run.parse(words) == meant
 
 
-@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["docs", "now"], ["--frob"], ["song.mid", "now"], ["--frob.mid"]])
+@pytest.mark.parametrize(
+    "words", [["render"], ["setup", "now"], ["docs", "now"], ["--frob"], ["song.mid", "now"], ["--frob.mid"]]
+)
 def test_other_words_are_answered_with_the_usage(run, words, capsys):
     with pytest.raises(SystemExit) as exit:
         run.main(words)
