@@ -92,7 +92,8 @@ def presets() -> str:
     parts = [
         "# Presets\n\nErrors are relative, over the training horizon. *Heard* is past it: see [results](results.md)."
     ]
-    parts += [card(each) for each in json.loads(printed.getvalue())]
+    shipped = [each for each in json.loads(printed.getvalue()) if Path(each["file"]).parent == ROOT / "presets"]
+    parts += [card(each) for each in shipped]
     return "\n\n".join(parts)
 
 

@@ -75,7 +75,10 @@ def _steps(controller: Controller) -> Iterator[None]:
         performance.seek(number * FLASH_S)
         yield
         frames.append(picture(view))
-    palette = frames[0].quantize(COLOURS)
+    sheet = Image.new("RGB", (frames[0].width, 4 * frames[0].height))  # the palette of all frames, of four of them
+    for place, frame in enumerate(frames[:: len(frames) // 4][:4]):
+        sheet.paste(frame, (0, place * frame.height))
+    palette = sheet.quantize(COLOURS)
     first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first.save(HERE / "string.gif", save_all=True, append_images=others, duration=FRAME_MS, loop=0, optimize=True)
     window.close()
