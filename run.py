@@ -319,7 +319,7 @@ def sound() -> bool:
 
 
 def mend() -> None:
-    """Remove what a pip cut short left, and the record of each package not whole: pip then brings it anew."""
+    """Remove what a pip cut short left, and the record of each package not whole: pip then brings it again."""
     for package in [*site_packages().glob("~*"), *site_packages().glob("*.dist-info")]:
         if not whole(package):
             say(f"mending {package.stem}")
@@ -345,7 +345,7 @@ def remove(path: Path) -> None:
 
 
 def make_venv() -> None:
-    """Make .venv from nothing, but for the lock in it."""
+    """Make .venv from nothing, except the lock in it."""
     say(f"making {VENV}; this takes minutes the first time")
     for path in set(VENV.iterdir()) - {LOCK}:
         remove(path)

@@ -45,7 +45,10 @@ def written(path: Path) -> Iterator[tuple[int, str]]:
     """The strings and comments of a Python file, with the line each starts in."""
     for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline):
         if token.type in (tokenize.COMMENT, tokenize.STRING) or tokenize.tok_name[token.type] == "FSTRING_MIDDLE":
-            yield token.start[0], token.string
+            text = re.sub(r"``?[^`\n]*``?", "`code`", token.string)  # names in docstrings
+            if re.match(r"[rb]*f", text, re.IGNORECASE):
+                text = re.sub(r"\{[^{}]*\}", "{}", text)  # names in f-strings
+            yield token.start[0], text
 
 
 def prose(path: Path) -> Iterator[tuple[int, str]]:

@@ -110,7 +110,7 @@ def evaluate_past_horizon(
         windows_s: of the spectral distances; none may be empty.
         trajectories: only so many, the split's first ones.
         frames_at_once: of a block; the result does not depend on it.
-        report: is told the share that is done.
+        report: receives the share that is done.
     """
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)

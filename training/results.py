@@ -44,8 +44,8 @@ class Row:
         rel_mse_400, rel_mae_400: over the first 400 frames, where the horizon reaches so far.
         start_…: of the untrained model, over the validation set; the result is never worse.
         test_…: the same of the test set, which chose neither weights nor recipes.
-        …_se: standard error of a figure by which trajectories are in the split; see `ErrorSums.standard_error`. None
-            in rows of before they were measured; `learned-strings results measure` fills them from a kept preset.
+        …_se: standard error of a figure over the split's trajectories; see `ErrorSums.standard_error`. None
+            in rows older than the measurement; `learned-strings results measure` fills them from a kept preset.
         seconds: of training, what it starts from among it; in rows without start_… the optimiser alone.
         commit: of the code, "" where it is not known.
         finished: UTC, ISO 8601.
@@ -134,7 +134,7 @@ def read_results(path: Path) -> list[Row]:
     except UnusableFile as error:
         raise SchemaError(f"{path}: {error.strerror}") from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin anew") from error
+        raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin again") from error
 
 
 def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:

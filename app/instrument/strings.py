@@ -16,7 +16,7 @@ from engine.resonators.string import StringParameters
 HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
 MOST_MODES = 99  # the shipped model's grid holds no more
 HIGHEST_FRET = 24
-MOST_SLACKENED = 5  # keys by which a guitar's string may be tuned lower than the set's
+MOST_SLACKENED = 5  # keys that a guitar's string may be tuned below the set's
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def fretting(strings: StringSet, key: int) -> list[int]:
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
-    """The string with a patch's multipliers: pitch and decay rates stay, but for what bending and d₃ have in them.
+    """The string with a patch's multipliers: pitch and decay rates stay, except for the parts of bending and d₃.
 
     The tension follows the mass and the square of the length, the damping the mass.
     """

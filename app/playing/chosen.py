@@ -15,7 +15,7 @@ from app.shared.vocabulary import DIFFERENCE
 
 
 def mix_of(choices: Choices) -> Mix:
-    """What is heard of a note."""
+    """The sound of a note."""
     return Mix(choices.source_heard, choices.level_match, choices.difference_gain_db)
 
 

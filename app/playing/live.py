@@ -184,7 +184,7 @@ class Live:
         struck, player = self._struck, self._player
         if struck is None or struck.key.string.parameters != string:
             return 1.0
-        with contextlib.suppress(ValueError):  # told when it is struck
+        with contextlib.suppress(ValueError):  # reported when it is struck
             return struck.gain if player is None else player.gain_of(struck)
         return struck.gain
 
@@ -242,7 +242,7 @@ class Live:
     def end_recording(self) -> list[TimedEvent]:
         """The events, with times in s from the first note on; empty where there was no note.
 
-        Keys that are down and pedals are let go at its end.
+        Keys and pedals that are down are released at its end.
         """
         with self._lock:
             recorded, self._recorded = self._recorded or [], None

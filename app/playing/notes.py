@@ -52,7 +52,7 @@ class Note:
         ahead: those of its voices that are rendered ahead.
         match: by source, the factor that brings it to the level of the truth; None until it is known.
         pending: it was not handed to a mixer yet.
-        released: it was told to fade out.
+        released: whether it was asked to fade out.
         mixer: to which it was handed.
         cut: it is not heard any more: its mixer was replaced, or it could not be played.
     """
@@ -196,7 +196,7 @@ class Notes:
         return note
 
     def now_s(self) -> float:
-        """The clock by which gestures are timed."""
+        """The clock of gestures."""
         return self._sound.now_s()
 
     @property
@@ -250,7 +250,7 @@ class Notes:
                 note.release(seconds)
 
     def set_mix(self, mix: Mix) -> None:
-        """Sets what is heard of all notes; those that ring are cross-faded."""
+        """Sets the sources of all notes; those that ring are cross-faded."""
         with self._lock:
             self._mix = mix
             notes = list(self._notes)
@@ -367,7 +367,7 @@ class Notes:
             self._skip(note)
             if self._hand_over(note, mixer):
                 return
-            note.begin_frame = 0  # another mixer counts anew
+            note.begin_frame = 0  # another mixer counts again
 
     def _skip(self, note: Note) -> None:
         if note.from_s > 0:

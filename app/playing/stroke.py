@@ -46,7 +46,7 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Mix:
-    """What is heard of notes.
+    """The sound of notes.
 
     Attributes:
         heard: a source, or `DIFFERENCE`.

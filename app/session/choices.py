@@ -119,7 +119,7 @@ class Session:
     `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
 
     While keys play the patch, its pick-up is what `listen`, `listen_right`, `stereo` and `pickup` say: whichever of
-    the two changes, the other follows, so that what is heard is what is saved, recorded and exported.
+    the two changes, the other follows, so that the sound is also saved, recorded and exported so.
     """
 
     changed = Signal(frozenset)
@@ -172,7 +172,7 @@ class Session:
         return self._choices.source_heard
 
     def switch_source(self) -> None:
-        """Switches what is heard from slot A to slot B, or back."""
+        """Switches the sound from slot A to slot B, or back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
 
 

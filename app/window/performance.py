@@ -42,7 +42,7 @@ from engine.pluck import Pluck
 from engine.resonators.string import StringParameters
 
 MotionKey = tuple[str, StringParameters, Pluck, float]  # the preset's name, its string, the pluck, how long it is
-LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
+LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
 PLACE_FIELDS = {"preset", "string", "amplitude_mm", "shape", "width", "patch", "keys_play"}  # of keys at ten places
 SLOT_FIELDS = {"a", "b", "heard"}
@@ -268,7 +268,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
-        """Forgets notes that ended, goes on with the loop, and updates the header."""
+        """Forgets notes that ended, continues with the loop, and updates the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._turn()

@@ -12,7 +12,7 @@ from numba import njit
 from engine.kernels.compiled import COMPILED
 
 QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
-AHEAD = 32  # frames that the limiter looks ahead, and by which it delays what is heard; even, and a quantum at most
+AHEAD = 32  # frames that the limiter looks ahead, its delay; even, and a quantum at most
 
 # A voice's state
 WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
@@ -39,7 +39,7 @@ BEGAN_S = 15  # R and of the callback that gave the device its first samples
 STARVED = 16  # W frames in which it should have sounded and had nothing to
 MODES = 17  # W latents, or modes, or 0
 MOVING = 18  # W modes of the truth, or latents that share a tension, that still move
-NODE = 19  # W the node from which a bank's integral goes on
+NODE = 19  # W the node from which a bank's integral continues
 SEGMENT_VALID = 20  # W whether a bank knows where its last segment ended
 LOUDNESS = 21  # R nepers below full scale that the loudest latent, or all of the string, has now
 GAIN_FROM = 22  # R where the present change of gain began
@@ -48,7 +48,7 @@ GAIN_DONE = 24  # W frames of it
 SILENT = 25  # R nepers of full scale: a voice whose loudness has fallen below is over
 MODULATED = 26  # W whether a bank's modulation can still be heard
 SAMPLES = 27  # W address of a rendered voice's samples, float32 (frames, points)
-READY = 28  # W of them, set by whoever renders
+READY = 28  # W of them, set by the renderer
 LENGTH = 29  # W of them in all; after the last the voice is over
 DRY = 30  # W whether it had nothing to play in the last quantum
 ATTACK = 31  # W frames of the fade-in at the pluck
@@ -58,7 +58,7 @@ ROWS = 34  # W latents whose modulation can be heard
 COLUMNS = 35  # W latents that can be heard in others' modulation
 BEGIN_AT = 36  # W the mixer's frame at which it begins; in the past: with the next quantum
 RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
-LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins anew after its last sample
+LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins again after its last sample
 ALIVE = 39  # W latents up to the last that can be heard
 WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
 RESONATOR = 41  # W address of the latest of these that are due; the kernel glides there
@@ -70,7 +70,7 @@ STEPS = 46  # W nodes, or sub-steps, of a frame, for which they were made
 DECAY = 47  # R of the largest energy in a frame
 LARGEST_ENERGY = 48  # R of latents that share a tension
 LARGEST_STRETCH = 49  # R
-PEAK = 50  # R m: of the displacement as it is let go, a least one
+PEAK = 50  # R m: of the displacement at its release, a least one
 JOINS = 51  # W whether its fade-in is the complement of the other's fade
 ENDS_AT = 52  # W frames since the pluck, from which on it fades out whatever it still gives
 ENDS_IN = 53  # W frames of that fade
@@ -200,7 +200,7 @@ M_FRAMES = 1  # W given to the device
 M_CALLS = 2  # W of the callback
 M_NOW_S = 3  # R the device clock at the last call
 M_DAC_S = 4  # R and when its first sample is heard
-M_UNDERFLOWS = 5  # W that the device told
+M_UNDERFLOWS = 5  # W that the device reported
 M_ACTIVE = 6  # W voices
 M_PUSHED = 7  # W voices that were handed over
 M_TAKEN = 8  # W and taken up

@@ -224,7 +224,7 @@ def baseline(
         int | None,
         typer.Option(min=1, max=100_000, help="Strings to learn from; default as studio_any_string."),
     ] = None,
-    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one goes on there.")] = None,
+    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one continues there.")] = None,
     strings: Strings = 40,
     rate: Rate = 48_000,
     seed: Seed = 0,
@@ -232,7 +232,7 @@ def baseline(
 ) -> None:
     """Train and measure a model by others on the same strings.
 
-    A stopped training goes on. It is measured as `evaluate` does, and no preset is written.
+    A stopped training continues. It is measured as `evaluate` does, and no preset is written.
     """
     import torch
 

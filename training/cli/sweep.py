@@ -96,7 +96,7 @@ def sweep(
                 with _watching(left, found.capacity) as watch:
                     rows = run(chosen, found, options, watch)
         except KeyboardInterrupt:
-            say("stopped; the same command goes on")
+            say("stopped; the same command continues")
             raise
     _tell(rows, json)
 

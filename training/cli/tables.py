@@ -1,4 +1,4 @@
-"""table, figure: the results beside the paper's, and figures of presets."""
+"""table, figure: our results with the paper's, and figures of presets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from engine.presets import Preset
     from training.cli.console import Report
 
-figure = typer.Typer(help="Draw figures of presets beside the truth, as PNG, SVG or PDF.", no_args_is_help=True)
+figure = typer.Typer(help="Draw figures of presets and the truth, as PNG, SVG or PDF.", no_args_is_help=True)
 
 PresetNames = Annotated[
     list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")

@@ -55,7 +55,7 @@ def evolution(
 
 
 def magnification(error: float, largest: float) -> int:
-    """The power of ten, at least 1, by which an error can be shown in the scale of `largest`."""
+    """The power of ten, at least 1, that shows an error in the scale of `largest`."""
     if not 0 < error < largest:
         return 1
     return 10 ** int(np.log10(largest / error))

@@ -126,7 +126,7 @@ def motions(presets: Sequence[Preset], starts_m: Tensor, steps: int) -> Iterator
     """The truth and the models in frames 1 … steps after `starts_m` (batch, grid_points), at rest.
 
     Raises:
-        ValueError: a model needs to be told more than a displacement at rest.
+        ValueError: a model needs more than a displacement at rest.
     """
     runs = [
         _Run(TruthSource(presets[0].info), starts_m),

@@ -21,7 +21,7 @@ below each is of the same models on the test set, which chose nothing. **The pap
 printed (5 seeds, validation; DMD's deviations are over the errors of single trajectories).
 
 - **deviation**, of ours: √(s² + b²). s is the standard deviation over seeds, where there is more than one. b is the
-  standard error by which strings are in the split, the bootstrap over its 100 trajectories (as many drawn with
+  standard error over the strings of the split, the bootstrap over its 100 trajectories (as many drawn with
   replacement, {RESAMPLES} times; of several seeds the root of the mean square). **No brackets**: one seed, and b is
   not known, because its preset was not kept; the words beside it know the paper's deviation alone.
 - **better**, **worse**: than the paper's figure of the same model, by more than √(our deviation² + the paper's²), at
@@ -31,7 +31,7 @@ printed (5 seeds, validation; DMD's deviations are over the errors of single tra
 - **prior knowledge**: training started from what is known of the string (its modes and eigenvalues, or averaged
   equations), which the paper's models do not have. Lines without these words are black boxes as in the paper.
 - **§**: hints. Training used that a string may be mirrored and its sign turned; by the recipe `hinted` the integrated
-  phase was told how many modes there are, too. The recipe `blind` has neither.
+  phase was given the number of modes, too. The recipe `blind` has neither.
 - **our best**: the lowest validation error of our learned models (DMD is fitted, not learned) as a multiple of the
   paper's best in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below
   {PRINTED:g}."""

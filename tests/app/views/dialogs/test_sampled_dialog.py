@@ -222,7 +222,7 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     dialog.close()  # as its cross does: it stays, to tell what was kept
     assert dialog.isVisible()
     notes.gate.set()
-    told = f"of {MADE} samples are kept; export again to go on from there"
+    told = f"of {MADE} samples are kept; export again to continue from there"
     qtbot.waitUntil(lambda: told in dialog.state.text())
     kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
     assert kept == len(notes.rendered) < MADE
