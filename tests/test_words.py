@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 PROSE = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 CODE = sorted(
     [
-        *(path for name in ("app", "engine", "training", "docs") for path in ROOT.glob(f"{name}/**/*.py")),
+        *(path for name in ("app", "engine", "training", "docs", "tests") for path in ROOT.glob(f"{name}/**/*.py")),
         ROOT / "run.py",
     ]
 )
@@ -48,7 +48,8 @@ def written(path: Path) -> Iterator[tuple[int, str]]:
             text = re.sub(r"``?[^`\n]*``?", "`code`", token.string)  # names in docstrings
             if re.match(r"[rb]*f", text, re.IGNORECASE):
                 text = re.sub(r"\{[^{}]*\}", "{}", text)  # names in f-strings
-            yield token.start[0], text
+            if not re.fullmatch(r"\W*\w+\W*", text):  # one word names an argument or a field
+                yield token.start[0], text
 
 
 def prose(path: Path) -> Iterator[tuple[int, str]]:
@@ -62,7 +63,7 @@ def prose(path: Path) -> Iterator[tuple[int, str]]:
 
 def test_no_word_of_the_list_is_used() -> None:
     found = []
-    for path in (*PROSE, *CODE):
+    for path in {*PROSE, *CODE} - {Path(__file__)}:
         for first, text in prose(path) if path.suffix == ".md" else written(path):
             for number, line in enumerate(text.splitlines(), first):
                 for hit in WORDS.finditer(line):

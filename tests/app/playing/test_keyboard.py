@@ -39,7 +39,7 @@ def test_the_row_goes_from_end_to_end_of_what_is_trained() -> None:
         ("linux", KeyPress("A", 24), None),
         ("linux", KeyPress("", 47), 9),  # ö
         ("win32", KeyPress("Q", 0x1E), 0),
-        ("darwin", KeyPress("d", 2), 2),  # its codes are not told: the letter counts
+        ("darwin", KeyPress("d", 2), 2),  # its codes are not reported: the letter counts
         ("linux", KeyPress("q"), None),
         ("linux", KeyPress(""), None),
     ],

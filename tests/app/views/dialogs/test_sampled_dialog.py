@@ -228,7 +228,7 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     assert kept == len(notes.rendered) < MADE
     assert not dialog.form.out.exists()
     assert dialog.save.text() == "Continue"
-    again = made(form=form)  # the window was started anew
+    again = made(form=form)  # the window was started again
     assert f"{kept} of {MADE} samples are there already, and are kept" in again.state.text()
     run(qtbot, again, f"{MADE - kept} samples rendered, {kept} kept")
     assert len(notes.rendered) == MADE
@@ -244,7 +244,7 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     dialog.close_button.click()
     notes.gate.set()
-    dialog._job._worker.close(None)  # what it tells has not arrived
+    dialog._job._worker.close(None)  # its report has not arrived
     (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
     qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text())
     assert dialog.state.objectName() == "warning"
