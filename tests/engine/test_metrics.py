@@ -99,7 +99,7 @@ def test_the_standard_error_of_equal_trajectories_is_that_of_a_mean() -> None:
 
 
 def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -> None:
-    """A quarter is ten times as loud and less accurate: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
+    """A quarter is ten times as loud: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
     shares, loudness = [0.01, 0.01, 0.01, 0.2] * 100, [1.0, 1.0, 1.0, 10.0] * 100
     sums = spoilt(shares, loudness)
     truth, wrong = np.array(loudness) ** 2, (np.array(shares) * loudness) ** 2

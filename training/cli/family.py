@@ -147,7 +147,7 @@ def evaluate(
         from training.figures.family_errors import family_errors
         from training.figures.style import save_figure
 
-        columns = {column: errors[loaded.name].strings for column, errors in measured.items()}
+        columns: dict[str, Sequence[StringError]] = {c: errors[loaded.name].strings for c, errors in measured.items()}
         save_figure(family_errors(columns, loaded.name), picture)
     if json:
         told_map = {"map": cells} if error_map else {}
