@@ -47,10 +47,9 @@ def test_sounds_and_pictures_are_small() -> None:
 def commands() -> Iterator[tuple[str, list[str]]]:
     """The command lines of all documents: where, and their words after the program's name."""
     for path in DOCUMENTS:
-        for block in re.findall(r"```\n(.*?)```", path.read_text("utf-8"), re.DOTALL):
-            for line in block.splitlines():
-                if line.startswith("python3 run.py -- "):
-                    yield path.name, shlex.split(line.removeprefix("python3 run.py -- "), comments=True)
+        for line in path.read_text("utf-8").splitlines():
+            if line.startswith("python3 run.py -- "):
+                yield path.name, shlex.split(line.removeprefix("python3 run.py -- "), comments=True)
 
 
 def test_commands_and_their_options_exist() -> None:
@@ -129,3 +128,12 @@ def test_notebooks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
             assert not cell["outputs"] and cell["execution_count"] is None, "clear the outputs before committing"
             exec(compile("".join(cell["source"]), f"{path.name}:{cell['id']}", "exec", dont_inherit=True), names)
     assert list(tmp_path.glob("*.png"))
+
+
+def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
+    from training.by_name import load
+
+    (example,) = re.findall(r"```toml\n(.*?)```", text("docs/reproduce.md"), re.DOTALL)
+    path = tmp_path / "my_run.toml"
+    path.write_text(example, encoding="utf-8")
+    assert load(str(path)).model == "koopman_var"
