@@ -1,7 +1,7 @@
 """Draw the pictures of the window without a screen: `PYTHONPATH=. .venv/bin/python docs/images/window.py`.
 
 `window.png`: a model trained on 25 ms after a hard pluck, with the playhead past the training.
-`string.gif`: the string from the pluck on, slowed as under a stroboscope.
+`string.webp`: the string from the pluck on, slowed as under a stroboscope.
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ CHOICES = {
 AT_S = 0.1
 FRAMES, FRAME_MS = 60, 70
 FLASH_S = 1 / 246.9 + 0.00027  # a period of the string and a little more
-COLOURS = 48
 
 
 def main() -> None:
@@ -75,12 +74,8 @@ def _steps(controller: Controller) -> Iterator[None]:
         performance.seek(number * FLASH_S)
         yield
         frames.append(picture(view))
-    sheet = Image.new("RGB", (frames[0].width, 4 * frames[0].height))  # the palette of all frames, of four of them
-    for place, frame in enumerate(frames[:: len(frames) // 4][:4]):
-        sheet.paste(frame, (0, place * frame.height))
-    palette = sheet.quantize(COLOURS)
-    first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    first.save(HERE / "string.gif", save_all=True, append_images=others, duration=FRAME_MS, loop=0, optimize=True)
+    first, *others = frames
+    first.save(HERE / "string.webp", save_all=True, append_images=others, duration=FRAME_MS, loop=0, quality=60)
     window.close()
     yield
 
