@@ -7,7 +7,7 @@
 `data`           data sets, their cache, and batches of them
 `fitting`        losses, the training loop, checkpoints
 `sweeping`       many runs: the plan, its order, the workers
-`tables`         the paper's tables with our results beside them
+`tables`         the paper's tables with our results
 `cli`            its commands, which the app adds to its own
 `figures`        pictures of presets and of runs
 `research`       what models are compared with, and starts that no preset needs to sound

@@ -16,7 +16,7 @@ from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, without_retired, write
 from training.start import BLIND_PURSUIT, PHASES, PURSUIT, starts_of
 
-DIGEST_VERSION = 3  # of the rule by which runs are told apart; see `training.migration`
+DIGEST_VERSION = 3  # of the rule that distinguishes runs; see `training.migration`
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -132,7 +132,7 @@ class TrainingConfiguration:
         try:
             model = read_model_configuration(self.model, self.model_configuration, "model_configuration")
         except SchemaError as error:
-            raise ValueError(str(error)) from error  # whoever reads this knows the file
+            raise ValueError(str(error)) from error  # the reader of the file adds its name
         if model.grid_points != self.data.grid_points:
             raise ValueError(
                 f"model_configuration.grid_points is {model.grid_points}, the data's are {self.data.grid_points}"

@@ -117,7 +117,7 @@ def evaluate_past_horizon(
         trajectories: of the split.
         listen: the listening point, in lengths.
         frames_at_once: of a block; the result does not depend on it.
-        report: is told the share that is done.
+        report: receives the share that is done.
     """
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)

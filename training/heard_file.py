@@ -1,7 +1,7 @@
 """What was heard of presets, in a table beside them: one a line, known by the digest of the preset's file.
 
 So a preset that changes carries no old claim, and a copy keeps its own. The table may come from anywhere: whatever is
-wrong in it is told, and skipped.
+wrong in it is reported, and skipped.
 """
 
 from __future__ import annotations

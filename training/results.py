@@ -40,8 +40,8 @@ class Row:
         rel_mse_400, rel_mae_400: over the first 400 frames, where the horizon reaches so far.
         start_…: of the untrained model, over the validation set; the result is never worse.
         test_…: the same of the test set, which chose neither weights nor recipes.
-        …_se: standard error of a figure by which trajectories are in the split; see `ErrorSums.standard_error`. None
-            in rows of before they were measured; `learned-strings results measure` fills them from a kept preset.
+        …_se: standard error of a figure over the split's trajectories; see `ErrorSums.standard_error`. None
+            in rows older than the measurement; `learned-strings results measure` fills them from a kept preset.
         seconds: of training, what it starts from among it; in rows without start_… the optimiser alone.
         commit: of the code, "" where it is not known.
         finished: UTC, ISO 8601.

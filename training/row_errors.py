@@ -1,4 +1,4 @@
-"""What a row of the results tells of both splits: errors, their standard errors, and the same over 400 frames."""
+"""The figures of both splits in a row of the results: errors, their standard errors, and the same over 400 frames."""
 
 from __future__ import annotations
 

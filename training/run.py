@@ -48,7 +48,7 @@ def _trained(
     report: Callable[[Progress], None],
     checkpoint_every_s: float | None,
 ) -> dict[str, Any]:
-    """Makes the preset `output`, or goes on with the run in `run_folder`; its errors and what it took, as in a row.
+    """Makes the preset `output`, or continues with the run in `run_folder`; its errors and what it took, as in a row.
 
     An epoch is in `run_folder`/log.csv when it is reported; the run ends with a plot, log.png.
 
@@ -112,7 +112,7 @@ def run_row(
     Args:
         name, recipe: as the row shall carry them.
         runs: the run's folder is runs/name: checkpoint, log and its plot, row, and the preset where `preset` is None.
-        waits: is told where another process trains in that folder, whose end is awaited.
+        waits: is called where another process trains in that folder, whose end is awaited.
 
     Raises:
         ValueError, RuntimeError, OSError: see `_trained`.

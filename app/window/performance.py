@@ -222,7 +222,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
-        """Forgets notes that ended, goes on with the loop, and updates the header."""
+        """Forgets notes that ended, continues with the loop, and updates the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._turn()

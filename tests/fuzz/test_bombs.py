@@ -95,7 +95,7 @@ MIDI = {
     "a length without end": midi(b"\x00\xff\x01" + b"\xff" * (2**20 - 40)),
     "a time within a chunk of another name": midi(b"\x00\x90\x3c\x40" + b"\x80" * 9),
     "too many messages": midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * 340_000),
-    "a system message that goes on": midi(b"\x00\xf0\x01\xf7\x00\x05" + b"\xff" * 1000),
+    "a system message that never ends": midi(b"\x00\xf0\x01\xf7\x00\x05" + b"\xff" * 1000),
 }
 
 

@@ -69,7 +69,7 @@ def test_the_truth_has_no_error_to_any_time(data: Dataset) -> None:
     for sums in (found.string, found.sound):
         assert len(sums.per_frame()[0]) == 2100
         assert len(sums.per_trajectory()[0]) == 2
-        assert sums.total().rel_mse < 1e-11  # the model is told float32
+        assert sums.total().rel_mse < 1e-11  # the model receives float32
     assert found.sound.total().null_depth_db < -110
     assert all(spectrum.convergence < 1e-5 for spectrum in found.spectra)
     partials = evaluate_partials(model, data, "test", [(0, HORIZON_S), (HORIZON_S, 0.525)])

@@ -48,7 +48,7 @@ def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> Non
     plain["recipe"] |= {"random_start": False, "koopman_terms": "text"}
     assert read_configuration(plain, "a preset") == now
     plain["recipe"]["random_start"] = True
-    with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it anew"):
+    with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it again"):
         read_configuration(plain, "a preset")
 
 

@@ -30,7 +30,7 @@ LONGEST_PAST_S = 60.0
 FEWEST_PLUCKS = 10  # of a string that none was trained on
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
 TOLD = {
-    "se": "standard error, by which trajectories are drawn (bootstrap)",
+    "se": "standard error over trajectories (bootstrap)",
     "spread": "spread over the trajectories",
     "400": "first 400 frames",
 }
@@ -294,7 +294,7 @@ def _on(preset: Preset, run: str) -> Preset:
     data = load(run).data
     told = replace(preset.info, tension_modulated=data.tension_modulated)
     own = of_string(replace(preset, info=told), data.string, data.rate_hz, data.modes)
-    # the errors that it tells are those of the family
+    # the errors that it reports are those of the family
     info = replace(own.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
     return replace(own, info=replace(info, horizon_steps=data.steps))
 

@@ -94,7 +94,7 @@ def evaluate(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Draw a dot for each string, by rise and inharmonicity: .png, .svg, .pdf.",
+            help="Draw the distribution of errors by rise of tension: .png, .svg, .pdf.",
         ),
     ] = None,
     rate: Rate = 48_000,
@@ -143,10 +143,11 @@ def evaluate(
         if error_map
     ]
     if picture is not None:
-        from training.figures.family_map import family_map
+        from training.figures.family_errors import family_errors
         from training.figures.style import save_figure
 
-        save_figure(family_map(own, loaded.name), picture)
+        columns: dict[str, Sequence[StringError]] = {c: errors[loaded.name].strings for c, errors in measured.items()}
+        save_figure(family_errors(columns, loaded.name), picture)
     if json:
         told_map = {"map": cells} if error_map else {}
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found, **told_map})
@@ -222,7 +223,7 @@ def baseline(
         int | None,
         typer.Option(min=1, max=100_000, help="Strings to learn from; default as studio_any_string."),
     ] = None,
-    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one goes on there.")] = None,
+    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one continues there.")] = None,
     strings: Strings = 40,
     rate: Rate = 48_000,
     seed: Seed = 0,
@@ -230,7 +231,7 @@ def baseline(
 ) -> None:
     """Train and measure a model by others on the same strings.
 
-    A stopped training goes on. It is measured as `evaluate` does, and no preset is written.
+    A stopped training continues. It is measured as `evaluate` does, and no preset is written.
     """
     import torch
 

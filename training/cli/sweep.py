@@ -94,7 +94,7 @@ def sweep(
                 with bars(LINE_EVERY_S) as begin:
                     rows = run(chosen, found, options, Shown(begin, left, found.capacity()))
         except KeyboardInterrupt:
-            say("stopped; the same command goes on")
+            say("stopped; the same command continues")
             raise
     _tell(rows, json)
 

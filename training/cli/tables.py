@@ -1,9 +1,10 @@
-"""table, figure: the results beside the paper's, and figures of presets."""
+"""table, figure: our results with the paper's, and figures of presets."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -13,8 +14,16 @@ from engine.result_file import whole_file
 from training.cli.arguments import check_range, open_preset
 from training.cli.console import Failure, progress, say
 
-figure = typer.Typer(help="Draw figures of presets beside the truth, as PNG, SVG or PDF.", no_args_is_help=True)
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
+    from training.cli.console import Report
+
+figure = typer.Typer(help="Draw figures of presets and the truth, as PNG, SVG or PDF.", no_args_is_help=True)
+
+Output = Annotated[
+    Path | None, typer.Option(help="The file; its suffix gives the format. Default FIGURE.png in this folder.")
+]
 MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
 LISTEN_RANGE = (0.01, 0.99)
 
@@ -26,30 +35,35 @@ def table(
         typer.Option(help="Only runs of this recipe of training/recipes."),
     ] = "all",
     format: Annotated[
-        Literal["markdown", "csv"], typer.Option(help="csv has a line for each cell (tidy data).")
-    ] = "markdown",
-    rows: Annotated[
-        bool, typer.Option("--rows", help="List the runs behind the figures, with the command that repeats each.")
-    ] = False,
+        Literal["compact", "full", "csv"],
+        typer.Option(
+            help="compact and full are Markdown, full with deviations; csv has a line per cell (tidy data)."
+        ),
+    ] = "compact",
+    metric: Annotated[
+        Literal["mse", "mae"], typer.Option(help="Relative error of the compact tables; the others have both.")
+    ] = "mse",
     output: Annotated[Path | None, typer.Option(help="Write to this file instead of standard output.")] = None,
     into: Annotated[
         Path | None,
         typer.Option(metavar="FILE.md", help=f"Replace all that follows the line {MARKER} in this file."),
     ] = None,
 ) -> None:
-    """Print the paper's two tables with our results beside its figures."""
-    if rows and format == "csv":
-        raise typer.BadParameter("is for markdown; in CSV each line names its runs", param_hint="--rows")
+    """Print the paper's two tables with our results."""
     if into is not None and (format == "csv" or output is not None):
-        raise typer.BadParameter("takes Markdown, and goes without --output", param_hint="--into")
+        raise typer.BadParameter("takes Markdown and excludes --output", param_hint="--into")
     from training.results import RESULTS, read_results
+    from training.tables.compact import as_compact
     from training.tables.markdown import as_markdown
     from training.tables.tidy_csv import as_csv
 
     found = read_results(results or RESULTS)
     if not found:
         say(f"note: {results or RESULTS} has no rows; the tables hold the paper's figures only")
-    text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe, listing=rows)
+    if format == "compact":
+        text = as_compact(found, recipe, f"rel_{metric}")
+    else:
+        text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe)
     if into is not None:
         text, output = _before(into) + text, into
     if output is None:
@@ -83,28 +97,47 @@ def extrapolation(
     listen: Annotated[
         float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
     ] = DEFAULT_LISTEN,
-    output: Annotated[
-        Path | None,
-        typer.Option(help="The file; its suffix gives the format. Default extrapolation.png in this folder."),
-    ] = None,
+    output: Output = None,
 ) -> None:
     """Figure 3 of the paper: past the training horizon.
 
     Waveforms, spectra and errors, up to the horizon and past it.
     """
     from training.figures import extrapolation as drawing
-    from training.figures.style import check_format, figure_bytes
 
     check_range("--listen", listen, *LISTEN_RANGE)
     if seconds is not None:
         check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    path = output or Path("extrapolation.png")
+    loaded = [open_preset(name) for name in presets]
+    _save(
+        output,
+        "extrapolation",
+        lambda report: drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report),
+    )
+
+
+@figure.command()
+def ratios(
+    results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
+    metric: Annotated[Literal["mse", "mae"], typer.Option(help="Relative error.")] = "mae",
+    output: Output = None,
+) -> None:
+    """Heat map of our errors over the paper's."""
+    from training.figures.ratios import ratios as drawing
+    from training.results import RESULTS, read_results
+
+    rows = read_results(results or RESULTS)
+    _save(output, "ratios", lambda report: drawing(rows, f"rel_{metric}"))
+
+
+def _save(output: Path | None, kind: str, draw: Callable[[Report], Figure]) -> None:
+    from training.figures.style import check_format, figure_bytes
+
+    path = output or Path(f"{kind}.png")
     try:
         check_format(path)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--output") from error
-    loaded = [open_preset(name) for name in presets]
-    with whole_file(path) as file, progress("figure extrapolation") as report:
-        drawn = drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report)
-        file.write(figure_bytes(drawn, path.suffix))
+    with whole_file(path) as file, progress(f"figure {kind}") as report:
+        file.write(figure_bytes(draw(report), path.suffix))
     print(path)

@@ -102,7 +102,7 @@ def train(
                 preset=file,
             )
     except KeyboardInterrupt:
-        say(f"stopped; the same command goes on with {folder / name}")
+        say(f"stopped; the same command continues with {folder / name}")
         raise
     if row.status != "done":
         raise Failure(f"{name}: {row.message}")

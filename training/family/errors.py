@@ -32,7 +32,7 @@ class StringError:
     Attributes:
         rel_mse: relative squared error over the grid.
         processor_s: for a second of the whole string's motion.
-        sounds: whether the string still moves, as far as `UNHEARD` tells.
+        sounds: whether the string still moves, by the limit `UNHEARD`.
     """
 
     pitch_hz: float

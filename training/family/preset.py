@@ -27,7 +27,7 @@ class FamilyConfiguration:
     """What a run is, all of it.
 
     Attributes:
-        string: that the preset plays unless told, with `modes`.
+        string: that the preset plays by default, with `modes`.
         strings, validation_strings, test_strings: how many of each split.
         seconds: of each string's motion.
         steps: of the fit; the first reaches `first_s` of the motion.
@@ -73,7 +73,7 @@ def train_preset(
     """Makes the preset's file, in some minutes.
 
     Args:
-        made: is told the share of the true motions that are there.
+        made: receives the share of the true motions that are there.
     """
     c, started = configuration, time.monotonic()
     steps = round(c.seconds * c.rate_hz)

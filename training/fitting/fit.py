@@ -42,7 +42,7 @@ class Diverged(RuntimeError):
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: told at the end of every epoch, and within long ones.
+    """How far a run is: reported at the end of every epoch, and within long ones.
 
     Attributes:
         step, steps: optimiser's steps, done and in all.
@@ -95,7 +95,7 @@ def fit(
     report: Callable[[Progress], None] = lambda progress: None,
     checkpoint_every_s: float | None = None,
 ) -> FitResult:
-    """Trains, or goes on with the run in `run_folder`; what has a closed form (DMD) is computed at once.
+    """Trains, or continues with the run in `run_folder`; what has a closed form (DMD) is computed at once.
 
     Args:
         report: called after every epoch, and every few seconds within.
@@ -240,7 +240,7 @@ class _Run:
             self._average.update_parameters(model)
 
     def _descend(self, loss: Tensor, error: Tensor) -> None:
-        """A step of the optimiser against `loss`; `error` is what is told."""
+        """A step of the optimiser against `loss`; `error` is reported."""
         self._optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self._model.parameters(), self._recipe.clip_norm)
@@ -375,7 +375,7 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
 
 
 def _keep_statistics(model: torch.nn.Module) -> None:
-    """Batch norm divides by what it has stored: a batch of loud strings is then told from one of soft ones."""
+    """Batch norm divides by what it has stored: a batch of loud strings then differs from one of soft ones."""
     for module in model.modules():
         if isinstance(module, BatchNorm1d):
             module.eval()

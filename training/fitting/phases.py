@@ -29,7 +29,7 @@ from training.research.fourier_wiring import store_in_fgru, store_in_frnn
 FIRST_FRAMES = 12
 MORE_FRAMES = 1.4  # times as many in each further fit
 SAMPLES = 10_000  # of all motions' frames, which a fit sees
-EVALUATIONS = 12  # of a fit, at most: the next one goes on from there
+EVALUATIONS = 12  # of a fit, at most: the next one continues from there
 
 Floats = NDArray[np.float64]
 

@@ -142,7 +142,7 @@ def test_an_interrupted_sweep_goes_on(run, words: list[Any], tmp_path: Path, scr
     script(interrupted)
     found = run(*words)
     assert found.status == 130
-    assert "stopped; the same command goes on" in found.err
+    assert "stopped; the same command continues" in found.err
     begun = []
     script(lambda name: begun.append(name) or row_of(name))
     assert run(*words).status == 0

@@ -140,7 +140,7 @@ def test_a_map_has_every_string_once() -> None:
 
 
 def test_a_string_that_has_fallen_silent_says_so() -> None:
-    """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all that is told."""
+    """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all there is."""
     players = {"linear": players_of_physics.linear_string}
     early, late = (
         family_errors.measure(players, "inside", "test", 3, 8_000, seconds)["linear"].strings

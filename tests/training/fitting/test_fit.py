@@ -52,7 +52,7 @@ def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, 
     horizon = 40 if model not in ("fgru", "frnn") else 12  # they take every frame one after the other
     configuration = small(model, recipe, horizon, epochs=6, patience=0, first_horizon=horizon // 2)
     found = fit(configuration, small_dataset, runs, report=seen.append)
-    seen = [p for p in seen if p.ends_epoch]  # a slow machine tells more
+    seen = [p for p in seen if p.ends_epoch]  # a slow machine reports more
     assert [p.epoch for p in seen] == [1, 2, 3, 4, 5, 6]
     assert seen[-1].loss < seen[0].loss or seen[-1].horizon > seen[0].horizon
     assert math.isfinite(found.validation.total().rel_mae)
@@ -133,7 +133,7 @@ def check_cuts(configuration: TrainingConfiguration, small_dataset: Dataset, run
 
         return report
 
-    for epoch in (2, 3):  # the second cut goes on from the first one's checkpoint
+    for epoch in (2, 3):  # the second cut continues from the first one's checkpoint
         with pytest.raises(KeyboardInterrupt):
             fit(configuration, small_dataset, runs / "cut", report=cut_after(epoch), checkpoint_every_s=-1)
     cut = fit(configuration, small_dataset, runs / "cut", checkpoint_every_s=-1)

@@ -22,7 +22,7 @@ MEASURED = [name for name in Row.__dataclass_fields__ if name not in ("seconds",
 
 
 class Record(Watch):
-    """Keeps what it is told."""
+    """Keeps what is reported."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
@@ -197,7 +197,7 @@ class Killer(Record):
         super().__init__()
         self._runs = runs
         self.victim = ""
-        self.resumed_at = 0  # the first epoch that is told after that
+        self.resumed_at = 0  # the first epoch that is reported after that
         self._pid = 0
 
     def progressed(self, event: Progressed) -> None:
