@@ -13,7 +13,7 @@ from training.cli.console import Failure, print_json, print_table, progress, say
 
 Instrument = Literal["guitar", "bass", "harp", "piano"]
 InstrumentOption = Annotated[Instrument, typer.Option(help="What it was: for what a sound does not give.")]
-Anyway = Annotated[bool, typer.Option("--anyway", help="Go on where the recording does not look like one note.")]
+Anyway = Annotated[bool, typer.Option("--anyway", help="Continue where the recording does not look like one note.")]
 
 
 def learn(
@@ -79,7 +79,7 @@ def judge(
 ) -> None:
     """Print how well a folder's recordings are learned: own note, baselines, unseen half, takes, gate.
 
-    Takes are told by their names: files whose names differ in the last letter alone are takes of one note.
+    Names show takes: files whose names differ in the last letter alone are takes of one note.
     """
     from app.audio.note_file import NoteFileError, read_note
     from training.recording.coverage import FIRST_SEED, coverage

@@ -1,6 +1,6 @@
 """Whether a recording is one note of a string, with reasons in words and what to do.
 
-Each check is one function of what is heard; all are made, so that a musician reads every reason at once.
+Each check is one function of the sound; all are made, so that a musician reads every reason at once.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def learn(
 
     Args:
         samples: (frames,) or (frames, channels), ±1 being full scale.
-        anyway: whether it goes on where the gate refuses.
+        anyway: whether it continues where the gate refuses.
         progress: is called with the share that is done; may raise, to cancel.
 
     Raises:

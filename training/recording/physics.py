@@ -76,7 +76,7 @@ class Physics:
         f0_hz, stiffness: with standard errors.
         partials: ascending.
         smooth_hz, smooth_decay: σ over frequency, a curve through all partials.
-        rise: the share by which the glide lifts all frequencies when the fit begins: the product of the tension's
+        rise: share that the glide adds to all frequencies when the fit begins: the product of the tension's
             coupling and the squared amplitude, which a sound cannot take apart.
     """
 
