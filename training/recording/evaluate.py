@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
+from scipy import interpolate, optimize, signal
 
 from training.recording.fit import LearnedNote, fit_note
 from training.recording.gate import examine
@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Recordings = Mapping[str, tuple[Array, int]]
 
 HALF_S = 1.25
+COARSE_HZ = 8_000  # takes are compared below 4 kHz
 MOST_PITCH = 0.006  # that another take may be higher or lower, as a share
 MOST_DELAY_S = 0.012
 
@@ -107,22 +108,22 @@ def _takes(first: tuple[Note, LearnedNote], second: tuple[Note, LearnedNote], va
     (note, learned), (other, _) = first, second
     if note.rate_hz != other.rate_hz:
         return
-    truth = other.fitted()
-    own = note.fitted()
-    count = min(len(truth), len(own))
-    t = np.arange(count) / note.rate_hz
+    truth, own = other.fitted(), note.fitted()
+    truth = truth[: len(own)]
+    step = max(1, note.rate_hz // COARSE_HZ)
+    rate = note.rate_hz / step
     begins = note.onset / note.rate_hz + FIT_BEGINS_S
-    whole = np.arange(len(note.samples)) / note.rate_hz - begins
-    _append(
-        values,
-        "take against take, ESR",
-        _held_out(truth[:count], lambda at: np.interp(at, whole, note.samples), t, note.rate_hz),
+    truth, samples = (
+        signal.decimate(each, step, ftype="fir") if step > 1 else each for each in (truth, note.samples)
     )
-    _append(values, "held-out take, ESR", _held_out(truth[:count], learned.render, t, note.rate_hz))
-    _append(values, "held-out take, amplitudes refitted, ESR", _refitted(truth[:count], learned, t))
+    t, whole = np.arange(len(truth)) / rate, np.arange(len(samples)) / rate - begins
+    take = interpolate.CubicSpline(whole, samples)
+    _append(values, "take against take, ESR", _held_out(truth, take, t, rate))
+    _append(values, "held-out take, ESR", _held_out(truth, learned.render, t, rate))
+    _append(values, "held-out take, amplitudes refitted, ESR", _refitted(truth, learned, t))
 
 
-def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: int) -> float:
+def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: float) -> float:
     """The least ESR over one pitch, one gain and one delay."""
 
     def left(pitch: float) -> float:
@@ -136,7 +137,7 @@ def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: 
             delay += more
         return best
 
-    grid = np.linspace(-MOST_PITCH, MOST_PITCH, 25)
+    grid = np.linspace(-MOST_PITCH, MOST_PITCH, 21)
     place = min(grid, key=left)
     step = float(grid[1] - grid[0])
     found = optimize.minimize_scalar(
@@ -147,12 +148,6 @@ def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: 
 
 def _refitted(truth: Array, learned: LearnedNote, t: Array) -> float:
     """The least ESR over one pitch and all amplitudes: poles alone carry over."""
-    rate_step = max(1, int(1 / (t[1] - t[0]) // 8_000))
-    from scipy import signal
-
-    short = signal.decimate(truth, rate_step, ftype="fir") if rate_step > 1 else truth
-    t = t[::rate_step][: len(short)]
-    short = short[: len(t)]
 
     def left(pitch: float) -> float:
         tau = learned.glide.tau(t)
@@ -164,8 +159,8 @@ def _refitted(truth: Array, learned: LearnedNote, t: Array) -> float:
         matrix = np.stack(columns, 1)
         square = matrix.T @ matrix
         square[np.diag_indices_from(square)] *= 1 + 1e-6
-        right = matrix.T @ short
-        return float(short @ short - right @ np.linalg.solve(square, right))
+        right = matrix.T @ truth
+        return float(truth @ truth - right @ np.linalg.solve(square, right))
 
     grid = np.linspace(-0.003, 0.003, 7)
     place = min(grid, key=left)
@@ -173,7 +168,7 @@ def _refitted(truth: Array, learned: LearnedNote, t: Array) -> float:
     found = optimize.minimize_scalar(
         left, bounds=(place - step, place + step), method="bounded", options={"xatol": 1e-5, "maxiter": 8}
     )
-    return float(max(0.0, min(found.fun, left(place))) / max(float(short @ short), 1e-30))
+    return float(max(0.0, min(found.fun, left(place))) / max(float(truth @ truth), 1e-30))
 
 
 def _append(values: dict[str, list[float]], name: str, value: float) -> None:
