@@ -20,7 +20,7 @@ from training.recording.refine import Fit, real_rows
 Array = NDArray[np.float64]
 
 FACTORS = {"cents": 28.0, "decay": 13.0, "level_db": 18.0}  # of the standard error, for 95 %
-FLOORS = {"cents": 3.7, "decay": 0.034, "level_db": 0.35}  # cents; a share; dB: of notes without noise
+FLOORS = {"cents": 4.2, "decay": 0.034, "level_db": 0.3}  # cents; a share; dB: of notes without noise
 DRAWS = 400
 
 
