@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
+from app.patches.instrument import SingleString
 from app.patches.patch import PhysicalString
 from app.presets.library import list_presets
 from app.session.choices import Choices
@@ -164,7 +165,9 @@ def test_a_batch_plays_the_string_where_all_presets_can(qtbot: QtBot, preset_fol
 
     def dialog(*presets: str) -> ExportDialog:
         export = ExportChoices.model_validate({"batch": {"presets": presets}})
-        made = ExportDialog(entries, Choices(preset="studio_any_string", string=string), export)
+        made = ExportDialog(
+            entries, Choices(instrument=SingleString(preset="studio_any_string"), string=string), export
+        )
         qtbot.addWidget(made)
         return made
 
