@@ -82,16 +82,16 @@ class InstrumentPlayer:
             raise ValueError(
                 f"{preset.path}: it knows one string only; choose a preset of many, as studio_any_string"
             )
-        self._grid_points = preset.model.configuration.grid_points
+        self.grid_points = preset.model.configuration.grid_points
         self._sources = tuple(gains)
         self._programs = programs_of(preset.model, rate_hz, self._sources)
         self._lock = threading.Lock()
         self._serial = self._instrument = 0
-        self._table: Table | None = None
-        self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self._grid_points - 2), most_notes)
+        self.table: Table | None = None
+        self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self.grid_points - 2), most_notes)
         self.compiled.set_source_gains(gains.values())
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        self._loud = LoudKeys(patch, heard, self._grid_points)
+        self._loud = LoudKeys(patch, heard, self.grid_points)
         self.take(self._loud)
 
     # What is played
@@ -148,7 +148,7 @@ class InstrumentPlayer:
             ValueError: the tuning is impossible.
         """
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        return LoudKeys(patch, heard, self._grid_points, self._loud if nearly else None)
+        return LoudKeys(patch, heard, self.grid_points, self._loud if nearly else None)
 
     def take(self, loud: LoudKeys, frame: int = 0) -> None:
         """Plays these keys from a frame on; strings that ring glide to them.
@@ -156,17 +156,17 @@ class InstrumentPlayer:
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
         with self._lock:
-            before = self._table
+            before = self.table
             if before is None or is_another(loud.patch, self._loud.patch):
                 self._instrument += 1
             self._serial += 1
-            self._loud, self._table = (
+            self._loud, self.table = (
                 loud,
                 table_of(
-                    loud, self._grid_points, self._sources, self._programs, self._serial, self._instrument, before
+                    loud, self.grid_points, self._sources, self._programs, self._serial, self._instrument, before
                 ),
             )
-            self.compiled.take(self._table, frame)
+            self.compiled.take(self.table, frame)
 
     def prepare(self, keys: Sequence[int] | None = None) -> None:
         """Computes the gains of keys, so that a strike need not. None: all keys of the patch."""
@@ -179,7 +179,7 @@ class InstrumentPlayer:
                     continue  # raised again when it is struck
 
     def _fill(self, key: int, string: int | None) -> None:
-        table, loud = self._table, self._loud
+        table, loud = self.table, self._loud
         assert table is not None
         fill_gain(table, loud, key, string)
 

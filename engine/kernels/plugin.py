@@ -30,7 +30,7 @@ def render(mixer_at: int, frames: int, out_at: int) -> None:
 @njit(**COMPILED)
 def begin(player_at: int) -> None:
     """Puts the wheels and pedals of a new player at rest."""
-    player.begin(carray(pointer(player_at), (1 << 40,), np.float64))
+    player.begin(player_at)
 
 
 @njit(**COMPILED)

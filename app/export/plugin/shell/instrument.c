@@ -172,6 +172,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   mixer[M_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
   const double *taps = (const double *)of + of->taps;
   for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
+  mixer[M_HERE].whole = number_of(mixer);
   mixer[M_PLAYER].whole = number_of(player);
   own->model[S_RATE].real = own->truth[T_RATE].real = rate_hz;
   own->table[TABLE_PROGRAMS].whole = number_of(own->model);
@@ -311,6 +312,7 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
   unsigned int before = _mm_getcsr();
   _mm_setcsr(before | 0x8040); /* denormal numbers are zero */
 #endif
+  own->mixer[M_PEAK].real = 0; /* of what is rendered now */
   float *block = (float *)own->scratch;
   for (uint32_t done = 0; done < frames;) {
     int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;

@@ -341,9 +341,9 @@ class Instance:
         return out.T.copy()
 
     def render(self, frames: int, events: Sequence[Event], block: int = 512) -> NDArray[np.float32]:
-        """A piece from its beginning, (frames, 2), in blocks."""
-        ordered, blocks = sorted(events, key=lambda event: event.frame), []
-        first = self.frame
+        """A piece, (frames, 2), in blocks; frames of events count from its beginning, which is now."""
+        first, blocks = self.frame, []
+        ordered = sorted((Event(first + each.frame, each.content) for each in events), key=lambda event: event.frame)
         while self.frame < first + frames:
             count = min(block, first + frames - self.frame)
             due = [event for event in ordered if self.frame <= event.frame < self.frame + count]
