@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.instrument import events
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
 from app.patches.patch import Patch
@@ -186,7 +186,7 @@ class InstrumentPlayer:
     # Events
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
-        """Hands an event over; its number, which the reports of a note carry.
+        """Hands an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at
@@ -198,6 +198,8 @@ class InstrumentPlayer:
         """
         if isinstance(event, PatchTurned):
             self.take(self.loud_keys(event.patch), frame)
+            return 0
+        if isinstance(event, PluckAt):
             return 0
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._make_ready(event)
