@@ -10,7 +10,6 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from engine.schema import write
 from training.provenance import now
@@ -55,8 +54,8 @@ class Options:
         )
 
 
-class Watch(Protocol):
-    """Receives what happens in a sweep."""
+class Watch:
+    """Receives what happens in a sweep, and shows nothing of it."""
 
     def started(self, run: Run) -> None:
         """A run was handed to the workers."""
@@ -69,10 +68,6 @@ class Watch(Protocol):
 
     def finished(self, row: Row) -> None:
         """A run has ended, and its row is in the results file."""
-
-
-class Unwatched(Watch):
-    """Shows nothing."""
 
 
 def group_of(plan: Plan) -> str:
@@ -107,7 +102,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = 
             runs' folders too.
         WorkersError: the workers are gone.
     """
-    watch = watch or Unwatched()
+    watch = watch or Watch()
     file = options.results or results_of(plan, options.runs)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(unfinished(plan, rows.values()))

@@ -150,6 +150,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     player.prepare()
     table = player.table
+    assert table is not None
     header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2))
     header.most_notes = MOST_NOTES
     parts = bytearray(bytes(header))
@@ -263,7 +264,8 @@ def layout_header(version: str) -> str:
     wanted = {
         at: "QUANTUM AHEAD EARLY WINDOW REACH MIXER_SLOTS M_RATE M_FRAMES M_ACTIVE M_WANTED_VOLUME M_VOLUME "
         "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS M_PLAYER M_TAPS "
-        "M_GAINS M_HERE I_HEADER C_CAPACITY C_FADE_WINDOWS C_AWAKE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
+        "M_GAINS M_HERE I_HEADER C_CAPACITY C_FADE_WINDOWS C_AWAKE C_STEP C_COSINES C_SINES C_WORK "
+        "C_LATE S_RATE T_RATE",
         of: "NOTE_ON NOTE_OFF BEND CONTROLLER PARAMETER TABLE EVENT_FRAME EVENT_KIND EVENT_CHANNEL EVENT_KEY "
         "EVENT_VALUE EVENT_ID EVENT_POSITION EVENT_PITCH_HZ EVENT_TABLE EVENT_SLOTS EVENTS REPORTS MOST_NOTES "
         "MOST_SOURCES TABLE_MODE TABLE_POINT TABLE_SOURCES TABLE_PROGRAMS MPE KEYS CHANNELS CHANNEL_SLOTS "
