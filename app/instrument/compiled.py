@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.instrument import events
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
 from app.patches.patch import Patch
@@ -56,7 +56,10 @@ def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
 
 
 class InstrumentPlayer:
-    """Plays one patch. Every public method may be called from any thread.
+    """Plays one patch, as `Player` does, but with the mixer's next quantum; what began is reported then.
+
+    Every public method may be called from any thread. Strings that ring follow a patch that is taken without a word.
+    A mixer of another rate needs another player.
 
     Args:
         preset: a preset of many strings.
@@ -111,7 +114,7 @@ class InstrumentPlayer:
         return wheeled(self.patch, self.compiled.wheel[0], "body.", "room.")
 
     @property
-    def controllers(self) -> list[Event]:
+    def at_hand(self) -> list[Event]:
         """The events that bring wheels and pedals of a new player where they stand."""
         found: list[Event] = []
         for number in range(of.CHANNELS):
@@ -186,7 +189,7 @@ class InstrumentPlayer:
     # Events
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
-        """Hands an event over; its number, which the reports of a note carry.
+        """Hands an event over; its number, which the reports of a note carry. 0: of none that is played by keys.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at
@@ -198,6 +201,8 @@ class InstrumentPlayer:
         """
         if isinstance(event, PatchTurned):
             self.take(self.loud_keys(event.patch), frame)
+            return 0
+        if isinstance(event, PluckAt):
             return 0
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._make_ready(event)
