@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 import numpy as np
@@ -252,6 +253,23 @@ def test_more_events_than_the_ring_holds_are_played_later(shipped: dict[str, Pat
         _ = stage.player.compiled.waiting
     assert stage.player.compiled.waiting == 0
     assert stage.player.compiled.channel(0).bend == (count - 1) / count
+
+
+def test_threads_may_give_events_while_the_mixer_plays(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    count = 1500
+
+    def give(channel: int) -> None:
+        for number in range(count):
+            stage.player.handle(Bend((number + 1) / count, channel))
+
+    threads = [threading.Thread(target=give, args=(channel,)) for channel in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads) or stage.player.compiled.waiting:
+        quantum(stage.mixer)
+    assert [stage.player.compiled.channel(channel).bend for channel in range(5)] == [1, 1, 1, 1, 0]
+    assert int(stage.player.compiled.memory.view(np.int64)[of.PLAYER_TAKEN]) == 4 * count + 1
 
 
 def test_the_same_events_give_the_same_samples(shipped: dict[str, Patch], preset: Preset) -> None:
