@@ -58,7 +58,7 @@ def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
 class InstrumentPlayer:
     """Plays one patch, as `Player` does, but with the mixer's next quantum; what began is reported then.
 
-    Every public method may be called from any thread. Strings that ring follow a patch that is taken without a word.
+    Every public method may be called from any thread. Strings that ring follow a patch that is taken.
     A mixer of another rate needs another player.
 
     Args:
@@ -189,7 +189,7 @@ class InstrumentPlayer:
     # Events
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
-        """Hands an event over; its number, which the reports of a note carry. 0: of none that is played by keys.
+        """Hands an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at

@@ -67,7 +67,7 @@ class LoudKeys:
         low, high = self.patch.range
         peaks_db = []
         for key in {low + round(share * (high - low)) for share in LOOKED_AT}:
-            with contextlib.suppress(ValueError):  # told when it is struck
+            with contextlib.suppress(ValueError):  # reported when it is struck
                 if (found := self._alone(key)) is not None:
                     pluck = self._pluck(found.string)
                     peak = peak_db(found.resonator, pluck, self._whole, self._response)

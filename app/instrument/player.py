@@ -464,7 +464,7 @@ class Player:
         return struck.string if self._patch.mode == "guitar" else None
 
     def _ratio(self, struck: Struck) -> float:
-        """The factor by which pitch wheels raise its frequency."""
+        """The factor of pitch wheels on its frequency."""
         return float(2 ** (self._hands.semitones(self._patch, struck.event.channel) / 12))
 
     def _pluck(self, event: NoteOn) -> Pluck:

@@ -118,7 +118,7 @@ def _sounds(players: np.ndarray, note: int) -> bool:
 
 @njit(**COMPILED)
 def _rest(player: np.ndarray, players: np.ndarray, number: int, pedal: int, plays: int) -> None:
-    """A channel as if nobody had moved anything on it, but for these."""
+    """A channel as if nobody had moved anything on it, except for these."""
     channel = _channel(number)
     player[channel + of.CHANNEL_BEND] = 0.0
     player[channel + of.CHANNEL_RANGE] = -1.0
@@ -379,7 +379,7 @@ def _make_voice(
     velocity: int,
     highest_m: float,
 ) -> None:
-    """A voice of the modes of a note's own string, which is let go at the amplitudes of `_pull`: as `Voice`."""
+    """A voice of the modes of a note's own string, which is released at the amplitudes of `_pull`: as `Voice`."""
     voice, counts, rate_hz, n = _at(address), _whole(address), player[of.PLAYER_RATE], players[note + of.NOTE_MODES]
     for slot in range(at.state(n) + at.TRUTH_ROWS * n):
         voice[slot] = 0.0
@@ -400,7 +400,7 @@ def _make_voice(
 
 @njit(inline="always", **COMPILED)
 def _release(address: int, frames: int) -> None:
-    """Lets a voice fade out; a release under way goes on."""
+    """Lets a voice fade out; a release under way continues."""
     counts = _whole(address)
     if counts[at.RELEASE] == 0:
         counts[at.RELEASE] = frames
@@ -641,7 +641,7 @@ def _take_out(mixers: np.ndarray, address: int) -> None:
 
 @njit(**COMPILED)
 def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: int, before: int) -> None:
-    """A note has the string of the one before, which is stopped, or whose motion goes on in it."""
+    """A note has the string of the one before, which is stopped, or whose motion continues in it."""
     stops = _frames(player, PLUCK_STOPS_S)
     for source in range(of.MOST_SOURCES):
         address, other = players[note + of.NOTE_VOICES + source], players[before + of.NOTE_VOICES + source]
@@ -942,7 +942,7 @@ def _cancel(player: np.ndarray, players: np.ndarray, now: int) -> None:
 
 @njit(**COMPILED)
 def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: int) -> None:
-    """Plays an event now. Those of a player without a table do nothing, but for a note, which is refused."""
+    """Plays an event now. Those of a player without a table do nothing, except for a note, which is refused."""
     kind, frame, now = players[event + of.EVENT_KIND], players[event + of.EVENT_FRAME], mixers[at.M_FRAMES]
     channel, key = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
     value, address = player[event + of.EVENT_VALUE], players[of.PLAYER_TABLE]

@@ -1,7 +1,7 @@
 """The string of a key and how a bend, a slide, a damper or a knob changes it, in closed form.
 
 A string is a row of eight numbers, the fields of `StringParameters`. Pitch is that of the first partial of a quiet
-pluck, √(ω₁² - σ₁²)/2π. Without fast mathematics: whoever computes a string again finds the same numbers.
+pluck, √(ω₁² - σ₁²)/2π. Without fast mathematics: computing a string again gives the same numbers.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Ear:
         return FULL_SCALE_M if self.pickup == "displacement" else FULL_SCALE_M_S
 
     def weights(self, grid_points: int) -> Tensor:
-        """float64 (grid_points, points): displacement @ weights is what is heard; 0 for a mode beyond the grid."""
+        """float64 (grid_points, points): displacement @ weights is the signal; 0 for a mode beyond the grid."""
         return _weights(self.points, self.solo, grid_points)
 
     def is_on_node(self, point: float) -> bool:

@@ -32,7 +32,7 @@ from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
-HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
+HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 
 Array = NDArray[np.float64]
@@ -339,7 +339,7 @@ def _flat(layer: nn.Linear) -> NDArray[np.float32]:
 def _packed(
     header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, Tensor | NDArray[np.generic]]
 ) -> Array:
-    """One array of a header and its parts, whose places the header tells."""
+    """One array of a header and its parts, whose places the header gives."""
     arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
     header = _header(header_slots, reals, wholes)
     memory = np.concatenate([header, np.zeros(sum(len(array) for array in arrays))])

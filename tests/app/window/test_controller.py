@@ -1,4 +1,4 @@
-"""The window as a whole, both directions: gestures change the session, the session changes what is seen."""
+"""The window as a whole, both directions: gestures change the session, the session changes the view."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def view(controller: Controller, key: str) -> Any:
 
 
 def notes(controller: Controller) -> list[Note]:
-    """Those that are heard and have not been told to end, the oldest first."""
+    """Those that are heard and have not been asked to end, the oldest first."""
     return [note for note in controller.performance.notes._notes if not note.over and not note.released]
 
 

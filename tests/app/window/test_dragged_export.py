@@ -1,4 +1,4 @@
-"""A drag from the export button: the file is the dialog's, told where it cannot be made, and gone at the end."""
+"""A drag from the export button: the file is the dialog's, reported where it cannot be made, and gone at the end."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def set_to(controller: Controller, **export: object) -> None:
 
 
 def drag(qtbot: QtBot, controller: Controller, until: str = "rendered") -> None:
-    """From the button, let go once the files are taken, or a notice is told."""
+    """From the button, released once the files are taken, or a notice is shown."""
     button = controller.window.transport.export
     ended: list[None] = []
     button.drag_ended.connect(lambda: ended.append(None))

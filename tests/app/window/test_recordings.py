@@ -24,7 +24,7 @@ from app.window.controller import Controller
 
 
 class Told:
-    """What the user is told, and answers to the question for a file: paths, and "" for Cancel."""
+    """The notices to the user, and the answers to the question for a file: paths, and "" for Cancel."""
 
     def __init__(self, played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
         self.errors: list[str] = []
@@ -140,7 +140,7 @@ def test_it_is_recorded_as_it_is_heard(
     for turn in (lambda: None, getattr(played.window.transport, button).click):
         turn()
         played.patches.recordings.record()
-        played.window.instrument.pressed.emit(60, 100)  # and held: when it is let go would differ
+        played.window.instrument.pressed.emit(60, 100)  # and held: when it is released would differ
         played.patches.recordings.record()
         played.window.instrument.released.emit(60)
     qtbot.waitUntil(lambda: len(told.good) == 2)
