@@ -56,7 +56,10 @@ def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
 
 
 class InstrumentPlayer:
-    """Plays one patch. Every public method may be called from any thread.
+    """Plays one patch, as `Player` does, but with the mixer's next quantum; what began is reported then.
+
+    Every public method may be called from any thread. Strings that ring follow a patch that is taken.
+    A mixer of another rate needs another player.
 
     Args:
         preset: a preset of many strings.
@@ -111,7 +114,7 @@ class InstrumentPlayer:
         return wheeled(self.patch, self.compiled.wheel[0], "body.", "room.")
 
     @property
-    def controllers(self) -> list[Event]:
+    def at_hand(self) -> list[Event]:
         """The events that bring wheels and pedals of a new player where they stand."""
         found: list[Event] = []
         for number in range(of.CHANNELS):
