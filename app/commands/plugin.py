@@ -42,7 +42,7 @@ def plugin(
     from training.cli.arguments import open_preset
 
     if install and (out is not None or target != "this"):
-        raise typer.BadParameter("puts the plug-in of this system in its own place; leave out --out and --for")
+        raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
     try:
         if instruments == [ALL]:
             chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]

@@ -10,6 +10,7 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from engine.schema import write
 from training.provenance import now
@@ -54,8 +55,8 @@ class Options:
         )
 
 
-class Watch:
-    """Receives what happens in a sweep, and shows nothing of it."""
+class Watch(Protocol):
+    """Receives what happens in a sweep."""
 
     def started(self, run: Run) -> None:
         """A run was handed to the workers."""
@@ -68,6 +69,22 @@ class Watch:
 
     def finished(self, row: Row) -> None:
         """A run has ended, and its row is in the results file."""
+
+
+class Unwatched:
+    """Shows nothing."""
+
+    def started(self, run: Run) -> None:
+        pass
+
+    def progressed(self, event: Progressed) -> None:
+        pass
+
+    def noted(self, event: Noted) -> None:
+        pass
+
+    def finished(self, row: Row) -> None:
+        pass
 
 
 def group_of(plan: Plan) -> str:
@@ -102,7 +119,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = 
             runs' folders too.
         WorkersError: the workers are gone.
     """
-    watch = watch or Watch()
+    watch = watch or Unwatched()
     file = options.results or results_of(plan, options.runs)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(unfinished(plan, rows.values()))

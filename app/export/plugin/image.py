@@ -1,6 +1,6 @@
 """An instrument as one block of bytes, and the header from which the shell has all places in memory.
 
-What is heard of an instrument is in it: the table of its keys with their gains, the model's and the solver's
+It holds the sound of an instrument: the table of its keys with their gains, the model's and the solver's
 programs, impulse responses of its body and room at several rates, its macros and parameters. Nothing depends on the
 rate but the responses: the shell sets it when the host does.
 """

@@ -142,7 +142,7 @@ def test_the_source_may_be_the_truth_or_the_difference(bank: Library) -> None:
         instance.activate(48_000)
         sound = played(instance, patch, 48_000)
         other = rendered(patch, 48_000, source)
-        if source == "difference":  # of the strings alone; where the body is, it is of what is heard through it
+        if source == "difference":  # model and truth differ less than any ear can find
             assert float(np.abs(sound).max()) < 1e-3
         else:
             assert difference_db(sound, other) < EQUAL_DB
@@ -180,7 +180,7 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
     moved = {name for name, each in instance.parameters.items() if instance.value(each.id) != before[name]}
     assert macro.name in moved
     assert len(moved) > 1
-    assert instance.callbacks == 1  # the host is told that other parameters have moved
+    assert instance.callbacks == 1  # the host must read the other parameters again
     state, sound = instance.save(), played(instance, patch, 48_000)
     for reload in (False, True):  # before it is activated, and while it plays
         other = bank.create(next(id for id, name in bank.plugins.items() if name == patch.name))
