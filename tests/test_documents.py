@@ -131,7 +131,7 @@ def test_notebooks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
-    from training.by_name import load
+    from training.cell import load
 
     (example,) = re.findall(r"```toml\n(.*?)```", text("docs/reproduce.md"), re.DOTALL)
     path = tmp_path / "my_run.toml"

@@ -207,7 +207,7 @@ def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
 
 
 def _with_start(recipe: dict[str, Any]) -> dict[str, Any]:
-    """A recipe of before starts had one name: `blind` and `latent_epochs` told which it was."""
+    """An earlier recipe with its start by name; before, `blind` and `latent_epochs` chose it."""
     own = {
         name: value for name, value in recipe.items() if name not in ("initialisation", "blind", "latents_per_mode")
     }

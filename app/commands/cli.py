@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, batch, faust, info, learn, listing, motion, patches, play, render, sampled
+from app.commands import abx, batch, faust, info, learn, listing, motion, patches, play, plugin, render, sampled
 from app.shared.thread_priority import wait_asleep
 from engine.result_file import explain
 from training.cli import evaluation, family, sweep, tables, training
@@ -70,6 +70,7 @@ for command in (
     batch.batch,
     sampled.sampled,
     faust.faust,
+    plugin.plugin,
     info.info,
     motion.compare,
     training.dataset,

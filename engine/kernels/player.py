@@ -1039,6 +1039,16 @@ def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
 
 
 @njit(**COMPILED)
+def _superseded(players: np.ndarray, event: int, following: int) -> bool:
+    """Whether an event moves a wheel, and the one that follows it at once moves the same: a burst costs one glide."""
+    kind, key = players[event + of.EVENT_KIND], players[event + of.EVENT_KEY]
+    same = kind == players[following + of.EVENT_KIND] and key == players[following + of.EVENT_KEY]
+    if not same or players[event + of.EVENT_CHANNEL] != players[following + of.EVENT_CHANNEL]:
+        return False
+    return kind == of.BEND or (kind == of.CONTROLLER and key == MOD_WHEEL)
+
+
+@njit(**COMPILED)
 def play(player_address: int, mixer_address: int) -> None:
     """Plays all events that are due in the mixer's next quantum, before it is rendered."""
     player, players, mixers = _at(player_address), _whole(player_address), _whole(mixer_address)
@@ -1046,8 +1056,13 @@ def play(player_address: int, mixer_address: int) -> None:
     fence()
     _tend(player, players, now)
     while players[of.PLAYER_TAKEN] < pushed:
-        event = of.PLAYER_EVENTS + players[of.PLAYER_TAKEN] % of.EVENTS * of.EVENT_SLOTS
-        if players[event + of.EVENT_FRAME] <= now or players[event + of.EVENT_KIND] == of.CANCEL:
+        taken = players[of.PLAYER_TAKEN]
+        event = of.PLAYER_EVENTS + taken % of.EVENTS * of.EVENT_SLOTS
+        following = of.PLAYER_EVENTS + (taken + 1) % of.EVENTS * of.EVENT_SLOTS
+        at_once = taken + 1 < pushed and players[following + of.EVENT_FRAME] <= now
+        if at_once and players[event + of.EVENT_FRAME] <= now and _superseded(players, event, following):
+            pass
+        elif players[event + of.EVENT_FRAME] <= now or players[event + of.EVENT_KIND] == of.CANCEL:
             _handle(player, players, mixers, event)
         elif players[of.PLAYER_QUEUED] < of.QUEUED:
             _queue(players, event)
@@ -1060,8 +1075,12 @@ def play(player_address: int, mixer_address: int) -> None:
         event = of.PLAYER_QUEUE + done * of.EVENT_SLOTS
         if players[event + of.EVENT_FRAME] >= now + at.QUANTUM:
             break
-        _handle(player, players, mixers, event)
         done += 1
+        following = event + of.EVENT_SLOTS
+        frame = players[event + of.EVENT_FRAME]
+        together = done < players[of.PLAYER_QUEUED] and players[following + of.EVENT_FRAME] == frame
+        if not (together and _superseded(players, event, following)):
+            _handle(player, players, mixers, event)
     if done > 0:
         players[of.PLAYER_QUEUED] -= done
         for each in range(players[of.PLAYER_QUEUED] * of.EVENT_SLOTS):

@@ -71,8 +71,20 @@ class Watch(Protocol):
         """A run has ended, and its row is in the results file."""
 
 
-class Unwatched(Watch):
+class Unwatched:
     """Shows nothing."""
+
+    def started(self, run: Run) -> None:
+        pass
+
+    def progressed(self, event: Progressed) -> None:
+        pass
+
+    def noted(self, event: Noted) -> None:
+        pass
+
+    def finished(self, row: Row) -> None:
+        pass
 
 
 def group_of(plan: Plan) -> str:
