@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 F0_RANGE_HZ = (26.0, 4_300.0)
 STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])
+COARSE = (0.0, 4e-5, 3e-4)  # of B, for the choice of f0 that are looked at closely
 MOST_PARTIALS = 80
 PRESENT_DB = 9.0  # above the local floor, for a peak that counts
 FULL_DB = 40.0  # above it a peak counts no more than at it
@@ -132,7 +133,7 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Seri
     if len(peaks.hz) == 0:
         return None
     candidates = _candidates(peaks, f0_range_hz)
-    scored = sorted(((_score(peaks, f0, 0.0)[0], f0) for f0 in candidates), reverse=True)
+    scored = sorted(((max(_score(peaks, f0, b)[0] for b in COARSE), f0) for f0 in candidates), reverse=True)
     best: Series | None = None
     for _, f0 in scored[:40]:
         for stiffness in STIFFNESSES:
