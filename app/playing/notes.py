@@ -397,7 +397,7 @@ class Notes:
                     voice,
                     model,
                     initial_m,
-                    stroke.ear.weights(model.grid_points),
+                    program.grid_weights(stroke.ear),
                     (subject, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
@@ -500,7 +500,7 @@ class Notes:
         rate_hz = min(self._sound.rate_hz, 48_000)
         program = self._sources.program(subject, kind, rate_hz)
         if program.rendered:
-            return note.voices[source].level_of_samples(seconds) if stroke.ear.pickup == "displacement" else 0.0
+            return note.voices[source].level_of_samples(seconds) if stroke.ear.pickup != "velocity" else 0.0
         mixer = Mixer(rate_hz, limited=False)
         initial_m, begin = self._sources.begin(subject, kind, rate_hz, stroke.pluck)
         mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))

@@ -22,7 +22,6 @@ END_FADE_S = 0.25  # of a model that hums on where its string has long been sile
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
 SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
 LONGEST_S = 1e9  # of a voice that never ends
-BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
 class Voice:
@@ -59,8 +58,8 @@ class Voice:
         counts[at.ENDS_AT] = round(min(program.ends_s, LONGEST_S) * program.rate_hz)
         counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
-        memory[at.PEAK] = peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
-        memory[at.LIMIT] = RUNAWAY_FACTOR * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
+        memory[at.PEAK] = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        memory[at.LIMIT] = RUNAWAY_FACTOR * ear.largest(displacement_m, program.force) / FULL_SCALE_M
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second

@@ -1,9 +1,10 @@
-"""The box that chooses the shape of a pluck, and why a triangle leaves the knobs of the width grey."""
+"""The boxes that choose the shape of a pluck and the pick-up, and why a triangle leaves its width grey."""
 
 from __future__ import annotations
 
 from PySide6.QtWidgets import QComboBox
 
+from app.shared.vocabulary import PICKUP_TITLES
 from app.views.controls.parts import combo_box
 from engine.pluck import SHAPES, Shape
 
@@ -17,6 +18,15 @@ def shape_box() -> QComboBox:
     """A narrow combo box of the names in words; its rows are SHAPES, and so is its data."""
     box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES])
     box.setToolTip("The shape of the pluck")
+    return _tight(box)
+
+
+def pickup_box() -> QComboBox:
+    """A narrow combo box of the pick-ups; its data is that of `Choices.pickup`."""
+    return _tight(combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]))
+
+
+def _tight(box: QComboBox) -> QComboBox:
     box.setStyleSheet(_TIGHT)
     box.setFixedWidth(_WIDTH)
     return box
