@@ -9,8 +9,13 @@ from app.views.controls.parts import combo_box
 from engine.pluck import SHAPES, Shape
 
 NO_WIDTH = "A triangle has no width: choose another shape to turn it"
-_NAMES: dict[Shape, str] = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
-_WIDTH = 106  # pixels: the longest name, with the padding of _TIGHT
+_NAMES: dict[Shape, str] = {
+    "gaussian": "Gaussian",
+    "triangular": "Triangle",
+    "raised_cosine": "Raised cosine",
+    "rounded": "Round triangle",
+}
+_WIDTH, _PICKUP_WIDTH = 106, 76  # pixels: the longest name, with the padding of _TIGHT
 _TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
 
 
@@ -18,15 +23,15 @@ def shape_box() -> QComboBox:
     """A narrow combo box of the names in words; its rows are SHAPES, and so is its data."""
     box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES])
     box.setToolTip("The shape of the pluck")
-    return _tight(box)
+    return _tight(box, _WIDTH)
 
 
 def pickup_box() -> QComboBox:
     """A narrow combo box of the pick-ups; its data is that of `Choices.pickup`."""
-    return _tight(combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]))
+    return _tight(combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]), _PICKUP_WIDTH)
 
 
-def _tight(box: QComboBox) -> QComboBox:
+def _tight(box: QComboBox, width: int) -> QComboBox:
     box.setStyleSheet(_TIGHT)
-    box.setFixedWidth(_WIDTH)
+    box.setFixedWidth(width)
     return box

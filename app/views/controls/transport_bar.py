@@ -137,7 +137,7 @@ class TransportBar(QFrame):
         self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
         self._pickup = pickup_box()
         self._pickup.setToolTip(
-            f"Displacement: of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
+            f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
             f"Velocity: of that point, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s)\n"
             f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}"
         )
