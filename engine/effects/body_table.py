@@ -57,6 +57,7 @@ class Wood:
         bright_hz: from here on their mean level falls by 6 dB an octave: the bridge's mass, and radiation of a plate
             above coincidence (Cremer and Heckl, chapter 6).
         half_width_m: with it the directions to two ears differ from about c/2π half widths on.
+        seed: of 40 that with the most even response in third octaves, left, right and both.
         sources: of the figures.
     """
 
@@ -114,7 +115,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=3_500.0,
         half_width_m=0.18,
         seconds=0.35,
-        seed=49,
+        seed=17,
         sources=GUITAR_SOURCES,
         hills=(Hill(1_500.0, 0.7, 5.0),),
     ),
@@ -133,7 +134,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=8_000.0,
         half_width_m=0.2,
         seconds=0.4,
-        seed=1,
+        seed=40,
         sources=(
             "modes of a Martin D-28 in Fletcher and Rossing, chapter 9, those above 300 Hz with ribs held; X-bracing "
             "and a lighter bridge: brighter (estimate)"
@@ -154,7 +155,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=1_600.0,
         half_width_m=0.2,
         seconds=0.25,
-        seed=1,
+        seed=19,
         sources=(
             "estimate: f-holes of a violin's kind, a carved top twice as thick as a flat one, a floating bridge"
         ),
@@ -168,7 +169,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=3_500.0,
         half_width_m=0.14,
         seconds=0.16,
-        seed=1,
+        seed=29,
         sources=(
             "formants at 500-800 Hz and two above: J. Woodhouse, D. Politzer, H. Mansour, Acta Acustica 5 (2021) 15 "
             "and 16 (doi 10.1051/aacus/2021008); head tuned to about D4, its air and its low quality, for a head "
@@ -184,7 +185,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=2_600.0,
         half_width_m=0.12,
         seconds=0.14,
-        seed=1,
+        seed=17,
         sources=("estimate, of shamisen and kora: a skin heavier than a banjo's head, with more loss, over a box"),
         hills=(Hill(850.0, 1.2, 7.0),),
     ),
@@ -202,11 +203,11 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=2_800.0,
         half_width_m=0.2,
         seconds=0.4,
-        seed=1,
+        seed=26,
         sources=(
             "a pair of air and board below 200 Hz: J.-L. Le Carrou, F. Gautier, E. Foltête, J. Acoust. Soc. Am. 121 "
-            "(2007) 559 (order of magnitude); breathing modes at 188, 273 and near 350 Hz: 'Vibroacoustics of a gothic "
-            "harp', J. Acoust. Soc. Am. 129 (2011); board of 2-10 mm (estimate)"
+            "(2007) 559 (order of magnitude); breathing modes at 188, 273 and near 350 Hz: 'Vibroacoustics of a "
+            "gothic harp', J. Acoust. Soc. Am. 129 (2011); board of 2-10 mm (estimate)"
         ),
         hills=(Hill(1_500.0, 0.6, 5.0),),
     ),
@@ -218,7 +219,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=9_000.0,
         half_width_m=0.4,
         seconds=0.5,
-        seed=1,
+        seed=2,
         sources=(
             "36 modes up to 600 Hz, output even from 50 to 2000 Hz: W. R. Savage, E. L. Kottick, T. J. Hendrickson, "
             "K. D. Marshall, J. Acoust. Soc. Am. 91 (1992) 2180; the four lowest are estimates"
@@ -240,7 +241,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=900.0,
         half_width_m=0.3,
         seconds=0.4,
-        seed=1,
+        seed=23,
         sources=(
             "air near 60 Hz and the first body mode near 100 Hz: A. Askenfelt, STL-QPSR 4/1982; A. W. Brown, thesis, "
             "Vienna 2004; the others and the quality are estimates"
@@ -261,7 +262,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=4_500.0,
         half_width_m=0.13,
         seconds=0.22,
-        seed=1,
+        seed=20,
         sources=("order of magnitude of D. Cohen, T. D. Rossing, Acoust. Sci. & Tech. 24 (2003) 1; levels estimated"),
         hills=(Hill(1_800.0, 1.2, 4.0),),
     ),
@@ -279,7 +280,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=3_500.0,
         half_width_m=0.18,
         seconds=0.3,
-        seed=1,
+        seed=39,
         sources=(
             "soundboard of 1.5-2 mm with seven braces: S. Inanli, E. Altinsoy, DAGA 2018; frequencies estimated from "
             "bowl and holes, as in a guitar of the same air"
@@ -301,7 +302,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=4_500.0,
         half_width_m=0.13,
         seconds=0.3,
-        seed=1,
+        seed=31,
         sources=(
             "air mode at 85 Hz and first mode at 100 Hz: A. K. Coaldrake, J. Acoust. Soc. Am. 148 (2020), doi "
             "10.1121/10.0002427; a dense spectrum of wood and cavity above: C. Waltham, Y. Lan, E. Koster, of the "
@@ -317,7 +318,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=4_500.0,
         half_width_m=0.6,
         seconds=0.8,
-        seed=1,
+        seed=29,
         sources=(
             "0.05 modes a hertz up to 1.1 kHz, 0.01 above, where ribs confine waves; loss factor 2 %: K. Ege, X. "
             "Boutillon, arXiv 1212.3068 (2010); the four lowest are estimates"
@@ -332,7 +333,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=6_000.0,
         half_width_m=0.16,
         seconds=0.25,
-        seed=1,
+        seed=38,
         sources=("estimate, of sitar and tanpura: a shell of 30-40 cm without a hole, a convex face of 4 mm"),
         hills=(Hill(1_800.0, 0.6, 5.0),),
     ),
@@ -344,7 +345,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=4_500.0,
         half_width_m=0.1,
         seconds=0.22,
-        seed=1,
+        seed=20,
         sources=("estimate: a guitar's modes, with the air of a concert ukulele"),
         hills=(Hill(1_800.0, 0.7, 5.0),),
     ),
@@ -356,7 +357,7 @@ BODIES: Mapping[str, Wood] = {
         bright_hz=6_000.0,
         half_width_m=0.3,
         seconds=0.35,
-        seed=1,
+        seed=22,
         sources=(
             "estimate, of cimbalom, santur and clavichord: a trapezoid board of spruce of 6 mm over a closed box"
         ),

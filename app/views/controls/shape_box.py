@@ -15,23 +15,26 @@ _NAMES: dict[Shape, str] = {
     "raised_cosine": "Raised cosine",
     "rounded": "Round triangle",
 }
-_WIDTH, _PICKUP_WIDTH = 106, 76  # pixels: the longest name, with the padding of _TIGHT
-_TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
+_WIDTH, _PICKUP_WIDTH = 106, 64  # pixels: the longest name, with the padding of _TIGHT
+_TIGHT = "QComboBox {{ padding: 5px 0 5px 6px; }} QComboBox::drop-down {{ border: none; width: {}px; }}"
+_ARROW, _PICKUP_ARROW = 17, 9  # pixels
 
 
 def shape_box() -> QComboBox:
     """A narrow combo box of the names in words; its rows are SHAPES, and so is its data."""
     box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES])
     box.setToolTip("The shape of the pluck")
-    return _tight(box, _WIDTH)
+    return _tight(box, _WIDTH, _ARROW)
 
 
 def pickup_box() -> QComboBox:
     """A narrow combo box of the pick-ups; its data is that of `Choices.pickup`."""
-    return _tight(combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]), _PICKUP_WIDTH)
+    return _tight(
+        combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]), _PICKUP_WIDTH, _PICKUP_ARROW
+    )
 
 
-def _tight(box: QComboBox, width: int) -> QComboBox:
-    box.setStyleSheet(_TIGHT)
+def _tight(box: QComboBox, width: int, arrow: int) -> QComboBox:
+    box.setStyleSheet(_TIGHT.format(arrow))
     box.setFixedWidth(width)
     return box
