@@ -102,6 +102,8 @@ class Reference:
 SAMPLED = (
     "from a sampled instrument of a General MIDI bank at velocity 100, widened to a factor of about 1.5 each way"
 )
+PIZZICATO = "of a double bass, E3, piano and forte, measured with these functions (D. Smolken, CC0), widened a little"
+QUILLS = ("harpsichord", "harpsichord_in_meantone", "harpsichord_lute_stop")
 BRIGHT = ("steel_string_acoustic", "harpsichord", "banjo")
 REFERENCES = (
     Reference("centroid_hz", 900, 1_800, f"1128 Hz {SAMPLED}", ("steel_string_acoustic",)),
@@ -112,7 +114,13 @@ REFERENCES = (
     Reference("between_db", -18, -4, "-10 dB of the bank's steel guitar, ±8 dB", ("steel_string_acoustic",)),
     Reference("below_db", -30, -14, "-22 dB of the bank's steel guitar, ±8 dB", ("steel_string_acoustic",)),
     Reference("ripple_db", 0.3, 5, "0.4 … 4.9 dB in the same bank"),
-    Reference("hard_over_soft", 1.3, 3, "aim for plucked acoustic instruments, not measured"),
+    Reference("hard_over_soft", 1.3, 3, "1.1 … 3.2 of the pizzicato below from p to f; aim for the others"),
+    Reference("hard_over_soft", 0.9, 1.1, "a quill plucks alike at any speed", QUILLS),
+    Reference("centroid_hz", 300, 650, f"340 … 563 Hz {PIZZICATO}", ("upright_bass",)),
+    Reference("rolloff_hz", 800, 2_000, f"990 … 1550 Hz {PIZZICATO}", ("upright_bass",)),
+    Reference("between_db", -20, -5, f"-15.6 … -8 dB {PIZZICATO}", ("upright_bass",)),
+    Reference("below_db", -22, -12, f"-17.7 … -15.2 dB {PIZZICATO}", ("upright_bass",)),
+    Reference("ripple_db", 1, 7, f"1.8 … 6.5 dB {PIZZICATO}, of all its notes", ("upright_bass",)),
     Reference(
         "two_notes_db", -50, -20, "aim for the harp, whose strings share a board; not measured", ("concert_harp",)
     ),

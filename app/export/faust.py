@@ -178,7 +178,7 @@ def _pulls(patch: Patch, modes: int, grid_points: int) -> list[list[float]]:
     full_scale = FULL_SCALES[patch.pickup.kind]
     found = []
     for share in shares:
-        width = patch.pluck.width + float(share) * (patch.pluck.width_hard - patch.pluck.width)
+        width = patch.pluck.width * (patch.pluck.width_hard / patch.pluck.width) ** float(share)
         pluck = replace(patch.pluck.pluck(1), amplitude_mm=1.0, width=width)
         found.append((to_modes(pluck.displacement(grid_points), modes) / full_scale).tolist())
     return found

@@ -18,7 +18,7 @@ from engine.resonators.base import Resonator
 from engine.voices import Ear
 
 PART_S = 0.4  # of the note: a loudness meter's block
-# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -9 dBFS.
+# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -5 dBFS.
 WANTED_DB = -24.0
 HIGHEST_PEAK_DB = WANTED_DB + 15.0  # of such a note of any key
 PEAK_BLOCKS = 54  # blocks of 54 frames: 60 ms

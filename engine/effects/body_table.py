@@ -122,9 +122,9 @@ BODIES: Mapping[str, Wood] = {
     "dreadnought": Wood(
         "Steel-string guitar",
         (
-            Mode(102.0, 20, 5.0),
-            Mode(193.0, 30, 6.0, -1),
-            Mode(204.0, 30, 2.0),
+            Mode(102.0, 20, 9.0),
+            Mode(193.0, 30, 8.0, -1),
+            Mode(204.0, 30, 4.0),
             Mode(326.0, 35, 1.0, -1),
             Mode(390.0, 35, 3.0),
             Mode(431.0, 35, 2.0, -1),
