@@ -16,14 +16,14 @@ LARGEST_AMPLITUDE_MM = 20.0
 FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
 FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
 FULL_SCALE_N = 20.0  # the force at the bridge that is 0 dBFS: a Gaussian of width 0.06 and 20 mm on a nylon B3
-RUNAWAY_FACTOR = 20.0  # times its initial peak: a string let go never exceeds about that peak
+RUNAWAY_FACTOR = 20.0  # times its initial peak: a released string never exceeds about that peak
 LEAST_PEAK_M = 1e-4  # of an initial displacement, for that factor
 DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is still there
 
 
 @dataclass(frozen=True)
 class Pluck:
-    """Where and how the string is pulled before it is let go.
+    """Where and how the string is pulled before its release.
 
     Attributes:
         position: 0 and 1 are the fixed ends, 0.5 the middle.

@@ -101,7 +101,7 @@ def faust_program(patch: Patch, grid_points: int, most_modes: int | None = None)
         "strike = edge * plays * loud * millimetres;",
         *_pull_lines(pulls),
         "",
-        "// A key that is let go: its damper",
+        "// A key that is released: its damper",
         *_damper_lines(patch),
         "",
         f"// Out of rest it begins within {1000 * ATTACK_S:g} ms",
@@ -207,7 +207,7 @@ def _damper_lines(patch: Patch) -> Iterable[str]:
 
 
 def _rest_s(patch: Patch) -> float:
-    """So long after a key was let go its string is at rest."""
+    """So long after a key was released its string is at rest."""
     return LONGEST_RING_S if patch.damping.let_ring else patch.damping.release_t60_s
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from app.patches.patch import Patch
+from engine.pluck import Pluck
 
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
 VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
@@ -31,7 +32,7 @@ class NoteOn:
 
 @dataclass(frozen=True)
 class NoteOff:
-    """A key is let go."""
+    """A key is released."""
 
     key: int
     channel: int = 0
@@ -61,24 +62,31 @@ class PatchTurned:
     patch: Patch
 
 
+@dataclass(frozen=True)
+class PluckAt:
+    """The string that is shown is plucked at a place: by hand, or by a key that is a place."""
+
+    pluck: Pluck
+
+
 def fixed_function(number: int) -> str:
     """What a controller does whatever the patch, as "is the sustain pedal"; "" for one that may be assigned."""
     return _FIXED.get(number, "")
 
 
 def moves_effects(event: object, patch: Patch) -> bool:
-    """Whether it changes the body or the room of what is heard of a patch."""
+    """Whether it changes a patch's body or room."""
     if isinstance(event, Controller):
         return event.number in (MOD_WHEEL, RESET) and patch.mod_wheel.startswith(("body.", "room."))
     return isinstance(event, PatchTurned)
 
 
-Event = NoteOn | NoteOff | Bend | Controller | PatchTurned
+Event = NoteOn | NoteOff | Bend | Controller | PatchTurned | PluckAt
 
 
 def channels_in(events: Iterable[Event]) -> set[int]:
     """The channels that events come on."""
-    return {event.channel for event in events if not isinstance(event, PatchTurned)}
+    return {event.channel for event in events if not isinstance(event, PatchTurned | PluckAt)}
 
 
 def let_go(channels: Iterable[int]) -> list[Event]:
@@ -91,7 +99,7 @@ def let_go(channels: Iterable[int]) -> list[Event]:
 
 
 def still_down(events: Iterable[Event]) -> list[Event]:
-    """What lets go the keys that are down and the pedals after these events."""
+    """The events that release the keys and pedals that are down after these events."""
     down: dict[NoteOff | Controller, None] = {}  # in their order
     for event in events:
         if isinstance(event, NoteOn | NoteOff):

@@ -19,7 +19,7 @@ from engine.voices import Ear, OfflineVoice, Program
 FIRST_FRAMES = 2_048  # of a compiled voice; blocks double from this length
 BLOCK_FRAMES = 32_768  # up to this one
 RENDERED_FRAMES = 2_048  # a block of any other voice
-BEHIND = 4 * QUANTUM  # frames at most by which a voice that is given its samples reads ahead
+BEHIND = 4 * QUANTUM  # frames that a voice with given samples reads ahead at most
 MIRRORED = 2 * REACH + 2 * QUANTUM  # samples added after the end, which the differentiator of a velocity reads
 
 

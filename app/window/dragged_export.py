@@ -16,7 +16,8 @@ from PySide6.QtWidgets import QApplication
 from app.export.choices import ExportChoices
 from app.export.files import Source
 from app.presets.library import PresetEntry
-from app.session.choices import Choices
+from app.session.choices import Choices, PluckedString
+from app.session.listener import Listener
 from app.shared.worker import Job
 from app.views.background import Background
 from app.views.controls.drag_button import DragButton
@@ -24,7 +25,7 @@ from app.views.dialogs.chosen_sound import export_chosen, suggested_name
 from app.views.dialogs.export_pages import as_heard
 from app.views.dialogs.job_dialog import EXPECTED
 
-_SOUND = {"string", "position", "amplitude_mm", "shape", "width", "listen", "listen_right", "stereo", "pickup"}
+_SOUND = {*PluckedString.model_fields, *Listener.model_fields} - {"solo"}
 
 
 class DraggedExport(QObject):

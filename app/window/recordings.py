@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from app.export.played import Played, recorded_files, write_recorded
 from app.instrument.events import PatchTurned
-from app.playing.live import Live
+from app.playing.keys import Keys
 from app.presets.library import Library
 from app.session.choices import Session
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
@@ -33,9 +33,9 @@ class Recordings(QObject):
     told = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
 
-    def __init__(self, session: Session, library: Library, live: Live, bar: PatchBar, parent: QObject) -> None:
+    def __init__(self, session: Session, library: Library, keys: Keys, bar: PatchBar, parent: QObject) -> None:
         super().__init__(parent)
-        self._session, self._library, self._live, self._bar = session, library, live, bar
+        self._session, self._library, self._keys, self._bar = session, library, keys, bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: list[Played] = []
         self._writers: list[Background] = []  # one for each recording
@@ -45,12 +45,14 @@ class Recordings(QObject):
 
     def record(self) -> None:
         """Begins to record; or ends it and asks for a file, as it does for a recording that is not saved yet."""
-        if self._live.recording:
+        if self._keys.recorder.recording:
             self._end()
         elif self._unsaved:
             self.save()
         else:
-            self._live.begin_recording()
+            self._keys.begin_recording()
+            if not self._session.choices.plays_patch:
+                self.informed.emit("Keys of a patch are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
 
     def save(self) -> None:
@@ -96,13 +98,13 @@ class Recordings(QObject):
 
     def tick(self, now_s: float) -> None:
         """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
-        if self._live.recording:
+        if self._keys.recorder.recording:
             self._bar.show_recording(now_s - self._began_s)
 
     def may_close(self) -> bool:
         """Whether the window may be closed; asks where that would lose what was played."""
         lost = []
-        if self._unsaved or self._live.recording:
+        if self._unsaved or self._keys.recorder.recording:
             lost.append("What was played is not saved.")
         if self._writing:
             lost.append("The sound of a recording is still being written; its notes are in the MIDI file already.")
@@ -127,7 +129,7 @@ class Recordings(QObject):
             writer.close(max(0.0, until_s - time.monotonic()), cancel=False)
 
     def _end(self) -> None:
-        events = self._live.end_recording()
+        events = self._keys.recorder.end()
         self._bar.show_recording(None)
         patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
         patch = patches[0] if patches else self._session.choices.patch

@@ -1,4 +1,4 @@
-"""What is heard of all voices together: a body, and a gentle room. Neither has part in any error or comparison.
+"""The effects on the sum of all voices: a body, and a gentle room. Neither has part in any error or comparison.
 
 impulse    an impulse response as a value: checked, at another rate, as loud as what it is given
 body       from the modes of an instrument's body, or from a response that is given

@@ -56,9 +56,9 @@ class PresetInfo:
         modes: modes kept in the training data; the initial displacement is projected on them.
         scale_m: the model's unit of displacement.
         initialisation: how the training began, by name.
-        knows: what its start was told of the string, in words; empty: nothing but the displacement.
+        knows: what its start received of the string, in words; empty: nothing but the displacement.
         rel_mse, rel_mae: validation errors over the horizon (the paper's metrics), test errors beside them.
-        family: of a model of many strings, which were learned; `string` is the one that it plays unless told.
+        family: of a model of many strings, which were learned; `string` is the one that it plays by default.
         training: the complete training configuration, so that the run can be repeated.
     """
 

@@ -10,12 +10,12 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from engine.kernels.layout import BRIGHTER
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, LEAST_PEAK_M
 from engine.resonators.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
 
 PickupKind = Literal["displacement", "velocity", "bridge"]
 FULL_SCALES = {"displacement": FULL_SCALE_M, "velocity": FULL_SCALE_M_S, "bridge": FULL_SCALE_N}
-BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def voice_blocks(
 
     Args:
         source: what renders the samples of a program that is not compiled.
-        advanced: is told the share that is done now and then; may raise, to end it.
+        advanced: receives the share that is done now and then; may raise, to end it.
         until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
             voice is over.
 

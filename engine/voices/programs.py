@@ -32,7 +32,7 @@ from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
-HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
+HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 
 Array = NDArray[np.float64]
@@ -233,9 +233,14 @@ def _tension_program(model: KoopmanTension, info: PresetInfo, rate_hz: int) -> P
     return tension_program(model, info.resonator, rate_hz)
 
 
-@torch.no_grad()
 def tension_program(model: KoopmanTension, resonator: Resonator, rate_hz: int) -> Program:
     """What the model learned, for a resonator of any kind at any rate."""
+    return _with_modes(at.TENSION, tension_memory(model, rate_hz), resonator, rate_hz)
+
+
+@torch.no_grad()
+def tension_memory(model: KoopmanTension, rate_hz: int) -> Array:
+    """What the kernels read of the model, whatever the resonator."""
     c, curves = model.configuration, torch.stack([model.A, model.r, model.p])
     reals = {
         at.S_NODE_PHASE: c.node_phase,
@@ -244,10 +249,7 @@ def tension_program(model: KoopmanTension, resonator: Resonator, rate_hz: int) -
         at.S_LOUDNESS: -math.log(FULL_SCALE_M),
         at.S_RATE: float(rate_hz),
     }
-    memory = np.concatenate(
-        [_header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), curves.flatten().numpy()]
-    )
-    return _with_modes(at.TENSION, memory, resonator, rate_hz)
+    return np.concatenate([_header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), curves.flatten().numpy()])
 
 
 def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
@@ -267,6 +269,11 @@ def solver_program(
     Args:
         aliased: modes that are too high for the rate are heard as others, as they are in data of that rate.
     """
+    return _with_modes(at.TRUTH, solver_memory(rate_hz, coarser), resonator, rate_hz, aliased)
+
+
+def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER) -> Array:
+    """What the kernels read of the solver, whatever the resonator."""
     reals = {
         at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
         at.T_SILENCE: HEARD_SILENCE,
@@ -275,7 +282,7 @@ def solver_program(
         **{at.T_ROTATIONS + stage: share for stage, share in enumerate(ROTATIONS[: at.STAGES // 2])},
         **{at.T_KICKS + stage: share for stage, share in enumerate(KICKS)},
     }
-    return _with_modes(at.TRUTH, _header(at.T_HEADER, reals, {}), resonator, rate_hz, aliased)
+    return _header(at.T_HEADER, reals, {})
 
 
 def _fits(omega: Tensor) -> Tensor:
@@ -353,7 +360,7 @@ def _flat(layer: nn.Linear) -> NDArray[np.float32]:
 def _packed(
     header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, Tensor | NDArray[np.generic]]
 ) -> Array:
-    """One array of a header and its parts, whose places the header tells."""
+    """One array of a header and its parts, whose places the header gives."""
     arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
     header = _header(header_slots, reals, wholes)
     memory = np.concatenate([header, np.zeros(sum(len(array) for array in arrays))])

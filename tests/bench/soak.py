@@ -43,6 +43,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QKeyEvent
 
 from app.audio.choices import Buffer, SoundChoice
+from app.patches.instrument import SingleString
 from app.patches.library import list_patches
 from app.session.choices import Choices
 from app.window.main_window import MainWindow
@@ -80,7 +81,7 @@ class Holes:
         heard: in the recording: of one who plays all silences, of a restless user those that begin or end at once.
         heard_ms, longest_ms: of them together, and of the longest.
         heard_at_s: since the recording began.
-        told: by the app's mixer, by cause; of very many the latest.
+        `told`: by the app's mixer, by cause; of very many the latest.
         control: of a steady tone that another process plays meanwhile in the same way: the machine's, not the app's.
         late: how often a thread of that process which only wakes, in real time, was later than 3 ms.
         latest_ms: by how much at most; 0 where never.
@@ -113,9 +114,9 @@ class Soak:
         drift_mib: how far any other was from the first, above or below.
         peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
-        faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
+        faults: tracebacks of exceptions, whether the app showed them or nobody caught them, and warnings of Python
             and of Qt; each once, with its number.
-        notices: all that the app told its user, with how often.
+        notices: all that the app showed its user, with how often.
     """
 
     machine: Machine
@@ -341,7 +342,7 @@ def _weighed_at_rest(stage: Stage) -> float:
     """Resident memory in MiB with one short pluck on stage, always the same; the user's choices come back."""
     session = stage.controller.session
     before = session.choices
-    rest = Choices(preset=stage.controller.library.entries[0].name, seconds=REST_PLUCK_S)
+    rest = Choices(instrument=SingleString(preset=stage.controller.library.entries[0].name), seconds=REST_PLUCK_S)
     stage.controller.performance.stop()
     session.update(**rest.model_dump())
     stage.controller.pluck()

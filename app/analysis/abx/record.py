@@ -15,7 +15,8 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationErro
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
 from app.presets.library import PresetEntry
-from app.session.choices import Choices
+from app.session.choices import Choices, PluckedString
+from app.session.listener import Listener
 from app.shared.version import program_version
 from engine.presets import preset_digest
 from engine.read_file import read_bounded
@@ -25,7 +26,7 @@ from engine.schema import SchemaError, parse_json
 KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
 LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
 SCORE_FIELDS = {"kind", "trials", "planned_trials", "correct", "complete", "p_value"}
-PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "listen", "pickup", "solo", "seconds", "string"}
+PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo"}
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
     f"Below {LEVEL:g}, luck is an unlikely explanation; a larger value does not show that A and B sound the same, "
@@ -40,7 +41,7 @@ class Candidate(BaseModel):
         source: its name among the sounds of a pluck.
         label: its name for people.
         preset, preset_sha256: the preset that made it; for the truth, the one whose string it is.
-        gain_db: by which it was turned down.
+        gain_db: its attenuation.
     """
 
     model_config = ConfigDict(frozen=True)

@@ -22,7 +22,7 @@ _RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore 
 
 
 class ExportDialog(JobDialog):
-    """Offers first what is heard, and remembers its last state in `export_choices`.
+    """Offers first the source that is heard, and remembers its last state in `export_choices`.
 
     Args:
         entries: the presets of a batch; `choices.preset` is among them.

@@ -21,6 +21,7 @@ from app.export.batch import BatchPlan, NamedString
 from app.export.choices import BatchChoices, ExportChoices
 from app.export.files import Source
 from app.export.sound import SOURCES
+from app.patches.patch import Patch
 from app.presets.library import PresetEntry
 from app.presets.words import shape_word
 from app.session.choices import Choices
@@ -51,7 +52,7 @@ def as_heard(
     source = choices.source_heard
     if name := other_preset(source):
         if any(entry.name == name for entry in entries):
-            choices = choices.model_copy(update={"preset": name, "string": None})
+            choices = choices.changed({"preset": name})
         source = "model"
     if source == "difference":
         gain_db = choices.difference_gain_db
@@ -254,11 +255,12 @@ def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
 
 
 def _dry_text(choices: Choices) -> str:
-    """What of the chosen patch is heard in the window and is not in these files, which are to be compared."""
-    if choices.patch is None:
+    """What of the patch is heard in the window and is not in these files, which are to be compared."""
+    patch = choices.instrument
+    if not isinstance(patch, Patch):
         return ""
-    left_out = "body, room and level" if choices.patch.body.name or choices.patch.room.mix > 0 else "level"
-    return f". The string alone, without the {left_out} that {choices.patch.name} gives it"
+    left_out = "body, room and level" if patch.body.name or patch.room.mix > 0 else "level"
+    return f". The string alone, without the {left_out} that {patch.name} gives it"
 
 
 def _shape_text(choices: Choices) -> str:

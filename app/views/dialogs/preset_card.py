@@ -19,7 +19,7 @@ from app.presets.words import (
 )
 from engine.plain_text import duration
 from engine.schema import SchemaError
-from training.by_name import load
+from training.cell import load
 from training.heard_words import heard_sentence
 
 

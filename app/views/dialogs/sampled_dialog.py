@@ -38,7 +38,7 @@ from engine.presets import PresetError, load_preset, preset_digest
 from engine.result_file import explain
 
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
-RESUMES = "A cancelled export keeps its samples, and goes on from there the next time."
+RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
 
 
 class SampledDialog(JobDialog):
@@ -67,11 +67,11 @@ class SampledDialog(JobDialog):
         self._update()
 
     def show_patch(self, patch: Patch, preset: PresetEntry) -> None:
-        """Another patch, or the same that was turned; an export that has begun goes on with what it began with."""
+        """Another patch, or the same that was turned; an export that has begun continues with what it began with."""
         if preset != self._preset or not self._digest:
             try:
                 self._digest = preset_digest(preset.path)
-            except (OSError, PresetError):  # told when it is to be played
+            except (OSError, PresetError):  # reported when it is to be played
                 self._digest = ""
         self._patch, self._preset = patch, preset
         if not self._job.busy:
@@ -144,7 +144,7 @@ class SampledDialog(JobDialog):
         except ExportError as error:
             self._end(str(error), failed=True)
             return
-        told = f"{kept} of {len(plan.zones)} samples are kept; export again to go on from there."
+        told = f"{kept} of {len(plan.zones)} samples are kept; export again to continue from there."
         self._end(f"Cancelled; {told if kept else 'nothing was written.'}")
 
     def _tell_saved(self, plan: SampledPlan, report: SampledReport) -> None:

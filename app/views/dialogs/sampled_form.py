@@ -22,7 +22,7 @@ RATES_HZ = (44_100, 48_000, 96_000)
 
 
 class SampledForm(QWidget):
-    """Tells each change; `choices` has the state, `plan` and `path` what it means for the patch that is shown."""
+    """Reports each change; `choices` has the state, `plan` and `path` what it means for the patch that is shown."""
 
     changed = Signal()
 
@@ -49,7 +49,7 @@ class SampledForm(QWidget):
         self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
         self.source.setToolTip("What plays the patch")
         self.dry = QCheckBox("Dry: the room is left to the sampler")
-        self.dry.setToolTip("A room in the samples ends with each key that is let go")
+        self.dry.setToolTip("A room in the samples ends with each released key")
         self.dry.setMinimumHeight(28)
         self.dry.setChecked(choices.dry)
         self.path = QLineEdit()

@@ -1,4 +1,4 @@
-"""What is heard of a player's hands: everything is measured on rendered sound."""
+"""The sound of a player's gestures: everything is measured on rendered sound."""
 
 from __future__ import annotations
 
@@ -394,7 +394,7 @@ def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> No
 
 @pytest.mark.parametrize("field", WHEEL)
 def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: str) -> None:
-    """Softly and hard, held and let go: something of the next note, or of what it is heard through, is another."""
+    """Softly and hard, held and released: something of the next note, or of what it is heard through, is another."""
 
     def heard(value: int) -> object:
         struck: list[Struck] = []

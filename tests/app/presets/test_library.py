@@ -13,6 +13,7 @@ import soundfile
 
 from app.export.choices import ExportChoices
 from app.export.files import SoundRequest, export_sound
+from app.patches.instrument import SingleString
 from app.presets.filter import PresetFilter
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
@@ -56,7 +57,7 @@ def test_a_refresh_tells_only_when_there_are_others(library: Library, small_pres
     shutil.copy(small_preset, own / "first.safetensors")
     (problem,) = library.refresh()
     assert "first.safetensors: a preset of this name exists already" in problem
-    assert library.refresh() == []  # it has been told
+    assert library.refresh() == []  # it has been reported
     assert (library.names, len(seen)) == (["first", "mine", "second"], 1)
     mine = library.find("mine")
     assert mine is not None
@@ -127,7 +128,8 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     dropped = receive(tmp_path / "b.WAV", library)
     assert dropped.notice == ""
     assert dropped.choices == {
-        "preset": "second",
+        "instrument": SingleString(preset="second"),
+        "string": None,
         "position": 0.61,
         "amplitude_mm": 2.5,
         "shape": "raised_cosine",
@@ -140,7 +142,6 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
         "solo": 0,
         "stereo": False,
         "pickup": "displacement",
-        "keys_play": "place",
     }
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
     os.utime(preset_folder / "second.safetensors", ns=(1, 1))

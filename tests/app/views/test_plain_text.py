@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
+from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, PatchEntry, read_patch
 from app.presets.library import PresetEntry
 from app.session.choices import Choices
@@ -68,7 +69,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
 ) -> None:
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), PresetBrowser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
-    dialog = ExportDialog([entry], Choices(preset=entry.name), export)
+    dialog = ExportDialog([entry], Choices(instrument=SingleString(preset=entry.name)), export)
     patch = read_patch(SHIPPED / "classical_guitar.json")
     sampled = SampledDialog(patch, entry, SampledChoices(folder=str(tmp_path / EVIL)))
     views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog, sampled]

@@ -1,4 +1,4 @@
-"""A drag from the export button: the file is the dialog's, told where it cannot be made, and gone at the end."""
+"""A drag from the export button: the file is the dialog's, reported where it cannot be made, and gone at the end."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
+from app.patches.instrument import SingleString
 from app.patches.patch import PhysicalString
 from app.presets.library import list_presets
 from app.session.choices import Choices
@@ -51,7 +52,7 @@ def set_to(controller: Controller, **export: object) -> None:
 
 
 def drag(qtbot: QtBot, controller: Controller, until: str = "rendered") -> None:
-    """From the button, let go once the files are taken, or a notice is told."""
+    """From the button, released once the files are taken, or a notice is shown."""
     button = controller.window.transport.export
     ended: list[None] = []
     button.drag_ended.connect(lambda: ended.append(None))
@@ -164,7 +165,9 @@ def test_a_batch_plays_the_string_where_all_presets_can(qtbot: QtBot, preset_fol
 
     def dialog(*presets: str) -> ExportDialog:
         export = ExportChoices.model_validate({"batch": {"presets": presets}})
-        made = ExportDialog(entries, Choices(preset="studio_any_string", string=string), export)
+        made = ExportDialog(
+            entries, Choices(instrument=SingleString(preset="studio_any_string"), string=string), export
+        )
         qtbot.addWidget(made)
         return made
 

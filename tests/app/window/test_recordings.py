@@ -24,7 +24,7 @@ from app.window.controller import Controller
 
 
 class Told:
-    """What the user is told, and answers to the question for a file: paths, and "" for Cancel."""
+    """The notices to the user, and the answers to the question for a file: paths, and "" for Cancel."""
 
     def __init__(self, played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
         self.errors: list[str] = []
@@ -94,7 +94,7 @@ def test_a_recording_replaces_no_file_that_nobody_asked_about(
 def test_a_cancelled_recording_is_kept_until_it_is_saved_or_discarded(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
-    bar, live = played.window.instrument.bar, played.performance.live
+    bar, recorder = played.window.instrument.bar, played.performance.notes.keys.recorder
     told.answers = [""]
     record(played)
     assert "Unsaved" in bar.record.text()
@@ -103,7 +103,7 @@ def test_a_cancelled_recording_is_kept_until_it_is_saved_or_discarded(
     told.answers = ["", tmp_path / "kept.wav"]
     save.trigger()
     played.patches.recordings.record()  # asks again, and records nothing over it
-    assert not live.recording
+    assert not recorder.recording
     assert "Unsaved" not in bar.record.text()
     qtbot.waitUntil(lambda: len(told.good) == 1)
     assert (tmp_path / "kept.wav").exists()
@@ -113,7 +113,7 @@ def test_a_cancelled_recording_is_kept_until_it_is_saved_or_discarded(
     assert "Record" in bar.record.text()
     assert bar.record.menu() is None
     bar.record.click()
-    assert live.recording
+    assert recorder.recording
     assert not told.errors
 
 
@@ -142,7 +142,7 @@ def test_it_is_recorded_as_it_is_heard(
     for turn in (lambda: None, change):
         turn()
         played.patches.recordings.record()
-        played.window.instrument.pressed.emit(60, 100)  # and held: when it is let go would differ
+        played.window.instrument.pressed.emit(60, 100)  # and held: when it is released would differ
         played.patches.recordings.record()
         played.window.instrument.released.emit(60)
     qtbot.waitUntil(lambda: len(told.good) == 2)

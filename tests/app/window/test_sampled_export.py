@@ -1,4 +1,4 @@
-"""The patch exported from the window, which goes on playing."""
+"""The patch exported from the window, which continues playing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from pytestqt.qtbot import QtBot
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.patches.library import find_patch
-from app.session.instrument import choices_of
 from app.shared.worker import Cancelled
 from app.views.dialogs.sampled_dialog import SampledDialog
 from app.window.controller import Controller
@@ -32,7 +31,7 @@ def patched(controller: Controller, preset_folder: Path, tmp_path: Path) -> Cont
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
     controller.library.refresh()
     controller.sampled._choices = SampledChoices(folder=str(tmp_path), keys=(60, 61), layers=1, seconds=0.2)
-    controller.session.update(**choices_of(find_patch(PATCH).patch))
+    controller.session.update(instrument=find_patch(PATCH).patch)
     return controller
 
 
@@ -59,12 +58,12 @@ def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Con
     open_dialog(qtbot, patched)
     assert patched.sampled.dialog is dialog
     assert dialog.what.text().startswith(PATCH)
-    patched.session.update(**choices_of(find_patch("Concert harp").patch))
+    patched.session.update(instrument=find_patch("Concert harp").patch)
     assert dialog.what.text().startswith("Concert harp")
-    qtbot.waitUntil(lambda: patched.performance.live.ready)
+    qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog.save.click()
     qtbot.keyPress(patched.window, Qt.Key.Key_A)
-    assert patched.performance.live.sounding()
+    assert patched.performance.notes.keys.sounding()
     qtbot.keyRelease(patched.window, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert "Concert_harp.sfz" in dialog.state.text()
@@ -86,7 +85,7 @@ def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
             time.sleep(0.01)
 
     monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
-    qtbot.waitUntil(lambda: patched.performance.live.ready)
+    qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog = open_dialog(qtbot, patched)
     qtbot.waitUntil(dialog.isActiveWindow)
     qtbot.mouseClick(dialog.save, Qt.MouseButton.LeftButton)
@@ -107,7 +106,7 @@ def test_keys_play_and_shortcuts_work_while_it_runs(
     assert active is not None
     focused = active.focusWidget() or active
     qtbot.keyPress(focused, Qt.Key.Key_A)
-    assert patched.performance.live.sounding()
+    assert patched.performance.notes.keys.sounding()
     qtbot.keyRelease(focused, Qt.Key.Key_A)
     looped = patched.session.choices.loop
     qtbot.keyClick(focused, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
@@ -151,7 +150,7 @@ def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypat
                 time.sleep(0.01)
         except Cancelled:
             ended.set()
-            raise ValueError("told to nobody") from None
+            raise ValueError("shown to nobody") from None
 
     monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
     dialog = open_dialog(qtbot, patched)

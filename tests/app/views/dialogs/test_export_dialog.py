@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QAbstractButton, QComboBox, QDoubleSpinBox, QListW
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
+from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.presets.library import list_presets
@@ -34,7 +35,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
     def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
         export = ExportChoices.model_validate(settings)
-        choices = Choices(preset="small", position=0.4).model_copy(update=heard or {})
+        choices = Choices(instrument=SingleString(preset="small"), position=0.4).changed(heard or {})
         dialog = ExportDialog(entries, choices, export)
         qtbot.addWidget(dialog)
         dialog.show()
@@ -217,7 +218,7 @@ def test_a_name_without_its_suffix_gets_it(made) -> None:
 
 def test_what_the_patch_adds_is_said_not_to_be_in_the_files(made) -> None:
     guitar = read_patch(PATCHES / "classical_guitar.json")
-    dialog = made({}, {"patch": guitar})
+    dialog = made({}, {"instrument": guitar.model_copy(update={"preset": "small"})})
     words = "The string alone, without the body, room and level that Classical guitar gives it"
     assert words in dialog.sound.what.text()
     assert words in dialog.batch.what.text()
