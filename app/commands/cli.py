@@ -16,7 +16,21 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, batch, faust, info, learn, listing, motion, patches, play, plugin, render, sampled
+from app.commands import (
+    abx,
+    batch,
+    faust,
+    info,
+    instruments,
+    learn,
+    listing,
+    motion,
+    patches,
+    play,
+    plugin,
+    render,
+    sampled,
+)
 from app.shared.thread_priority import wait_asleep
 from engine.result_file import explain
 from training.cli import evaluation, family, sweep, tables, training
@@ -83,6 +97,7 @@ for command in (
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
 cli.add_typer(abx.abx, name="abx")
+cli.add_typer(instruments.instruments, name="instruments")
 cli.add_typer(family.family, name="family")
 
 

@@ -34,7 +34,10 @@ ListenRight = Annotated[
 ]
 PickupOption = Annotated[
     Pickup,
-    typer.Option(help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s."),
+    typer.Option(
+        help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s; bridge is the "
+        "force on the end at 0, its full scale is 20 N."
+    ),
 ]
 DecayDb = Annotated[
     float | None,

@@ -418,7 +418,7 @@ class Notes:
                     voice,
                     model,
                     initial_m,
-                    asked.ear.weights(model.grid_points),
+                    program.grid_weights(asked.ear),
                     (subject, asked.pluck, asked.ear.points, asked.ear.solo, asked.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),

@@ -46,7 +46,7 @@ class Listening:
         seconds = (signal.frames + MIRRORED) / signal.rate_hz if program.rendered else 0.0
         self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
         self._offline.voice.begin_at_once()
-        self._weights = ear.weights(initial_m.shape[1])
+        self._weights = program.grid_weights(ear)
         self._given = 0  # samples that the voice was given
         self._last = np.zeros((0, len(ear.points)), np.float32)  # the last of them
         self._state: SourceState | None = None

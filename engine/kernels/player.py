@@ -32,7 +32,14 @@ from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import TOO_HIGH
-from engine.pluck import FULL_SCALE_M, LARGEST_AMPLITUDE_MM, LEAST_PEAK_M, POSITION_RANGE, RUNAWAY_FACTOR
+from engine.pluck import (
+    FULL_SCALE_M,
+    FULL_SCALE_N,
+    LARGEST_AMPLITUDE_MM,
+    LEAST_PEAK_M,
+    POSITION_RANGE,
+    RUNAWAY_FACTOR,
+)
 
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
@@ -324,7 +331,7 @@ def _pull(
         distance = (x - position) / width
         if shape == of.TRIANGULAR:
             found = peak_m * min(x / position, (1 - x) / (1 - position))
-        elif point == 0 or point == grid - 1:
+        elif point == 0 or point == grid - 1 or shape == of.ROUNDED:
             found = 0.0
         elif shape == of.GAUSSIAN:
             found = peak_m * math.exp(-distance * distance)
@@ -333,6 +340,8 @@ def _pull(
         player[of.PLAYER_PULLED + point] = found
         highest = max(highest, found)
     turn = 2 * (grid - 1)
+    if shape == of.ROUNDED:
+        highest = _round(player, table, grid, position, peak_m, width)
     for mode in range(modes):
         total, place = 0.0, 0
         for point in range(1, grid - 1):
@@ -345,6 +354,27 @@ def _pull(
 
 
 @njit(**COMPILED)
+def _round(player: np.ndarray, table: np.ndarray, grid: int, position: float, peak_m: float, width: float) -> float:
+    """Fills the pulled shape, which is 0, with a rounded triangle, and returns its peak: as `excitation.rounded`."""
+    turn = 2 * (grid - 1)
+    for mode in range(1, grid - 1):
+        half = mode * width / 2
+        spread = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
+        each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, 0
+        for point in range(1, grid - 1):
+            place += mode
+            if place >= turn:
+                place -= turn
+            player[of.PLAYER_PULLED + point] += each * table[of.TABLE_SINES + place]
+    highest = 0.0
+    for point in range(grid):
+        highest = max(highest, player[of.PLAYER_PULLED + point])
+    for point in range(grid):
+        player[of.PLAYER_PULLED + point] *= peak_m / highest
+    return peak_m
+
+
+@njit(**COMPILED)
 def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: int, note: int) -> None:
     """Sets one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
     n, solo = players[note + of.NOTE_MODES], players[note + of.NOTE_SOLO]
@@ -354,9 +384,13 @@ def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: in
         omega = math.sqrt(max(strings.omega_squared(own, mode) - sigma * sigma, 0.0))
         for point in range(players[note + of.NOTE_POINTS]):
             first = at.weights(n, which, point, 0) + mode - 1
-            sine = math.sin(math.pi * mode * player[note + of.NOTE_POINT + point])
+            place = player[note + of.NOTE_POINT + point]
+            if place == of.BRIDGE:
+                weight = strings.bridge_force(own, mode) / FULL_SCALE_N
+            else:
+                weight = math.sin(math.pi * mode * place) / FULL_SCALE_M
             heard = omega <= highest and (solo == 0 or solo == mode)
-            voice[first] = sine / FULL_SCALE_M if heard else 0.0
+            voice[first] = weight if heard else 0.0
             voice[first + n] = 0.0
 
 
@@ -396,6 +430,11 @@ def _make_voice(
     first += at.OMEGA_SQUARED * n
     strings.rows(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING], n, voice[first : first + 4 * n])
     _weigh(player, players, voice, 0, note)
+    if player[note + of.NOTE_POINT] == of.BRIDGE:
+        largest = 0.0
+        for mode in range(n):
+            largest += abs(player[of.PLAYER_AMPLITUDES + mode] * voice[at.weights(n, 0, 0, 0) + mode])
+        voice[at.LIMIT] = max(voice[at.LIMIT], RUNAWAY_FACTOR * largest)
 
 
 @njit(inline="always", **COMPILED)
@@ -714,7 +753,7 @@ def _note_on(
         harder = _value(player, players, table, tables, of.HARDEST_MM) / soft
         amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
         width = _value(player, players, table, tables, of.WIDTH)
-        width += (_value(player, players, table, tables, of.WIDTH_HARD) - width) * share
+        width *= (_value(player, players, table, tables, of.WIDTH_HARD) / width) ** share
         position, slide = (
             _value(player, players, table, tables, of.POSITION),
             players[_channel(channel) + of.CHANNEL_SLIDE],

@@ -41,7 +41,8 @@ EVENT_SLOTS = 16
 
 # Slots of an instrument's table
 POLY, GUITAR, MPE = 0, 1, 2
-GAUSSIAN, TRIANGULAR, RAISED_COSINE = 0, 1, 2
+GAUSSIAN, TRIANGULAR, RAISED_COSINE, ROUNDED = 0, 1, 2, 3
+BRIDGE = -1.0  # a listening point that is none: the force on the end at 0
 BY_TENSION, BY_LENGTH = 0, 1
 KEYS = 128
 GUITAR_STRINGS = 8  # at most, of a guitar that sends MIDI

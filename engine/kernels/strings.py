@@ -54,6 +54,13 @@ def omega_squared(string: np.ndarray, mode: int) -> float:
 
 
 @njit(**EXACT)
+def bridge_force(string: np.ndarray, mode: int) -> float:
+    """Force of a mode at amplitude 1 m on the end at 0, in N: as `StringParameters.bridge_forces`."""
+    eta = mode * math.pi / string[of.LENGTH]
+    return string[of.TENSION] * eta + string[of.MODULUS] * string[of.MOMENT] * eta**3
+
+
+@njit(**EXACT)
 def modes_below(string: np.ndarray, frequency_hz: float) -> int:
     """The number of modes whose undamped frequency lies below: as `StringParameters.modes_below`."""
     omega = 2 * math.pi * frequency_hz

@@ -107,7 +107,7 @@ def voice_blocks(
 
 def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanced: Callable[[float], None]) -> None:
     """Renders all samples of a voice beforehand."""
-    weights = ear.weights(source.grid_points)
+    weights = voice.program.grid_weights(ear)
     state = source.start(initial_m[None])
     voice.append(((initial_m.double() @ weights)[None] / FULL_SCALE_M).float().numpy())
     total = voice.room

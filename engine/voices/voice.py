@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
-from engine.kernels.layout import ATTACK_S, BRIGHTER, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
+from engine.kernels.layout import ATTACK_S, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
 from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
@@ -54,8 +54,8 @@ class Voice:
         counts[at.ENDS_AT] = round(min(program.ends_s, LONGEST_S) * program.rate_hz)
         counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
-        memory[at.PEAK] = peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
-        memory[at.LIMIT] = RUNAWAY_FACTOR * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
+        memory[at.PEAK] = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        memory[at.LIMIT] = RUNAWAY_FACTOR * ear.largest(displacement_m, program.force) / FULL_SCALE_M
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second

@@ -269,6 +269,8 @@ def _shape_text(choices: Choices) -> str:
 
 
 def _heard_text(choices: Choices) -> str:
+    if choices.pickup == "bridge":
+        return "heard at the bridge"
     heard = f"heard at {choices.listen:.2f}"
     if choices.stereo:
         heard += f" (left) and {choices.listen_right:.2f} (right)"

@@ -65,6 +65,10 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     np.testing.assert_allclose(mu2 * (t[0] + b[0] * mu2), key.resonator.omega.numpy() ** 2, rtol=1e-12)
     np.testing.assert_allclose(c[0] + d[0] * mu2, key.resonator.sigma.numpy(), rtol=1e-12)
     assert (t[1], loud[1]) == (t[0], 0)  # a silent key has a neighbour's string
+    at_bridge = key_tables([key], bridge=True)[4][0] * mu2 * (t[0] + b[0] * mu2) / np.sqrt(mu2)
+    assert key.resonator.end_force is not None
+    expected = key.gain * key.string.shortened * key.resonator.end_force.numpy()
+    np.testing.assert_allclose(at_bridge, expected, rtol=1e-12)
 
 
 def test_the_program_says_what_it_is(preset: Preset) -> None:
@@ -96,6 +100,7 @@ def test_a_patch_without_a_string_is_told(preset: Preset) -> None:
                 "tuning": TuningChoice(a4_hz=415.0),
             },
         ),
+        ((45, 69), {"pickup": Pickup(kind="bridge")}),
     ],
 )
 def test_it_sounds_as_our_quiet_pluck(

@@ -518,7 +518,7 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     assert not transport.knobs["listen_right"].isEnabled()
     places = [knob.pos() for knob in transport.knobs.values()]
     transport._stereo.click()
-    transport._velocity.click()
+    transport._pickup.activated.emit(transport._pickup.findData("velocity"))
     assert session.choices.stereo
     assert session.choices.pickup == "velocity"
     assert transport.knobs["listen_right"].isEnabled()
@@ -533,4 +533,4 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     left, right = session.choices.listen, session.choices.listen_right
     assert ears == [Ear((left, right), "velocity"), Ear((left,))]
     assert not transport._stereo.isChecked()
-    assert not transport._velocity.isChecked()
+    assert transport._pickup.currentData() == "displacement"

@@ -334,19 +334,19 @@ def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, pla
 
 def test_the_transport_changes_where_the_patch_is_heard(played: Controller) -> None:
     transport, before = played.window.transport, played.session.choices
-    transport._velocity.click()
+    transport._pickup.activated.emit(transport._pickup.findData("bridge"))
     transport._stereo.setChecked(not before.stereo)
     played.session.move_listening_point(0.21)
     patch = played.session.choices.patch
     assert patch is not None
-    assert patch.pickup.kind == "velocity"
+    assert patch.pickup.kind == "bridge"
     assert (len(patch.pickup.points) == 2) is not before.stereo
     assert patch.pickup.points[0] == 0.21
     assert played.window.instrument.bar.save.isEnabled()
     assert heard(played) == patch
     played.patches.choose("concert_harp")
     harp = read_patch(PATCHES / "concert_harp.json")
-    assert transport._velocity.isChecked() == (harp.pickup.kind == "velocity")
+    assert transport._pickup.currentData() == harp.pickup.kind
     assert transport._stereo.isChecked() == (len(harp.pickup.points) == 2)
 
 

@@ -130,14 +130,16 @@ def test_a_recording_that_cannot_be_written_is_kept(
     qtbot.waitUntil(lambda: len(told.good) == 1)
 
 
-@pytest.mark.parametrize("button", ["_velocity", "_stereo"])
+@pytest.mark.parametrize("button", ["_pickup", "_stereo"])
 def test_it_is_recorded_as_it_is_heard(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, button: str
 ) -> None:
     """Not as the patch was saved."""
     told.answers = [tmp_path / "before.wav", tmp_path / "after.wav"]
     played.patches.change("knobs.decay", 10.0)
-    for turn in (lambda: None, getattr(played.window.transport, button).click):
+    control = getattr(played.window.transport, button)
+    change = control.click if button == "_stereo" else lambda: control.activated.emit(control.findData("velocity"))
+    for turn in (lambda: None, change):
         turn()
         played.patches.recordings.record()
         played.window.instrument.pressed.emit(60, 100)  # and held: when it is released would differ
@@ -146,7 +148,7 @@ def test_it_is_recorded_as_it_is_heard(
     qtbot.waitUntil(lambda: len(told.good) == 2)
     before, after = (soundfile.read(tmp_path / name, always_2d=True)[0] for name in ("before.wav", "after.wav"))
     assert before.shape[1] == after.shape[1] == 2
-    side = {"_velocity": 0, "_stereo": 1}[button]  # the left one stays where it was
+    side = {"_pickup": 0, "_stereo": 1}[button]  # the left one stays where it was
     assert np.abs(before[:4_800, side] - after[:4_800, side]).max() > 0.05 * np.abs(before).max()
 
 
