@@ -218,7 +218,7 @@ def _rest_s(patch: Patch) -> float:
 
 
 def _heard(patch: Patch) -> str:
-    """Displacement of a mode that is let go at rest, its velocity, or its force at the bridge but for a factor."""
+    """Displacement of a mode that is released at rest, its velocity, or its force at the bridge less a factor."""
     if patch.pickup.kind == "velocity":
         return "0 - b * w2 / omega"
     displacement = "a + b * sigma / omega"

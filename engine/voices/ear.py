@@ -39,12 +39,12 @@ class Ear:
         return FULL_SCALES[self.pickup]
 
     def weights(self, grid_points: int, force: Tensor | None = None) -> Tensor:
-        """float64 (grid_points, points): displacement @ weights is what is heard; 0 for a mode beyond the grid.
+        """float64 (grid_points, points): displacement @ weights is the signal; 0 for a mode beyond the grid.
 
         It is in m, of which the velocity is taken later; at the bridge, in N times the ratio of the full scales.
 
         Args:
-            force: `Resonator.force_weights` of what is heard at the bridge.
+            force: `Resonator.force_weights` of the string, for the bridge.
 
         Raises:
             ValueError: it has no bridge.
@@ -61,7 +61,7 @@ class Ear:
         return (force * (FULL_SCALE_M / FULL_SCALE_N))[:, None].repeat(1, len(self.points))
 
     def largest(self, displacement_m: Tensor, force: Tensor | None = None) -> float:
-        """A bound of what is heard of a string that is let go so, in the unit of `weights`; narrow plucks pass it.
+        """A bound of the signal after a release from this shape, in the unit of `weights`; narrow plucks pass it.
 
         A velocity is bounded by ten times the displacement of full scale. The force at an end never passes tension
         times the steepest slope: waves to both sides have half of it each, and the end doubles it.

@@ -77,7 +77,7 @@ class Program:
         return found
 
     def grid_weights(self, ear: Ear) -> Tensor:
-        """As `Ear.weights`, for its string; displacement @ weights is what is heard."""
+        """As `Ear.weights`, for its string; displacement @ weights is the signal."""
         return ear.weights(self.grid_points, self.force)
 
     @property

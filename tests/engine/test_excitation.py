@@ -77,4 +77,4 @@ def test_a_rounded_triangle_is_the_triangle_under_a_spread_force() -> None:
 
 def test_a_narrow_one_is_the_triangle() -> None:
     narrow, sharp = rounded(0.3, 1e-6, 2e-3, 101), triangular(0.3, 2e-3, 101)
-    torch.testing.assert_close(narrow, sharp, atol=2e-5, rtol=0)  # but for modes beyond the grid
+    torch.testing.assert_close(narrow, sharp, atol=2e-5, rtol=0)  # except modes beyond the grid

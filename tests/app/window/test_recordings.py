@@ -137,6 +137,7 @@ def test_it_is_recorded_as_it_is_heard(
     """Not as the patch was saved."""
     told.answers = [tmp_path / "before.wav", tmp_path / "after.wav"]
     played.patches.change("knobs.decay", 10.0)
+    played.session.update(pickup="displacement")  # at the bridge both sides hear the same
     control = getattr(played.window.transport, button)
     change = control.click if button == "_stereo" else lambda: control.activated.emit(control.findData("velocity"))
     for turn in (lambda: None, change):

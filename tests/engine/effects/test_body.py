@@ -56,7 +56,7 @@ def test_the_higher_modes_are_as_dense_as_the_plates() -> None:
 
 
 def test_a_membrane_has_the_modes_of_bessels_functions() -> None:
-    """(0,1) … (1,2) are the first ten, pairs with a diameter counted twice; the density goes on from there."""
+    """(0,1) … (1,2) are the first ten, pairs with a diameter counted twice; the density continues from there."""
     radius_m, first_hz = 0.14, 300.0
     (_, _), (to_hz, density) = membrane(radius_m, first_hz)
     highest_hz = 2.95 * first_hz  # between (1,2) at 2.917 and (4,1) at 3.156
