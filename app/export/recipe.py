@@ -11,7 +11,7 @@ from typing import Literal
 import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from app.export.sound import LONGEST_S, SoundRequest
+from app.export.sound import LONGEST_S, SoundRequest, Through
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
@@ -87,7 +87,7 @@ class Recipe(BaseModel):
         preset_rate_hz: the rate at which the model played.
         string: the string that a preset of many played, with so many `modes`; None: the preset's own.
         horizon_s: the training horizon, past which the model extrapolates.
-        full_scale_m: the displacement that is 0 dBFS.
+        full_scale_m: the displacement that is 0 dBFS, of a string alone.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -114,6 +114,7 @@ class Recipe(BaseModel):
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
     string: StringParameters | None = None
     modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
+    through: Through | None = None
 
     @field_validator("string", mode="before")
     @classmethod
@@ -152,6 +153,7 @@ class Recipe(BaseModel):
             fade_out_s=settings.fade_out_s,
             string=info.string if many else None,
             modes=info.modes if many else None,
+            through=request.through,
         )
 
     def request(self, preset: Preset) -> SoundRequest:
@@ -175,6 +177,7 @@ class Recipe(BaseModel):
             self.pickup,
             self.difference_gain_db,
             self.decay_db,
+            self.through,
         )
 
     @property

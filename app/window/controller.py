@@ -33,7 +33,6 @@ from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.abx_dialog import AbxDialog
-from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.help_dialog import HelpDialog
 from app.views.dialogs.preset_browser import PresetBrowser
 from app.views.instrument.patch_browser import PatchBrowser
@@ -41,8 +40,8 @@ from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
-from app.window.dragged_export import DraggedExport
 from app.window.dropped_files import receive
+from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.main_window import KEY_NAMES, KEYS, PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
@@ -51,7 +50,6 @@ from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
-from app.window.sampled_export import SampledExport
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
@@ -143,13 +141,19 @@ class Controller(QObject):
         for dragged in (window.instrument.bar, window.instrument.knobs):
             dragged.drag_started.connect(self.history.hold)
             dragged.drag_ended.connect(self.history.let_go)
-        self.dragged = DraggedExport(
-            window.transport.export, lambda: (self.library.entries, self.session.choices, self._settings.export)
+        self.exports = Exports(
+            self.session,
+            self.library,
+            self.patches.recordings,
+            self.performance.through,
+            (settings.export, settings.sampled),
+            window.transport.export,
+            window,
         )
-        self.dragged.told.connect(window.notices.tell)
-        self.sampled = SampledExport(self.session, self.library, settings.sampled, window)
-        self.sampled.told.connect(window.notices.tell)
-        window.sampled_asked.connect(self.sampled.open)
+        self.exports.told.connect(window.notices.tell)
+        window.transport.export_asked.connect(lambda: self.exports.open("note"))
+        window.export_asked.connect(lambda: self.exports.open("note"))
+        window.sampled_asked.connect(lambda: self.exports.open("sampler"))
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -181,8 +185,6 @@ class Controller(QObject):
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
-        window.transport.export_asked.connect(self.export)
-        window.export_asked.connect(self.export)
         window.abx_asked.connect(self.listening_test)
         window.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
@@ -248,21 +250,6 @@ class Controller(QObject):
                 self.performance.play_or_stop()
             self.window.transport.show_playing(self.performance.playing)
 
-    def export(self) -> None:
-        choices = self.session.choices
-        if self.entry is None:
-            self.window.notices.tell("There is no preset to export: choose one first.")
-            return
-        dialog = ExportDialog(
-            self.library.entries,
-            choices,
-            self._settings.export,
-            self.window,
-        )
-        dialog.exec()
-        dialog.accept()  # ends a job that still runs, where the program was quit
-        self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
-
     def listening_test(self) -> None:
         """Opens the ABX test of the chosen pluck; until it is closed nothing else plays."""
         entry = self.entry
@@ -327,9 +314,8 @@ class Controller(QObject):
             self._abx.abandon()
         self._timer.stop()
         self._deck_timer.stop()
-        self.dragged.close()
         self.keeper.close()
-        self.sampled.close()
+        self.exports.close()
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:
@@ -342,7 +328,8 @@ class Controller(QObject):
         return self._settings.model_copy(
             update={
                 "choices": self.session.choices,
-                "sampled": self.sampled.choices,
+                "export": self.exports.choices[0],
+                "sampled": self.exports.choices[1],
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.appearance.look,
@@ -376,7 +363,7 @@ class Controller(QObject):
             panel.choices_changed(names)
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
-        self.sampled.choices_changed(names)
+        self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)
         self._wake()

@@ -90,7 +90,7 @@ class PatchDesk(QObject):
         self._playback = Playback(instruments.play, performance.notes, performance.live.cancel)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
-        self.recordings = Recordings(session, library, performance.live, panel.bar, self)
+        self.recordings = Recordings(session, performance.live, panel.bar, self)
         self.recordings.told.connect(self.told)
         self.recordings.informed.connect(self.informed)
         self.reload()
@@ -491,10 +491,9 @@ class PatchDesk(QObject):
         self.recordings.tick(now_s)
 
     def close(self) -> None:
-        """Ends the playback, and waits until a recording is written; may be called again."""
+        """Ends the playback; may be called again."""
         self._note_timer.stop()
         self._playback.stop()
-        self.recordings.close()
 
     def _show_entries(self) -> None:
         entry = self.entry

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
+from app.export.sound import Through
 from app.instrument.events import Event
 from app.instrument.player import Struck
 from app.patches.patch import Patch
@@ -248,6 +249,13 @@ class Performance(QObject):
             choices = choices.changed(choices_of(patch))
         self.notes.listen(heard_ear(choices))
         self.live.set_patch(choices.patch, heard_ear(choices))
+
+    def through(self, choices: Choices) -> Through | None:
+        """What the instrument adds to the chosen string: its level, body and room; None: there is no instrument."""
+        patch, string = self.live.heard_through, choices.string
+        if patch is None:
+            return None
+        return Through.of(patch, 1.0 if string is None else self.live.gain_of(string.parameters))
 
     def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
         """Model and truth of a pluck as they are heard, (frames, channels) by source, rendered in the background.

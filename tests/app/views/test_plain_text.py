@@ -16,7 +16,7 @@ from pytestqt.qtbot import QtBot
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.patches.library import SHIPPED, PatchEntry, read_patch
-from app.presets.library import PresetEntry
+from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.plain import Label, plain_tip
@@ -24,10 +24,11 @@ from app.views.controls.preset_bar import PresetBar
 from app.views.controls.readout import Readout
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.export_pages import HeardInstrument
 from app.views.dialogs.preset_browser import PresetBrowser
-from app.views.dialogs.sampled_dialog import SampledDialog
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_browser import PatchBrowser
+from app.window.exports import heard_note
 from engine.presets import read_info
 
 EVIL = "<img src=evil>"
@@ -68,10 +69,11 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
 ) -> None:
     notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), PresetBrowser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
-    dialog = ExportDialog([entry], Choices(preset=entry.name), export)
+    dialog = ExportDialog(export, SampledChoices(folder=str(tmp_path / EVIL)))
     patch = read_patch(SHIPPED / "classical_guitar.json")
-    sampled = SampledDialog(patch, entry, SampledChoices(folder=str(tmp_path / EVIL)))
-    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog, sampled]
+    note = heard_note(Choices(preset=entry.name), Library([entry]), None)
+    dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})
+    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
     for view in views:
         qtbot.addWidget(view)
     notices.tell(f"{EVIL}: tensor {EVIL} is unknown", EVIL)

@@ -17,9 +17,6 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.patches.patch import PhysicalString
-from app.presets.library import list_presets
-from app.session.choices import Choices
-from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
 from engine.presets import find_string, read_string
 from engine.presets.finding import SHIPPED
@@ -46,8 +43,8 @@ def short(controller: Controller) -> Controller:
 
 def set_to(controller: Controller, **export: object) -> None:
     """As the export dialog would have been set last."""
-    chosen = ExportChoices.model_validate({**controller._settings.export.model_dump(), **export})
-    controller._settings = controller._settings.model_copy(update={"export": chosen})
+    before, sampled = controller.exports.choices
+    controller.exports._choices = ExportChoices.model_validate({**before.model_dump(), **export}), sampled
 
 
 def drag(qtbot: QtBot, controller: Controller, until: str = "rendered") -> None:
@@ -74,11 +71,12 @@ def test_it_is_what_the_dialog_writes(
 ) -> None:
     set_to(short, folder=str(tmp_path), **export)
     drag(qtbot, short)
-    dialog = ExportDialog(short.library.entries, short.session.choices, short._settings.export)
-    qtbot.addWidget(dialog)
+    short.exports.open("note")
+    dialog = short.exports.dialog
+    assert dialog is not None
     dialog.save.click()
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
-    written = list(dialog.sound.paths().values())
+    written = list(dialog.note.paths().values())
     assert [path.name for path in dropped] == [path.name for path in written]
     assert [path.read_bytes() for path in dropped] == [path.read_bytes() for path in written]
 
@@ -155,21 +153,3 @@ def test_the_string_that_is_chosen_is_what_is_exported_and_comes_back(
     assert short.session.choices.string is None
     short.take_file(file)
     assert (short.session.choices.preset, short.session.choices.string) == ("studio_any_string", string)
-
-
-def test_a_batch_plays_the_string_where_all_presets_can(qtbot: QtBot, preset_folder: Path) -> None:
-    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
-    entries, _ = list_presets(preset_folder)
-    string = PhysicalString.model_validate(vars(read_string(find_string("steel_g3"))))
-
-    def dialog(*presets: str) -> ExportDialog:
-        export = ExportChoices.model_validate({"batch": {"presets": presets}})
-        made = ExportDialog(entries, Choices(preset="studio_any_string", string=string), export)
-        qtbot.addWidget(made)
-        return made
-
-    alone = dialog("studio_any_string")
-    (played,) = alone.batch.plan(alone.export_choices()).strings
-    assert played.parameters == string.parameters and played.name.startswith("196.")
-    mixed = dialog("studio_any_string", "first")
-    assert mixed.batch.plan(mixed.export_choices()).strings == ()
