@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands import abx, batch, faust, info, listing, motion, patches, play, render, sampled
+from app.commands import batch, faust, info, listing, motion, patches, play, render, sampled
 from app.shared.thread_priority import wait_asleep
 from engine.result_file import explain
 from training.cli import evaluation, family, sweep, tables, training
@@ -79,7 +79,6 @@ for command in (
     cli.command()(command)
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
-cli.add_typer(abx.abx, name="abx")
 cli.add_typer(family.family, name="family")
 
 
