@@ -11,7 +11,7 @@ from app.shared.vocabulary import Bits
 if TYPE_CHECKING:
     from app.export.wav import WavSettings
 
-Chosen = Literal["model", "truth", "difference", "both", "files"]
+Chosen = Literal["model", "truth", "difference", "files"]
 
 
 class ExportChoices(BaseModel):

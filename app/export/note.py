@@ -10,7 +10,7 @@ from pathlib import Path
 from app.export.choices import Chosen, ExportChoices
 from app.export.files import SoundRequest, WavReport, default_file_name, export_sounds
 from app.export.sound import Through
-from app.shared.vocabulary import Pickup, Source
+from app.shared.vocabulary import Pickup, PlayedSource, Source
 from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.presets import load_preset, of_string
@@ -36,11 +36,6 @@ class Note:
     string: StringParameters | None = None
     through: Through | None = None
 
-    def in_stereo(self, alone: bool) -> bool:
-        """Whether its file has two channels; `alone`: of the string alone."""
-        wide = self.through is not None and not alone and self.through.effects is not None
-        return wide or self.listen_right is not None
-
     def file_name(self, rate_hz: int, source: Source) -> str:
         """A name with preset, string, pluck, rate (0: the model's) and source."""
         first_hz = "" if self.string is None else f"_{self.string.undamped_frequency(1) / math.tau:.1f}Hz"
@@ -58,15 +53,15 @@ class HeardNote:
     """
 
     note: Note
-    source: Source
+    source: PlayedSource
     another: bool
     difference_gain_db: float
     words: str
 
     def chosen(self, last: Chosen) -> Chosen:
         """What is saved: what is heard; where both were saved last and one of them is heard, both again."""
-        both = last in ("files", "both") and self.source != "difference" and not self.another
-        return last if both else self.source
+        both = last == "files" and self.source != "difference" and not self.another
+        return "files" if both else self.source
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,6 @@ SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Truth", "truth"),
     ("Difference: model minus truth", "difference"),
     ("Both, in two files", "files"),
-    ("Both, model left and truth right", "both"),
 )
 RATES_HZ = (44_100, 48_000, 96_000)
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
@@ -228,12 +227,6 @@ class NotePage(ExportPage):
             return
         note = self._subject.note
         self.alone.setVisible(note.through is not None)
-        stereo, row = note.in_stereo(self.alone.isChecked()), self.source.findData("both")
-        with QSignalBlocker(self.source):
-            if stereo and row >= 0:
-                self.source.removeItem(row)
-            elif not stereo and row < 0:
-                self.source.addItem(*SOURCE_NAMES[-1])
         source, rate_hz = self.source.currentData(), self._wav.rate.currentData()
         self.gain.setVisible(source == "difference")
         alone = "" if note.through is None else ". The string alone" if self.alone.isChecked() else _through(note)

@@ -58,7 +58,7 @@ TOUR = (
     ),
     (
         "Export",
-        "Ctrl+E saves what you hear as WAV: a note with body, room and level, its string alone, or what you recorded. "
+        "Ctrl+E saves what you hear as WAV: a note with body, room and level, its string alone, or a recording. "
         "A note's file stores its settings; drop it on the window to restore them. Ctrl+Shift+E exports the patch as "
         "an instrument for samplers.",
     ),

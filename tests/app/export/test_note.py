@@ -86,8 +86,7 @@ def test_a_body_that_has_changed_is_told() -> None:
     [
         ("truth", False, "model", "truth"),
         ("model", False, "files", "files"),
-        ("truth", False, "both", "both"),
-        ("difference", False, "both", "difference"),
+        ("difference", False, "files", "difference"),
         ("model", True, "files", "model"),
     ],
 )

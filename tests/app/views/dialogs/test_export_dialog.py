@@ -84,18 +84,14 @@ def test_it_writes_the_file_that_it_named(
     assert opened == [str(tmp_path)]
 
 
-def test_both_become_two_files_or_two_channels(qtbot: QtBot, made, tmp_path: Path) -> None:
+def test_both_become_two_files(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made({"source": "files"})
     run(qtbot, dialog, "Saved")
     assert wavs(tmp_path) == ["small_x0.40_a4.0_4000_model.wav", "small_x0.40_a4.0_4000_truth.wav"]
-    dialog.note.source.setCurrentIndex(dialog.note.source.findData("both"))
-    run(qtbot, dialog, "_both.wav")
-    assert soundfile.info(tmp_path / "small_x0.40_a4.0_4000_both.wav").channels == 2
 
 
 def test_stereo_and_the_pick_up_reach_the_file(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made(heard={"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
-    assert dialog.note.source.findData("both") == -1
     run(qtbot, dialog, "Saved")
     with soundfile.SoundFile(tmp_path / "small_x0.40_a4.0_4000_model.wav") as file:
         recipe = json.loads(file.comment)
@@ -168,8 +164,7 @@ def test_another_preset_that_is_heard_is_the_one_that_is_saved(made) -> None:
 
 def test_both_stay_chosen_while_one_of_them_is_heard(made) -> None:
     assert made({"source": "files"}, {"heard": "b"}).note.source.currentData() == "files"
-    assert made({"source": "both"}).note.source.currentData() == "both"
-    assert made({"source": "both"}, {"a": "difference"}).note.source.currentData() == "difference"
+    assert made({"source": "files"}, {"a": "difference"}).note.source.currentData() == "difference"
 
 
 def test_a_name_without_its_suffix_gets_it(made) -> None:
@@ -185,9 +180,8 @@ def test_what_the_patch_adds_is_heard_in_the_file_unless_the_string_alone_is_wan
     qtbot: QtBot, made, tmp_path: Path
 ) -> None:
     guitar = read_patch(PATCHES / "classical_guitar.json")
-    dialog = made({"source": "both"}, {"patch": guitar})
+    dialog = made({}, {"patch": guitar})
     assert "With the body, room and level of Classical guitar" in dialog.note.what.text()
-    assert dialog.note.source.currentData() == "files"  # in stereo, left and right are taken
     run(qtbot, dialog, "Saved")
     path = tmp_path / "small_x0.40_a4.0_4000_model.wav"
     through = read_recipe(path).through
