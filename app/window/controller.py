@@ -34,8 +34,8 @@ from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.help_dialog import HelpDialog
-from app.views.dialogs.preset_browser import PresetBrowser
-from app.views.instrument.patch_browser import PatchBrowser
+from app.views.dialogs.preset_card import preset_browser
+from app.views.instrument.patch_card import patch_browser
 from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
@@ -105,7 +105,7 @@ class Controller(QObject):
         self.library = Library([])
         problems = self.library.refresh()
         self.presets = PresetDesk(
-            self.session, self.library, window.presets, PresetBrowser(window), settings.favourites
+            self.session, self.library, window.presets, preset_browser(window), settings.favourites
         )
         self.panels = fill(window, self.session, self.library)
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
@@ -128,7 +128,7 @@ class Controller(QObject):
             self.performance,
             self.instruments,
             window.instrument,
-            PatchBrowser(window),
+            patch_browser(window),
             settings.patch_favourites,
         )
         self.patches.told.connect(window.notices.tell)
@@ -147,7 +147,6 @@ class Controller(QObject):
             self.patches.recordings,
             self.performance.through,
             (settings.export, settings.sampled),
-            window.transport.export,
             window,
         )
         self.exports.told.connect(window.notices.tell)
@@ -175,7 +174,7 @@ class Controller(QObject):
             panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)
             panel.told.connect(window.notices.tell)
-        self.presets.pluck_asked.connect(self.pluck)
+        self.presets.browser.played.connect(lambda name: self.pluck())
         self.presets.told.connect(window.notices.tell)
         window.previous_asked.connect(lambda: self.presets.step(-1))
         window.next_asked.connect(lambda: self.presets.step(1))
@@ -335,7 +334,7 @@ class Controller(QObject):
                 "look": self.appearance.look,
                 "midi": self.instruments.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
-                "patch_favourites": tuple(sorted(self.patches.favourites)),
+                "patch_favourites": tuple(sorted(self.patches.desk.favourites)),
                 "instrument": InstrumentChoice(
                     shown=self.window.shows_instrument,
                     surface=self.window.instrument.surface,

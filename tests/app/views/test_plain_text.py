@@ -25,9 +25,9 @@ from app.views.controls.readout import Readout
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
-from app.views.dialogs.preset_browser import PresetBrowser
+from app.views.dialogs.preset_card import preset_browser, preset_row
 from app.views.instrument.panel import InstrumentPanel
-from app.views.instrument.patch_browser import PatchBrowser
+from app.views.instrument.patch_card import patch_browser, patch_row
 from app.window.exports import heard_note
 from engine.presets import read_info
 
@@ -67,7 +67,7 @@ def texts(root: QObject) -> str:
 def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     qtbot: QtBot, entry: PresetEntry, tmp_path: Path
 ) -> None:
-    notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), PresetBrowser(), Readout()
+    notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
     dialog = ExportDialog(export, SampledChoices(folder=str(tmp_path / EVIL)))
     patch = read_patch(SHIPPED / "classical_guitar.json")
@@ -81,7 +81,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     bar.set_chosen(entry)
     slots.set_entries([entry])
     slots.show_choices(Choices(a=f"preset:{entry.name}", b="difference"))
-    browser.show_entries([entry], (), entry.name, 1, str(tmp_path / EVIL))
+    browser.show_rows([preset_row(entry)], (), entry.name, str(tmp_path / EVIL))
     readout.tell(EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
@@ -95,7 +95,7 @@ def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
     body = patch.body.model_copy(update={"name": EVIL})
     patch = patch.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
     entry = PatchEntry(Path("/x") / f"{EVIL}.json", patch)
-    panel, browser = InstrumentPanel(), PatchBrowser()
+    panel, browser = InstrumentPanel(), patch_browser()
     views: list[QWidget] = [panel, browser]
     for view in views:
         qtbot.addWidget(view)
@@ -103,7 +103,7 @@ def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
     panel.bar.show_note(EVIL)
     panel.knobs.show_facts({EVIL: EVIL})
     panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
-    browser.show_entries([entry], (), entry.name)
+    browser.show_rows([patch_row(entry)], (), entry.name, EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
         assert "evil" in texts(view)
