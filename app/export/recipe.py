@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -22,6 +22,9 @@ from engine.presets import Preset, PresetError, of_string, preset_digest
 from engine.resonators.string import StringParameters
 from engine.schema import parse_json, read
 from engine.sources import FULL_SCALE_M
+
+# fields of `SoundRequest`
+REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source", "through")
 
 
 class RecipeError(Exception):
@@ -136,13 +139,7 @@ class Recipe(BaseModel):
             version=program_version(),
             preset=request.preset.name,
             preset_sha256=preset_digest(request.preset.path),
-            pluck=request.pluck,
-            listen=request.listen,
-            listen_right=request.listen_right,
-            pickup=request.pickup,
-            seconds=request.seconds,
-            decay_db=request.decay_db,
-            source=request.source,
+            **{name: getattr(request, name) for name in REQUESTED},
             difference_gain_db=request.difference_gain_db if request.source == "difference" else 0.0,
             preset_rate_hz=info.rate_hz,
             horizon_s=info.horizon_s,
@@ -153,7 +150,6 @@ class Recipe(BaseModel):
             fade_out_s=settings.fade_out_s,
             string=info.string if many else None,
             modes=info.modes if many else None,
-            through=request.through,
         )
 
     def request(self, preset: Preset) -> SoundRequest:
@@ -167,18 +163,8 @@ class Recipe(BaseModel):
         """
         if self.string is not None:
             preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
-        return SoundRequest(
-            preset,
-            self.pluck,
-            self.listen,
-            self.seconds,
-            self.source,
-            self.listen_right,
-            self.pickup,
-            self.difference_gain_db,
-            self.decay_db,
-            self.through,
-        )
+        asked: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
+        return SoundRequest(preset, **asked, difference_gain_db=self.difference_gain_db)
 
     @property
     def settings(self) -> WavSettings:

@@ -1,6 +1,6 @@
 """A patch that is played: events come in, voices go out.
 
-events     what a player does: keys, bends, pedals; with their time, where they come from a file
+events     what a player does: keys, bends, pedals, plucks at a place; with their time, where they come from a file
 strings    which string a key is: its length for the pitch, and how a bend, a slide or a damper changes it
 glide      by how many cents a key starts above its resting pitch
 loudness   the gain that makes all keys of a patch equally loud

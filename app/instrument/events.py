@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from app.patches.patch import Patch
+from engine.pluck import Pluck
 
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
 VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
@@ -61,6 +62,13 @@ class PatchTurned:
     patch: Patch
 
 
+@dataclass(frozen=True)
+class PluckAt:
+    """The string that is shown is plucked at a place: by hand, or by a key that is a place."""
+
+    pluck: Pluck
+
+
 def fixed_function(number: int) -> str:
     """What a controller does whatever the patch, as "is the sustain pedal"; "" for one that may be assigned."""
     return _FIXED.get(number, "")
@@ -73,12 +81,12 @@ def moves_effects(event: object, patch: Patch) -> bool:
     return isinstance(event, PatchTurned)
 
 
-Event = NoteOn | NoteOff | Bend | Controller | PatchTurned
+Event = NoteOn | NoteOff | Bend | Controller | PatchTurned | PluckAt
 
 
 def channels_in(events: Iterable[Event]) -> set[int]:
     """The channels that events come on."""
-    return {event.channel for event in events if not isinstance(event, PatchTurned)}
+    return {event.channel for event in events if not isinstance(event, PatchTurned | PluckAt)}
 
 
 def let_go(channels: Iterable[int]) -> list[Event]:

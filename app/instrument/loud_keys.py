@@ -38,7 +38,7 @@ class LoudKeys:
         """Raises ValueError: the tuning is impossible."""
         self.patch, self.ear = patch, ear
         self._whole, self._grid_points = replace(ear, solo=0), grid_points
-        self._strings = Strings(patch)
+        self.strings = Strings(patch)
         self._response: Response | None = body_response(patch) if near is None else near._response
         self._over_db: float = self._peaks_over_db() if near is None else near._over_db
 
@@ -54,7 +54,7 @@ class LoudKeys:
 
     def string_of(self, key: int, string: int | None = None) -> KeyString | None:
         """As `of_key`, the string alone, which takes no time."""
-        found = self._strings.of_key(key, string)
+        found = self.strings.of_key(key, string)
         if found is not None and any(
             not found.parameters.decay_rate(mode) < found.parameters.undamped_frequency(mode)
             for mode in (1, found.modes)  # then of all between: see `engine.bounds.check_motion`
@@ -76,7 +76,7 @@ class LoudKeys:
 
     def _alone(self, key: int, number: int | None = None) -> LoudKey | None:
         """With the gain that makes it as loud as the others."""
-        string = self._strings.of_key(key, number)
+        string = self.strings.of_key(key, number)
         if string is None:
             return None
         modes = min(string.modes, self._grid_points - 2)

@@ -9,7 +9,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
+from app.instrument.events import (
+    KEYS,
+    Bend,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    PluckAt,
+    TimedEvent,
+    channels_in,
+)
 from app.instrument.midi_chunks import checked_chunks
 from app.instrument.strings import Strings
 from app.patches.patch import Patch
@@ -160,7 +171,7 @@ def _silent(patch: Patch, keys: Sequence[int]) -> int:
 
 
 def _on_keys(event: Event) -> Event:
-    return event if isinstance(event, PatchTurned) else replace(event, channel=KEYS)
+    return event if isinstance(event, PatchTurned | PluckAt) else replace(event, channel=KEYS)
 
 
 def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
@@ -185,7 +196,7 @@ def messages_of(event: Event) -> Iterable[Any]:
     """The mido messages of an event; none where MIDI has no message for it."""
     import mido
 
-    if isinstance(event, PatchTurned):
+    if isinstance(event, PatchTurned | PluckAt):
         return
     channel = 0 if event.channel == KEYS else event.channel % 16
     if isinstance(event, NoteOn):

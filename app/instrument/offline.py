@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.compiled import InstrumentPlayer
 from app.instrument.effects import channels_of, effects_of
 from app.instrument.events import (
     MOD_WHEEL,
@@ -19,18 +20,16 @@ from app.instrument.events import (
     TimedEvent,
     moves_effects,
 )
-from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD, QUANTUM
 from engine.presets import Preset
-from engine.voices import Ear, Mixer
+from engine.voices import Mixer
 
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
 SILENT_DB = -90.0  # re full scale: after the last event it ends where the peak of a block is lower
 MOST_RINGING = 96  # where more strings ring, the oldest fade out
-STOLEN_S = 0.03
 
 
 class _Stage:
@@ -42,37 +41,24 @@ class _Stage:
 
     def __init__(self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
-        self._gains = gains
-        self._struck: list[Struck] = []
-        self.player = Player(patch, preset, rate_hz, self._take, tuple(gains))
+        self.player = InstrumentPlayer(patch, preset, rate_hz, gains, most_notes=MOST_RINGING)
+        self.mixer.set_player(self.player.compiled)
+        self._dry = len(gains) > 1
         self.tail_s = 0.0
         self._set_effects()
-
-    def _take(self, struck: Struck) -> None:
-        self._struck = [each for each in self._struck if not each.over]
-        for each in self._struck[: max(0, len(self._struck) + 1 - MOST_RINGING)]:
-            for voice in each.voices.values():
-                voice.release(STOLEN_S)
-        for source, voice in struck.voices.items():
-            voice.start_with_gain(self._gains[source] * struck.gain)
-        self._struck.append(struck)
-        self.mixer.add(*struck.voices.values())
 
     def handle(self, event: Event, frame: int) -> None:
         self.player.handle(event, frame)
         if moves_effects(event, self.player.patch):
+            self.player.compiled.catch_up(self.mixer)
             self._set_effects()
 
     def render(self, frames: int) -> NDArray[np.float32]:
-        """The next frames; strings that ring follow the patch to other listening points, as in the window."""
-        ear = Ear(tuple(self.player.patch.pickup.points), self.player.patch.pickup.kind)
-        for struck in self._struck:
-            for voice in struck.voices.values():
-                voice.listen(ear)
+        """The next frames."""
         return self.mixer.render(frames)
 
     def _set_effects(self) -> None:
-        effects = effects_of(self.player.heard_through) if len(self._gains) == 1 else None
+        effects = None if self._dry else effects_of(self.player.heard_through)
         self.mixer.set_effects(effects)
         if effects is not None:
             self.tail_s = max(self.tail_s, effects.tail_s(self.mixer.rate_hz))
@@ -80,8 +66,7 @@ class _Stage:
     @property
     def silent(self) -> bool:
         """Whether nothing rings any more."""
-        self.mixer.forget_ended()
-        return not self.mixer.voices
+        return not self.mixer.active
 
 
 def render_events(

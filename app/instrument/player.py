@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from app.instrument import events
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.hands import GUITAR_STRINGS, Hands
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
@@ -252,7 +252,7 @@ class Player:
     # Events
 
     def handle(self, event: Event, frame: int = 0) -> Struck | None:
-        """Plays an event; what it struck, or None.
+        """Plays an event; what it struck, or None. A pluck at a place is none of a key's.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. Events
@@ -264,6 +264,8 @@ class Player:
         if isinstance(event, PatchTurned):
             self.take(self.loud_keys(event.patch))
             self.glide(frame)
+            return None
+        if isinstance(event, PluckAt):
             return None
         with self._lock:
             self._frame = frame

@@ -1,4 +1,4 @@
-"""The string of each key, and how a bend, a slide or a damper changes it.
+"""The string of each key, and how a bend, a slide or a damper changes it, by `engine.kernels.strings`.
 
 Pitch is that of the first partial of a quiet pluck, √(ω₁² - σ₁²)/2π. Fretting changes the length alone, a bend the
 tension alone; both are solved for the pitch in closed form, so that it is exact.
@@ -6,17 +6,19 @@ tension alone; both are solved for the pitch in closed form, so that it is exact
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
+from engine.kernels.playing_layout import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
 from engine.resonators.string import StringParameters
 
-HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
-MOST_MODES = 99  # the shipped model's grid holds no more
 HIGHEST_FRET = 24
-MOST_SLACKENED = 5  # keys by which a guitar's string may be tuned lower than the set's
+STRING = tuple(field.name for field in fields(StringParameters))
+KNOBS = tuple(Knobs.model_fields)  # in the order of the kernels
 
 
 @dataclass(frozen=True)
@@ -55,10 +57,9 @@ class Strings:
         Raises:
             ValueError: no string has that pitch; the message names the key and what is impossible.
         """
-        low, high = self._patch.range
-        if not (low <= key <= high and self._tuning.mapped(key)):
+        pitch_hz = self.pitch_hz(key)
+        if pitch_hz is None:
             return None
-        pitch_hz = self._tuning.hz(key)
         try:
             own = self._own(key, string)
             parameters = fretted(own, pitch_hz)
@@ -68,6 +69,15 @@ class Strings:
         except ValueError as error:
             raise ValueError(f"key {key} of {self._patch.name}, {pitch_hz:.4g} Hz: {error}") from error
         return KeyString(key, parameters, pitch_hz, modes, parameters.length_m / own.length_m)
+
+    def pitch_hz(self, key: int) -> float | None:
+        """The pitch of a key; None as in `of_key`."""
+        low, high = self._patch.range
+        return self._tuning.hz(key) if low <= key <= high and self._tuning.mapped(key) else None
+
+    def open_hz(self, note: int) -> float:
+        """The pitch of an open string, which the range does not limit."""
+        return self._tuning.hz(note)
 
     def _own(self, key: int, number: int | None) -> StringParameters:
         """The whole string on which a key is played, with the patch's knobs."""
@@ -101,24 +111,17 @@ def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
 
     The tension follows the mass and the square of the length, the damping the mass.
     """
-    area = knobs.gauge**2
-    mass = area * knobs.density
-    return replace(
-        string,
-        length_m=string.length_m * knobs.length * math.sqrt(knobs.tension),
-        area_m2=string.area_m2 * area,
-        second_moment_m4=string.second_moment_m4 * knobs.stiffness * knobs.gauge**4,
-        density_kg_m3=string.density_kg_m3 * knobs.density,
-        youngs_modulus_pa=string.youngs_modulus_pa * knobs.modulus,
-        damping_d1_kg_m_s=string.damping_d1_kg_m_s * knobs.decay * mass,
-        damping_d3_kg_m_s=string.damping_d3_kg_m_s * knobs.brightness_decay * mass,
-        tension_n=string.tension_n * mass * knobs.tension * knobs.length**2,
-    )
+    from engine.kernels import strings as kernel  # Numba only when it is needed
+
+    kernel.turned(_row(string), np.array([getattr(knobs, name) for name in KNOBS]), out := np.empty(len(STRING)))
+    return StringParameters(*out.tolist())
 
 
 def pitch_hz_of(string: StringParameters) -> float:
     """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
-    return math.sqrt(max(0.0, string.undamped_frequency(1) ** 2 - string.decay_rate(1) ** 2)) / (2 * math.pi)
+    from engine.kernels import strings as kernel
+
+    return float(kernel.pitch_hz(_row(string)))
 
 
 def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
@@ -127,14 +130,9 @@ def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
     Raises:
         ValueError: that length is out of bounds.
     """
-    mass, bending = string.mass_per_length_kg_m, string.youngs_modulus_pa * string.second_moment_m4
-    sigma = string.decay_rate(1)
-    for _ in range(4):  # σ₁ depends on the length, a little
-        load = mass * ((2 * math.pi * pitch_hz) ** 2 + sigma**2)
-        # EIη⁴ + T₀η² = ρAω², without the difference of near numbers
-        squared = 2 * load / (string.tension_n + math.sqrt(string.tension_n**2 + 4 * bending * load))
-        sigma = (string.damping_d1_kg_m_s + string.damping_d3_kg_m_s * squared) / (2 * mass)
-    return replace(string, length_m=math.pi / math.sqrt(squared))
+    from engine.kernels import strings as kernel
+
+    return replace(string, length_m=float(kernel.fretted(_row(string), pitch_hz)))
 
 
 def bent(string: StringParameters, ratio: float) -> StringParameters:
@@ -143,12 +141,9 @@ def bent(string: StringParameters, ratio: float) -> StringParameters:
     Raises:
         ValueError: there is none: stiffness alone is higher, or it is out of bounds.
     """
-    if ratio == 1:
-        return string
-    eta, mass = math.pi / string.length_m, string.mass_per_length_kg_m
-    sigma, wanted = string.decay_rate(1), ratio * 2 * math.pi * pitch_hz_of(string)
-    bending = string.youngs_modulus_pa * string.second_moment_m4
-    tension = (mass * (wanted**2 + sigma**2) - bending * eta**4) / eta**2
+    from engine.kernels import strings as kernel
+
+    tension = float(kernel.bent(_row(string), ratio))
     if not tension > 0:
         raise ValueError(f"no tension lowers it by a factor of {ratio:.3g}; bend less")
     return replace(string, tension_n=tension)
@@ -156,10 +151,18 @@ def bent(string: StringParameters, ratio: float) -> StringParameters:
 
 def slid(string: StringParameters, ratio: float) -> StringParameters:
     """The string with the length that raises its pitch by a ratio, as by a slide. Raises ValueError as `fretted`."""
-    return string if ratio == 1 else fretted(string, ratio * pitch_hz_of(string))
+    from engine.kernels import strings as kernel
+
+    return replace(string, length_m=float(kernel.slid(_row(string), ratio)))
 
 
 def damped(string: StringParameters, t60_s: float) -> StringParameters:
     """The string with a damper: each partial decays by 60 dB more in `t60_s`. Raises ValueError: out of bounds."""
-    added = 2 * string.mass_per_length_kg_m * math.log(1000) / t60_s
-    return replace(string, damping_d1_kg_m_s=string.damping_d1_kg_m_s + added)
+    from engine.kernels import strings as kernel
+
+    return replace(string, damping_d1_kg_m_s=float(kernel.damped(_row(string), t60_s)))
+
+
+def _row(string: StringParameters) -> NDArray[np.float64]:
+    """As the kernels take it."""
+    return np.array([getattr(string, name) for name in STRING])

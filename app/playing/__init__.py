@@ -1,12 +1,12 @@
-"""From gestures to sound: keys and MIDI, what is plucked, and the notes that ring.
+"""From events to sound: keys, MIDI and plucks at places become notes that ring.
 
-keyboard, midi, midi_port   gestures of instruments, as plucks or choices
+keyboard, midi, midi_port   what keys and controllers mean
 midi_backend                the system's MIDI
-chosen                      from what is chosen to what is plucked, heard and drawn
-stroke                      what is plucked and how it is mixed: values
+notes, note                 events become notes of the instrument; which ring, and how they are heard
+keys                        what the keys of a patch sound with, prepared in the background
 sources                     presets in memory, and the programs of their voices
-notes, ahead                the notes that ring; models that are rendered before they are heard
-live                        a patch that is played: events of keys and MIDI become notes
+ahead, levels               models that are rendered before they are heard; the level match
+recorder                    events as they are played, with their times
 playback, due               a MIDI file, played in its time
 pair                        two sounds side by side, for the listening test
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
@@ -20,6 +20,10 @@ ANYWHERE = (0.05, 0.95)  # of a model without trained positions
 ANY_AMPLITUDE_MM = (0.5, 10.0)
 SOFTEST_MM = 0.05
 LARGEST_VELOCITY = 127
+LOWEST_PLACE, HIGHEST_PLACE = (
+    36,
+    96,
+)  # keys of a keyboard of 61, which are places from one end of the reach to the other
 VELOCITY_STEP = 16
 DIGITS = 4  # after the point, for file names and recipes have them
 
@@ -67,6 +71,21 @@ class Reach:
             (max(low_mm, SOFTEST_MM), min(high_mm, LARGEST_AMPLITUDE_MM)),
         )
 
+    def pluck(self, key: int, velocity: int, pluck: Pluck) -> Pluck:
+        """The pluck of a key of a single string: `pluck` at the key's place, as hard as its velocity."""
+        place = self.place((key - LOWEST_PLACE) / (HIGHEST_PLACE - LOWEST_PLACE))
+        return replace(pluck, position=place, amplitude_mm=self.amplitude_of(velocity))
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """The positions of the computer's ten keys from A on."""
+        return tuple(self.place(number / (PLACES - 1)) for number in range(PLACES))
+
+    def turned(self, press: KeyPress, amplitude_mm: float) -> float | None:
+        """The amplitude after a key that changes it, as `turn` does a velocity; None for another key."""
+        turned = turn(press, 0, self.velocity_of(amplitude_mm))
+        return None if turned is None or press.letter.upper() in OCTAVE_STEPS else self.amplitude_of(turned[1])
+
     def place(self, share: float) -> float:
         """The position at 0 … 1 of the keys."""
         low, high = self.position
@@ -91,14 +110,6 @@ class KeyPress:
 
     letter: str
     code: int = 0
-
-
-@dataclass(frozen=True)
-class Played:
-    """What a key means: new values of `Choices`, and whether the string is then plucked."""
-
-    changes: dict[str, float]
-    plucks: bool
 
 
 def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
@@ -138,23 +149,6 @@ def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
         return codes.index(press.code) if press.code in codes else None
     found = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
     return found if found >= 0 else None
-
-
-def play(press: KeyPress, reach: Reach, amplitude_mm: float, platform: str = sys.platform) -> Played | None:
-    """The meaning of a key, `amplitude_mm` being the present amplitude; None for a key without one.
-
-    The row plucks; 1 … 9 are velocities from softest to loudest; C and V are softer and harder.
-    """
-    place = place_of(press, platform)
-    if place is not None:
-        return Played({"position": reach.place(place / (PLACES - 1))}, plucks=True)
-    letter = press.letter.upper()
-    if letter and letter in "123456789":
-        return Played({"amplitude_mm": reach.amplitude_of(_ninth(int(letter)))}, plucks=False)
-    step = {"C": -VELOCITY_STEP, "V": VELOCITY_STEP}.get(letter)
-    if step is None:
-        return None
-    return Played({"amplitude_mm": reach.amplitude_of(reach.velocity_of(amplitude_mm) + step)}, plucks=False)
 
 
 def _rounded(value: float, low: float, high: float) -> float:

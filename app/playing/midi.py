@@ -1,18 +1,15 @@
-"""What MIDI messages mean for one string: notes pluck it, controllers set the fields that they are assigned to."""
+"""The MIDI settings, and what the controllers that are assigned turn."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
-from app.instrument.events import Controller, Event, NoteOn, fixed_function
+from app.instrument.events import Controller, fixed_function
 from app.patches.patch import Patch
-from app.playing.keyboard import Reach
 from app.shared.parameters import LEARNABLE, MACROS, OF_CHOICES
 
-LOWEST_NOTE, HIGHEST_NOTE = 36, 96  # of a keyboard of 61 keys
 LARGEST_VALUE = 127
 
 NoteMode = Literal["pitch", "position", "preset"]
@@ -32,7 +29,7 @@ class MidiChoices(BaseModel):
 
     Attributes:
         port: the input's name; "": none.
-        notes: whether a note plays a pitch of the patch, sets the pluck position, or selects the preset.
+        notes: whether a note plays a key of the instrument, sets the pluck position, or selects the preset.
         controllers: field -> number of the controller that is assigned to it; other fields are absent. Those with a
             function of their own are left out, which earlier versions let be assigned.
     """
@@ -70,38 +67,19 @@ def turned(patch: Patch, field: str, value: float) -> Patch:
         return patch
 
 
-@dataclass(frozen=True)
-class Meaning:
-    """New values of `Choices`, and whether the string is then plucked."""
-
-    changes: dict[str, Any]
-    plucks: bool = False
-
-
-def meaning_of(
-    event: Event, choices: MidiChoices, reach: Reach, presets: list[str], patch: Patch | None = None
-) -> Meaning:
-    """What an event means; for a controller that is not assigned, and for a release, nothing.
+def turns_of(event: Controller, choices: MidiChoices, patch: Patch | None) -> dict[str, Any]:
+    """New values for `Choices.changed`, of all that a controller is assigned to.
 
     Args:
-        presets: the names that notes select, in their order.
-        patch: whose parameters and macros controllers turn; None: they turn none of them.
+        patch: whose parameters and macros it turns; None: it turns none of them.
     """
-    if isinstance(event, Controller):
-        fields = [field for field, controller in choices.controllers.items() if controller == event.number]
-        turns: dict[str, Any] = {}
-        for field in fields:
-            value = LEARNABLE[field].value(event.value / LARGEST_VALUE)
-            if field in OF_CHOICES:
-                turns[field] = value
-            elif patch is not None:
-                turns["patch"] = patch = turned(patch, field, value)
-        return Meaning(turns)
-    if not isinstance(event, NoteOn):
-        return Meaning({})
-    changes: dict[str, Any] = {"amplitude_mm": reach.amplitude_of(event.velocity)}
-    if choices.notes == "preset" and presets:
-        changes["preset"] = presets[(event.key - LOWEST_NOTE) % len(presets)]
-    elif choices.notes != "preset":
-        changes["position"] = reach.place((event.key - LOWEST_NOTE) / (HIGHEST_NOTE - LOWEST_NOTE))
-    return Meaning(changes, plucks=True)
+    turns: dict[str, Any] = {}
+    for field, controller in choices.controllers.items():
+        if controller != event.number:
+            continue
+        value = LEARNABLE[field].value(event.value / LARGEST_VALUE)
+        if field in OF_CHOICES:
+            turns[field] = value
+        elif patch is not None:
+            turns["patch"] = patch = turned(patch, field, value)
+    return turns

@@ -1,29 +1,42 @@
-"""The notes that ring: struck, switched between sources, heard from other points, and ended.
+"""The notes that ring: begun by events, switched between sources, heard from other points, and ended.
 
-A gesture strikes a note in its own thread: its voices are made and handed to the mixer at once, before anything is
-drawn. The voices of one note begin with the same frame, so that a switch between them stays in time.
+All that plays is an event: a key, a message of MIDI or of a file, a pluck at a place. `Notes.handle` turns it into a
+note in the thread it comes in: its voices are handed to the mixer at once, before anything is drawn.
 """
 
 from __future__ import annotations
 
-import math
 import threading
 import traceback
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.audio.sound import Sound, SoundStatus
+from app.instrument.events import Event, NoteOn, PluckAt
+from app.instrument.player import SOURCES, Struck
+from app.patches.instrument import Instrument, SingleString
+from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.due import Due
+from app.playing.keyboard import Reach
+from app.playing.keys import Keys
+from app.playing.levels import Levels
+from app.playing.note import Note
 from app.playing.sources import Sources
-from app.playing.stroke import Mix, Stroke
-from app.rendering.subject import Subject
+from app.presets.library import PresetEntry
+from app.rendering import RenderRequest
+from app.rendering.subject import StringOf, Subject, path_of, string_of
+from app.session.monitor import Monitor
 from app.shared.thread_priority import Rank, step_back
-from engine.kernels.layout import QUANTUM
+from app.shared.vocabulary import OTHER
+from engine.effects import Effects
 from engine.pluck import Pluck
 from engine.presets import PresetError
 from engine.voices import Ear, Mixer, Voice, render_voice
@@ -34,170 +47,228 @@ STOP_S = 0.012  # the fade of `stop`
 REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
 LEAST_RELIEF = 2  # notes that end then, at each look at the load
-MATCHED_S = 1.0  # from the pluck on: the part whose levels are compared
-LARGEST_MATCH_DB = 40.0  # beyond this a source is silent rather than soft, and stays as it is
-KEPT_MATCHES = 256
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
+LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
 
 Report = Callable[[str, str], None]  # a message and its details
-
-
-class Note:
-    """A pluck that was struck.
-
-    Attributes:
-        from_s: where in its motion it begins.
-        begin_frame: the frame of the mixer at which it begins; 0: at once.
-        voices: by source.
-        ahead: those of its voices that are rendered ahead.
-        match: by source, the factor that brings it to the level of the truth; None until it is known.
-        pending: it was not handed to a mixer yet.
-        released: it was told to fade out.
-        mixer: to which it was handed.
-        cut: it is not heard any more: its mixer was replaced, or it could not be played.
-    """
-
-    def __init__(self, stroke: Stroke, from_s: float = 0.0, begin_frame: int = 0) -> None:
-        self.stroke, self.from_s, self.begin_frame = stroke, from_s, begin_frame
-        self.voices: dict[str, Voice] = {}
-        self.ahead: list[AheadVoice] = []
-        self.match: Mapping[str, float] | None = None
-        self.pending = True
-        self.handed_over = False  # or about to be
-        self.released = False
-        self.mixer: Mixer | None = None
-        self.cut = False
-        self.timed = False  # its latency has been noted
-        self.adopted = False  # its voices were made by a caller of `adopt`, who changes them
-
-    @property
-    def over(self) -> bool:
-        """Whether it has ended: nothing of it will be heard any more."""
-        if self.cut or self.pending:
-            return self.cut or self.released
-        return all(voice.over for voice in self.voices.values())
-
-    @property
-    def seconds(self) -> float:
-        """The time in its motion up to which the device has its samples."""
-        if self.pending:
-            return self.from_s
-        return max((voice.seconds for voice in self.voices.values()), default=0.0)
-
-    @property
-    def began(self) -> bool:
-        """Whether the device has any of its samples, or it was cut after it was handed over."""
-        return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
-
-    @property
-    def waits_s(self) -> float:
-        """For how many seconds it will still be rendered before it sounds; 0: it does not wait, or not known."""
-        waits = self.pending and not self.over
-        return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
-
-    @property
-    def began_frame(self) -> int:
-        """The frame of the mixer at which it began; 0 before that."""
-        return max((voice.began_frame for voice in self.voices.values()), default=0)
-
-    def frame_at(self, seconds: float) -> int:
-        """The frame of its mixer at which its motion reaches a time; only once it has begun."""
-        assert self.mixer is not None
-        rate_hz = self.mixer.rate_hz
-        skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
-        starved_s = min(voice.starved_s for voice in self.voices.values())
-        return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
-
-    def release_at(self, frame: int) -> None:
-        """Lets it fade out from a frame of the mixer on; 0: not any more."""
-        for voice in self.voices.values():
-            voice.release_at(frame)
-
-    def end(self) -> None:
-        """Cuts it, where no device plays its voices any more; they are over."""
-        self.cut = True
-        for voice in self.voices.values():
-            voice.refuse()
-
-    def release(self, seconds: float) -> None:
-        """Lets it fade out within so many seconds, from now on."""
-        self.released = True
-        for voice in self.voices.values():
-            voice.release(seconds)
 
 
 class Notes:
     """All public methods but `poll` and `close`, which are the window's, may be called from any thread.
 
     Args:
+        find: a preset by its name; None where there is none.
         report: is called with a message and its details where something cannot be played; in any thread.
+        set_effects: sets body and room of all that is heard; called in a background thread.
+
+    Attributes:
+        keys: what the keys of a patch sound with.
+        latest: the note that an event began last.
     """
 
-    def __init__(self, sound: Sound, sources: Sources, report: Report) -> None:
-        self._sound, self._sources, self._report = sound, sources, report
+    def __init__(
+        self,
+        sound: Sound,
+        sources: Sources,
+        find: Callable[[str], PresetEntry | None],
+        report: Report,
+        set_effects: Callable[[Effects | None], None] = lambda effects: None,
+    ) -> None:
+        self._sound, self._sources, self._find, self._report = sound, sources, find, report
         self._lock = threading.RLock()
         self._notes: list[Note] = []
-        self._mix = Mix()
+        self._monitor = Monitor()
         self._ear: Ear | None = None
+        self.latest: Note | None = None
+        self._chosen: RenderRequest | None = None
+        self._reach: Reach | None = None  # of a single string, which is played; None: a patch is
+        self._dry = False
         self._ahead = Ahead()
-        self._matches: OrderedDict[tuple[object, ...], Mapping[str, float]] = OrderedDict()
-        self._matching: set[tuple[object, ...]] = set()
         self._latencies_s: deque[float] = deque(maxlen=100)
         self._helper = ThreadPoolExecutor(1, "notes-helper", step_back, (Rank.BACKGROUND,))
+        self._levels = Levels(sources, self.in_background)
         self._closed = False
         self._wished_plucks: object = None
+        self.keys = Keys(sources, self._path_of, lambda: sound.mixer, self.in_background, report, set_effects)
         sound.watch(self._bound_load)
 
-    # Gestures
+    # What is played
 
-    def strike(self, stroke: Stroke, from_s: float = 0.0, alone: bool = False, begin_frame: int = 0) -> Note:
-        """Plucks a string, while other notes ring on. Returns at once.
+    def set_instrument(self, instrument: Instrument, ear: Ear, patch: Patch | None = None) -> None:
+        """What events play from now on, and where all notes are heard.
 
-        It sounds with the next quantum of the device, unless presets must be loaded or a model is rendered ahead.
+        Args:
+            patch: one that is loaded while a single string is played, so that its keys sound at once when it is.
+        """
+        single = isinstance(instrument, SingleString)
+        entry = self._find(instrument.preset) if single else None
+        reach = Reach.of(entry.info if entry is not None else None) if single else None
+        with self._lock:
+            self._reach, self._ear, chosen = reach, ear, self._chosen
+            if chosen is not None and entry is not None and path_of(chosen.preset) != entry.path:
+                self._chosen = replace(chosen, preset=entry.path)
+        self.keys.set_patch(instrument if isinstance(instrument, Patch) else patch, ear)
+        self._hear_effects()
 
+    def listen(self, ear: Ear) -> None:
+        """Sets where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
+        with self._lock:
+            self._ear = ear
+            if self._chosen is not None:
+                self._chosen = replace(self._chosen, ear=ear)
+        self.keys.listen(ear)
+
+    def choose(self, request: RenderRequest | None) -> None:
+        """The pluck that loops, seeks and the next pluck at a place start from."""
+        with self._lock:
+            self._chosen = request
+
+    def set_monitor(self, monitor: Monitor) -> None:
+        """Sets what is heard of all notes; those that ring are cross-faded."""
+        with self._lock:
+            self._monitor = monitor
+            notes = list(self._notes)
+            for note in notes:
+                self._apply_monitor(note)
+        for note in notes:
+            if not note.pending and not note.over:
+                self._ask_match(note)
+
+    def hear_dry(self, dry: bool) -> None:
+        """Whether body and room are left out; a single string has none."""
+        self._dry = dry
+        self._hear_effects()
+
+    def _hear_effects(self) -> None:
+        self.keys.hear_dry(self._dry or self._reach is not None)
+
+    # Events
+
+    def handle(self, event: Event, due: Due | None = None) -> Note | None:
+        """Plays an event, at once or when it is due; the note that it began, or None.
+
+        Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
+        presets must be loaded or a model is rendered ahead.
+        """
+        struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
+        placed = self._place(event)
+        if not isinstance(placed, PluckAt):
+            note = self.keys.handle(placed, due, lambda struck, string: self._adopt(struck, string, struck_s, due))
+        else:
+            with self._lock:
+                if self._chosen is None:
+                    return None
+                chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
+            frame = 0 if due is None else due.frame_in(self._sound.mixer)
+            note = self._ring(chosen, 0.0, frame, struck_s, due is not None)
+        self.latest = note or self.latest
+        return note
+
+    def _place(self, event: Event) -> Event:
+        """The pluck that a key of a single string is; any other event as it is."""
+        reach, chosen = self._reach, self._chosen
+        if reach is None or not isinstance(event, NoteOn) or event.velocity <= 0:
+            return event
+        return PluckAt(reach.pluck(event.key, event.velocity, Pluck() if chosen is None else chosen.pluck))
+
+    def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> Note | None:
+        """Begins a note of the chosen pluck, while others ring on; None where nothing is chosen.
 
         Args:
             from_s: where in its motion it begins.
-            alone: whether the other notes fade out.
             begin_frame: the frame of the mixer at which it begins; 0: at once.
+            alone: whether the other notes fade out.
         """
-        struck_s = 0.0 if from_s or begin_frame else self._sound.now_s()  # only gestures are timed
-        note = Note(stroke, from_s, begin_frame)
         if alone:
             self.stop(REPLACED_S)
+        return None if self._chosen is None else self._ring(self._chosen, from_s, begin_frame)
+
+    def _ring(
+        self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
+    ) -> Note:
+        gain = self.keys.gain_of(string_of(chosen.preset))
+        note = Note(chosen, self._voices_of(chosen), gain, from_s, begin_frame)
+        note.ahead_of_event = waits
         with self._lock:
             self._notes.append(note)
-        begin = self._guarded(lambda: self._begin(note, struck_s), note)
-        if from_s > 0 or not self.have(stroke):
-            self._submit(begin)
+        begin = partial(self._begin, note, struck_s)
+        if from_s > 0 or not self._loaded(note):
+            self.in_background(begin, note)
         else:
-            begin()
+            self._guarded(begin, note)()
         return note
 
-    def adopt(self, stroke: Stroke, voices: Mapping[str, Voice], struck_s: float, due: Due | None = None) -> Note:
-        """A note of given voices, which have the rate of the present mixer; it sounds with the next quantum.
+    def turn(self, note: Note, seconds: float) -> Note | None:
+        """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early."""
+        mixer, frame = self._sound.mixer, note.frame_at(seconds)
+        if self._chosen is None or frame > (mixer.seconds + LOOP_AHEAD_S) * mixer.rate_hz:
+            return None
+        note.release_at(frame)
+        return self.ring(begin_frame=frame)
 
-        It ends when the device changes its rate. All its sources have the gain of the stroke: they are not matched.
-
-        Args:
-            struck_s: when the gesture was, by `now_s`; 0 where there was none.
-            due: when it sounds instead.
-        """
-        mixer = self._sound.mixer
-        note = Note(stroke, begin_frame=0 if due is None else due.frame_in(mixer))
-        note.adopted, note.voices, note.match = True, dict(voices), dict.fromkeys(voices, 1.0)
-        for voice in voices.values():
-            voice.set_struck(struck_s)
-            voice.begin_at(note.begin_frame)
+    def cancel(self) -> None:
+        """What was handed over and is not due yet is not played."""
+        self.keys.cancel()
         with self._lock:
-            self._notes.append(note)
-        if not self._hand_over(note, mixer):
-            note.end()
-        return note
+            for note in self._notes:
+                if note.ahead_of_event and not note.began:
+                    note.release(0.0)
 
-    def now_s(self) -> float:
-        """The clock by which gestures are timed."""
-        return self._sound.now_s()
+    def stop(self, seconds: float = STOP_S) -> None:
+        """Lets all notes fade out; those that wait will not sound."""
+        with self._lock:
+            for note in self._notes:
+                note.release(seconds)
+
+    # Ahead of events
+
+    def in_background(self, work: Callable[[], None], note: Note | None = None) -> None:
+        """Does `work` in the helper's thread, after what waits there; its errors are reported, and cut the note."""
+        if not self._closed:
+            self._helper.submit(self._guarded(work, note))
+
+    @property
+    def at_hand(self) -> bool:
+        """Whether the chosen pluck would sound at once: nothing needs to be loaded for it."""
+        with self._lock:
+            chosen = self._chosen
+            return chosen is not None and self._loaded(Note(chosen, self._voices_of(chosen)))
+
+    def prepare(self, *subjects: Subject) -> None:
+        """Loads presets in the background, so that a pluck need not wait."""
+        rate_hz = self._sound.rate_hz
+        for subject in subjects:
+            if not self._sources.has(subject, rate_hz):
+                self.in_background(partial(self._sources.prepare, subject, rate_hz))
+
+    def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
+        """Computes in the background where voices of these plucks start; the latest call counts."""
+        rate_hz = self._sound.rate_hz
+        wish = self._wished_plucks = object()
+
+        def work() -> None:
+            for pluck in plucks:
+                for source in SOURCES:
+                    if not self._closed and wish is self._wished_plucks:
+                        self._sources.begin(subject, source, rate_hz, pluck)
+
+        self.in_background(work)
+
+    def render(self, request: RenderRequest, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
+        """Model and truth of a pluck, (frames, channels), rendered in the background and not played."""
+
+        def work() -> Mapping[str, NDArray[np.float32]]:
+            loaded, found = self._sources.load(request.preset), {}
+            for source in SOURCES:
+                program = self._sources.program(request.preset, source, rate_hz)
+                found[source] = render_voice(
+                    program, loaded.model, loaded.preset.info, request.pluck, request.ear, request.seconds
+                )
+            return found
+
+        return self._helper.submit(work)
+
+    # What there is
 
     @property
     def mixer(self) -> Mixer:
@@ -208,80 +279,6 @@ class Notes:
     def buffer_s(self) -> float:
         """The length of the device's buffer: so much may be rendered at once."""
         return self._sound.status().latency_s
-
-    @property
-    def rate_hz(self) -> int:
-        """The present rate of the device."""
-        return self._sound.rate_hz
-
-    def in_background(self, work: Callable[[], None]) -> None:
-        """Does `work` in the helper's thread, after what waits there; its errors are reported."""
-        self._submit(self._guarded(work))
-
-    def have(self, stroke: Stroke) -> bool:
-        """Whether nothing needs to be loaded for it."""
-        rate_hz = self._sound.rate_hz
-        return all(self._sources.has(stroke.subject(source), rate_hz) for source in stroke.sources)
-
-    def prepare(self, *subjects: Subject) -> None:
-        """Loads presets in the background, so that a strike need not wait."""
-        rate_hz = self._sound.rate_hz
-        for subject in subjects:
-            if not self._sources.has(subject, rate_hz):
-                self._submit(self._guarded(lambda subject=subject: self._sources.prepare(subject, rate_hz)))  # type: ignore[misc]
-
-    def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
-        """Computes in the background where voices of these plucks start; the latest call counts."""
-        rate_hz = self._sound.rate_hz
-        wish = self._wished_plucks = object()
-
-        def work() -> None:
-            for pluck in plucks:
-                for kind in ("model", "truth"):
-                    if not self._closed and wish is self._wished_plucks:
-                        self._sources.begin(subject, kind, rate_hz, pluck)
-
-        self._submit(self._guarded(work))
-
-    def stop(self, seconds: float = STOP_S) -> None:
-        """Lets all notes fade out; those that wait will not sound."""
-        with self._lock:
-            for note in self._notes:
-                note.release(seconds)
-
-    def set_mix(self, mix: Mix) -> None:
-        """Sets what is heard of all notes; those that ring are cross-faded."""
-        with self._lock:
-            self._mix = mix
-            notes = list(self._notes)
-            for note in notes:
-                self._apply_mix(note)
-        for note in notes:
-            if not note.pending and not note.over:
-                self._wish_match(note)
-
-    def listen(self, ear: Ear) -> None:
-        """Sets where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
-        with self._lock:
-            self._ear = ear
-
-    def render(self, stroke: Stroke, rate_hz: int, seconds: float) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """The sound of each source, (frames, channels), rendered in the background and not played."""
-
-        def work() -> Mapping[str, NDArray[np.float32]]:
-            found = {}
-            for source in stroke.sources:
-                subject = stroke.subject(source)
-                program = self._sources.program(subject, "truth" if source == "truth" else "model", rate_hz)
-                loaded = self._sources.load(subject)
-                found[source] = render_voice(
-                    program, loaded.model, loaded.preset.info, stroke.pluck, stroke.ear, seconds
-                )
-            return found
-
-        return self._helper.submit(work)
-
-    # What there is
 
     @property
     def ringing(self) -> int:
@@ -306,7 +303,7 @@ class Notes:
                         note.timed = True
                         self._latencies_s.append(latency_s)
                 if note.ahead and note.match is None and not note.pending:
-                    self._wish_match(note)
+                    self._ask_match(note)
                 if self._ear is not None:
                     for voice in note.voices.values():
                         voice.listen(self._ear)
@@ -318,6 +315,20 @@ class Notes:
         self._ahead.close()
 
     # How it is done
+
+    def _path_of(self, preset: str) -> Path | None:
+        entry = self._find(preset)
+        return None if entry is None else entry.path
+
+    def _voices_of(self, request: RenderRequest) -> tuple[str, ...]:
+        """The sources that get a voice: what the monitor holds, without presets that are not here."""
+        here = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
+        return tuple(source for source in self._monitor.voices if source in here) or ("model",)
+
+    def _loaded(self, note: Note) -> bool:
+        """Whether nothing needs to be loaded for it."""
+        rate_hz = self._sound.rate_hz
+        return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
     def _guarded(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
         """`work` with its errors reported; they cut the note."""
@@ -335,31 +346,41 @@ class Notes:
 
         return guarded
 
-    def _submit(self, work: Callable[[], None]) -> None:
-        if not self._closed:
-            self._helper.submit(work)
-
     def _carry(self) -> None:
-        """When the device has changed its rate, the latest notes ring on in its new mixer."""
+        """When the device has changed its rate, the latest plucks ring on in its new mixer; keys' notes end."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
-        ringing = [note for note in left if note.seconds and not (note.released or note.adopted)][-MOST_CARRIED:]
+        ringing = [note for note in left if note.seconds and not note.released and note.struck is None][
+            -MOST_CARRIED:
+        ]
         for note in left:
             if note in ringing:
                 note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
                 note.pending, note.handed_over = True, False
-                self._submit(self._guarded(lambda note=note: self._begin(note, 0.0), note))  # type: ignore[misc]
+                self.in_background(partial(self._begin, note, 0.0), note)
             else:
                 note.end()
+
+    def _adopt(self, struck: Struck, string: StringOf, struck_s: float, due: Due | None) -> Note:
+        """The note of a key's string, whose voices have the rate of the present mixer."""
+        mixer, request = self._sound.mixer, RenderRequest(string, struck.pluck, 0.0, struck.ear)
+        begin_frame = 0 if due is None else due.frame_in(mixer)
+        note = Note(request, SOURCES, struck.gain, begin_frame=begin_frame, struck=struck)
+        note.set_begin(struck_s)
+        with self._lock:
+            self._notes.append(note)
+            if self._chosen is not None:  # the string that is shown from now on
+                self._chosen = replace(self._chosen, preset=string, pluck=struck.pluck)
+        if not self._hand_over(note, mixer):
+            note.end()
+        return note
 
     def _begin(self, note: Note, struck_s: float) -> None:
         """Makes the voices and hands them over; again where the device changes its rate meanwhile."""
         for _ in range(3):
             mixer = self._sound.mixer
             self._make_voices(note, mixer.rate_hz, struck_s)
-            for voice in note.voices.values():
-                voice.set_struck(struck_s)
-                voice.begin_at(note.begin_frame)
+            note.set_begin(struck_s)
             if note.ahead:
                 for each in note.ahead:
                     self._ahead.render(each)
@@ -375,30 +396,30 @@ class Notes:
                 voice.skip(note.from_s, Mixer(voice.program.rate_hz).memory)
 
     def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
-        stroke, voices = note.stroke, {}
+        asked, voices = note.request, dict[str, Voice]()
         ahead: list[AheadVoice] = []
-        for source in stroke.sources:
-            subject, kind = stroke.subject(source), "truth" if source == "truth" else "model"
+        for source in note.sources:
+            subject = note.subject(source)
             try:
-                program = self._sources.program(subject, kind, rate_hz)
-                initial_m, begin = self._sources.begin(subject, kind, rate_hz, stroke.pluck)
+                program = self._sources.program(subject, source, rate_hz)
+                initial_m, begin = self._sources.begin(subject, source, rate_hz, asked.pluck)
                 model = self._sources.load(subject).model if program.rendered else None
             except (PresetError, ValueError):
-                if source not in stroke.others:
+                if source in SOURCES:
                     raise
                 continue  # another preset that cannot be used; the render worker reports why
             if model is None:
-                voices[source] = Voice(program, initial_m, stroke.ear, 0.0, begin=begin)
+                voices[source] = Voice(program, initial_m, asked.ear, 0.0, begin=begin)
                 continue
-            voice = voices[source] = Voice(program, initial_m, stroke.ear, 0.0, stroke.seconds, model.rate_hz, begin)
-            voice.fade_out_by(stroke.seconds)  # behind it there are no samples
+            voice = voices[source] = Voice(program, initial_m, asked.ear, 0.0, asked.seconds, model.rate_hz, begin)
+            voice.fade_out_by(asked.seconds)  # behind it there are no samples
             ahead.append(
                 AheadVoice(
                     voice,
                     model,
                     initial_m,
-                    stroke.ear.weights(model.grid_points),
-                    (subject, stroke.pluck, stroke.ear.points, stroke.ear.solo, stroke.seconds),
+                    asked.ear.weights(model.grid_points),
+                    (subject, asked.pluck, asked.ear.points, asked.ear.solo, asked.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,
@@ -416,7 +437,7 @@ class Notes:
         self._skip(note)
         if not self._hand_over(note, self._sound.mixer):
             note.handed_over, note.begin_frame = False, 0
-            self._submit(self._guarded(lambda: self._begin(note, struck_s), note))
+            self.in_background(partial(self._begin, note, struck_s), note)
 
     def _cannot_render(self, note: Note, error: Exception) -> None:
         note.cut = True
@@ -429,16 +450,15 @@ class Notes:
                 return True
             if mixer is not self._sound.mixer:
                 return False
-            if not note.adopted:
-                note.match = self._matches.get(note.stroke.matching_key)
-            self._apply_mix(note, at_once=note.from_s == 0)
+            note.match = self._levels.of(note)
+            self._apply_monitor(note, at_once=note.from_s == 0)
             try:
                 mixer.add(*note.voices.values())
             except ValueError:
                 return False
             note.mixer, note.pending = mixer, False
             self._make_room(MOST_NOTES)
-        self._wish_match(note)
+        self._ask_match(note)
         return True
 
     def _bound_load(self, status: SoundStatus) -> None:
@@ -454,61 +474,20 @@ class Notes:
         for note in ringing[: max(0, len(ringing) - most)]:
             note.release(STOLEN_S)
 
-    def _apply_mix(self, note: Note, at_once: bool = False) -> None:
+    def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
-            gain = note.stroke.gain * self._mix.of(note.voices).gain(source, note.match)
+            gain = note.gain * self._monitor.gain(source, note.voices.keys(), note.match)
             voice.set_gain(gain)
             if at_once:
                 voice.start_with_gain(gain)
 
-    # Levels
+    def _ask_match(self, note: Note) -> None:
+        if self._monitor.level_match:
+            self._levels.ask(note, self._sound.rate_hz, self._take_match)
 
-    def _wish_match(self, note: Note) -> None:
-        key = note.stroke.matching_key
+    def _take_match(self, key: tuple[object, ...], match: Mapping[str, float]) -> None:
         with self._lock:
-            known = note.match is not None or key in self._matching or len(self._matching) > 8
-            if (
-                not self._mix.matched
-                or known
-                or not all(each.finished or each.rendered_s >= MATCHED_S for each in note.ahead)
-            ):
-                return
-            self._matching.add(key)
-        self._submit(self._guarded(lambda: self._match(note, key)))
-
-    def _match(self, note: Note, key: tuple[object, ...]) -> None:
-        try:
-            seconds = min([MATCHED_S, *(each.rendered_s for each in note.ahead)])  # a pluck may be shorter
-            levels = {source: self._level(note, source, seconds) for source in note.voices}
-            found = {source: _match_gain(level, levels.get("truth", level)) for source, level in levels.items()}
-        finally:
-            with self._lock:
-                self._matching.discard(key)
-        with self._lock:
-            self._matches[key] = found
-            while len(self._matches) > KEPT_MATCHES:
-                self._matches.popitem(last=False)
-            for each in self._notes:
-                if each.stroke.matching_key == key:
-                    each.match = found
-                    self._apply_mix(each)
-
-    def _level(self, note: Note, source: str, seconds: float) -> float:
-        """Root mean square of the first `seconds`; 0 where it is not known, so that the source stays as it is."""
-        stroke = note.stroke
-        subject, kind = stroke.subject(source), "truth" if source == "truth" else "model"
-        rate_hz = min(self._sound.rate_hz, 48_000)
-        program = self._sources.program(subject, kind, rate_hz)
-        if program.rendered:
-            return note.voices[source].level_of_samples(seconds) if stroke.ear.pickup == "displacement" else 0.0
-        mixer = Mixer(rate_hz, limited=False)
-        initial_m, begin = self._sources.begin(subject, kind, rate_hz, stroke.pluck)
-        mixer.add(Voice(program, initial_m, stroke.ear, begin=begin))
-        sound = mixer.render(round(seconds * rate_hz))
-        return math.sqrt(float(np.square(sound, dtype=np.float64).mean()))
-
-
-def _match_gain(own: float, truth: float) -> float:
-    limit = 10 ** (LARGEST_MATCH_DB / 20)
-    gain = truth / own if own > 0 else 0.0
-    return gain if 1 / limit <= gain <= limit else 1.0
+            for note in self._notes:
+                if note.matching_key == key and note.struck is None:
+                    note.match = match
+                    self._apply_monitor(note)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,8 @@ class Sources:
         self._lock = threading.Lock()  # of the dictionaries, for a moment
         self._loading = threading.RLock()  # one load after the other
         self._presets: OrderedDict[Subject, Loaded] = OrderedDict()
-        self._begins: OrderedDict[tuple[Subject, str, int, Pluck], tuple[Tensor, tuple[Array, Array]]] = OrderedDict()
         self._programs: dict[tuple[Subject, str, int], Program] = {}
+        self._kept_begin = lru_cache(maxsize=KEPT_PLUCKS)(self._begin)
 
     def has(self, subject: Subject, rate_hz: int) -> bool:
         """Whether it is loaded with both programs at this rate, so that a strike would not wait."""
@@ -50,8 +51,6 @@ class Sources:
                 while len(self._presets) > KEPT_PRESETS:
                     oldest, _ = self._presets.popitem(last=False)
                     self._programs = {key: each for key, each in self._programs.items() if key[0] != oldest}
-                    for key in [key for key in self._begins if key[0] == oldest]:
-                        del self._begins[key]
             return found
 
     def _read(self, subject: Subject) -> Preset:
@@ -59,8 +58,13 @@ class Sources:
             return load_preset(subject)
         return of_string(self.load(subject.path).preset, subject.string)
 
-    def program(self, subject: Subject, kind: str, rate_hz: int) -> Program:
-        """The program of a voice; `kind`: "model" or "truth", `rate_hz`: of the device. Raises PresetError."""
+    def program(self, subject: Subject, source: str, rate_hz: int) -> Program:
+        """The program of a voice: the truth's, or for any other `source` the model's. Raises PresetError.
+
+        Args:
+            rate_hz: of the device.
+        """
+        kind = "truth" if source == "truth" else "model"
         key = (subject, kind, rate_hz)
         if (found := self._programs.get(key)) is not None:
             return found
@@ -75,23 +79,17 @@ class Sources:
                     self._programs[key] = found
             return found
 
-    def begin(self, subject: Subject, kind: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+    def begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
         """A pluck's displacement (grid_points,) in m, and the start of a voice of the program. Both are kept.
 
         Raises PresetError.
         """
-        key = (subject, kind, rate_hz, pluck)
-        with self._lock:
-            found = self._begins.pop(key, None)
-        if found is None:
-            info = self.load(subject).preset.info
-            initial_m = project(pluck.displacement(info.grid_points), info.modes)
-            found = initial_m, self.program(subject, kind, rate_hz).start(initial_m)
-        with self._lock:
-            self._begins[key] = found
-            while len(self._begins) > KEPT_PLUCKS:
-                self._begins.popitem(last=False)
-        return found
+        return self._kept_begin(subject, source, rate_hz, pluck)
+
+    def _begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+        info = self.load(subject).preset.info
+        initial_m = project(pluck.displacement(info.grid_points), info.modes)
+        return initial_m, self.program(subject, source, rate_hz).start(initial_m)
 
     def prepare(self, subject: Subject, rate_hz: int) -> None:
         """Loads it with both programs. Raises PresetError."""

@@ -6,21 +6,17 @@ All choices are one immutable, validated value; the session replaces it and sign
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any, Literal
+from typing import Any
 
 from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch, PhysicalString
-from app.session.instrument import EARS, heard_at, picked_up
+from app.session.listener import Listener, points_of
+from app.session.monitor import Monitor
 from app.shared.parameters import OF_CHOICES
-from app.shared.vocabulary import Pickup
 from engine.pluck import Pluck, Shape
-
-Slot = Literal["a", "b"]  # two sources to compare; each holds "model", "truth", "difference" or "preset:NAME"
-SLOT_PATTERN = r"^(model|truth|difference|preset:.+)$"
-
-HIGHEST_MODE = 9_999  # of any grid that a preset may have
 
 
 def _parameter(name: str) -> Any:
@@ -29,39 +25,42 @@ def _parameter(name: str) -> Any:
     return Field(OF_CHOICES[name].default, ge=low, le=high)
 
 
-class Choices(BaseModel):
-    """Everything that is restored at the next start.
+class PluckedString(BaseModel):
+    """The string that is shown and how it is plucked: of the latest note, or as drawn.
 
     Attributes:
-        preset: the name of its file without the suffix; "": none.
-        position, width, listen, listen_right: as fractions of the string's length.
-        amplitude_mm: of the pluck, in mm.
-        seconds: how long the pluck is rendered.
-        string: the string that a preset of many strings is plucked as; None: the preset's own.
-        patch: what keys play; None: they pluck the preset's own string.
-        keys_play: whether keys are pitches of the patch, or places on the string.
-        octave: by how many octaves the computer's keys are transposed.
-        velocity: with which the computer's keys are struck, as in MIDI.
+        string: for a preset of many strings; None: the preset's own.
+        position, width: as fractions of the string's length.
+        amplitude_mm: in mm.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    preset: str = ""
+    string: PhysicalString | None = None
     position: float = _parameter("position")
     amplitude_mm: float = _parameter("amplitude_mm")
     shape: Shape = "gaussian"
     width: float = _parameter("width")
-    listen: float = _parameter("listen")
+
+    @property
+    def pluck(self) -> Pluck:
+        return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
+
+
+class Choices(Monitor, Listener, PluckedString):
+    """Everything that is restored at the next start.
+
+    Attributes:
+        instrument: what is played.
+        kept: the patch that is there, while a single string is played.
+        seconds: how long the pluck is rendered.
+        octave: by how many octaves the computer's keys are transposed.
+        velocity: with which the computer's keys are struck, as in MIDI.
+    """
+
+    instrument: Instrument = SingleString()
+    kept: Patch | None = None
     seconds: float = _parameter("seconds")
-    listen_right: float = _parameter("listen_right")  # used in stereo, where `listen` is the left one
-    stereo: bool = False
-    pickup: Pickup = "displacement"
-    solo: int = Field(0, ge=0, le=HIGHEST_MODE)  # above 0: this mode is heard alone
-    a: str = Field("model", pattern=SLOT_PATTERN)
-    b: str = Field("truth", pattern=SLOT_PATTERN)
-    heard: Slot = "a"
-    level_match: bool = True
-    difference_gain_db: float = _parameter("difference_gain_db")
     loop: bool = False
     volume_db: float = _parameter("volume_db")
     speed: float = _parameter("speed")
@@ -69,92 +68,140 @@ class Choices(BaseModel):
     right_view: str = "waveform"
     motion: bool = True  # whether the string's picture shows its motion, and the envelope of it
     envelope: bool = True
-    string: PhysicalString | None = None
-    patch: Patch | None = None
-    keys_play: Literal["pitch", "place"] = "pitch"
     octave: int = Field(0, ge=-4, le=4)
     velocity: int = Field(90, ge=1, le=127)
 
     @model_validator(mode="before")
     @classmethod
-    def _take_old_heard(cls, data: Any) -> Any:
-        """Reads settings of versions without slots, in which `heard` named the source itself."""
-        if isinstance(data, dict) and data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
-            return {**data, "a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
-        return data
+    def _take_old(cls, data: Any) -> Any:
+        return migrated(data) if isinstance(data, dict) else data
 
     @property
-    def pluck(self) -> Pluck:
-        return Pluck(self.position, self.amplitude_mm, self.shape, self.width)
+    def preset(self) -> str:
+        """The name of the instrument's preset; "": none."""
+        return self.instrument.preset
 
     @property
-    def source_heard(self) -> str:
-        return self.a if self.heard == "a" else self.b
+    def patch(self) -> Patch | None:
+        """The patch that is there, played or not."""
+        return self.instrument if isinstance(self.instrument, Patch) else self.kept
 
     @property
-    def plays_pitches(self) -> bool:
-        """Whether keys are pitches of the patch; otherwise they pluck at ten places."""
-        return self.keys_play == "pitch" and self.patch is not None
+    def plays_patch(self) -> bool:
+        """Whether the instrument is a patch, whose keys are pitches; otherwise they are places along a string."""
+        return isinstance(self.instrument, Patch)
 
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """These choices with other values: the one way to change them. Another preset resets `string`, unless given.
 
+        Args:
+            changes: fields; also `preset`, the name of one whose single string becomes the instrument, and `patch`,
+                which takes the place of the one that is there, played or not.
+
         Raises:
             ValueError: a value is out of its range, a field is unknown, or the patch cannot be heard so.
         """
-        if changes.get("preset", self.preset) != self.preset:
-            changes = {"string": None, **changes}
+        changes = dict(changes)
+        if "preset" in changes:
+            changes["instrument"] = SingleString(preset=changes.pop("preset"))
+        if "patch" in changes:
+            changes["instrument" if self.plays_patch else "kept"] = changes.pop("patch")
+        elif self.plays_patch and "instrument" in changes:
+            changes.setdefault("kept", self.instrument)
         try:  # of the other fields, which are valid, only the slots: without them `heard` is read as an old one
             checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-        return _with_one_ear(self.model_copy(update={name: getattr(checked, name) for name in changes}), changes)
+        found = self.model_copy(update={name: getattr(checked, name) for name in changes})
+        follow: dict[str, Any] = {"kept": None} if found.plays_patch else {}
+        if found.preset != self.preset and "string" not in changes:
+            follow["string"] = None
+        return _with_one_pickup(found.model_copy(update=follow), changes)
+
+
+OBSERVED = (*Choices.model_fields, "preset", "patch")  # names that `Session.changed` carries
+
+
+def migrated(data: dict[str, Any]) -> dict[str, Any]:
+    """The fields of these choices, read from those of an earlier version."""
+    return _with_instrument(_without_slots(data))
+
+
+def _without_slots(data: dict[str, Any]) -> dict[str, Any]:
+    """Before there were slots, `heard` named the source itself."""
+    if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
+        return {**data, "a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
+    return data
+
+
+def _with_instrument(data: dict[str, Any]) -> dict[str, Any]:
+    """Before there were instruments, `keys_play` said whether `patch` was played or the string of `preset`."""
+    old = {name: data[name] for name in ("preset", "patch", "keys_play") if name in data}
+    if not old or "instrument" in data:
+        return data
+    rest = {name: value for name, value in data.items() if name not in old}
+    preset, patch = old.get("preset", ""), old.get("patch")
+    if patch is None or old.get("keys_play", "pitch") == "place":
+        return {**rest, "instrument": {"preset": preset}, "kept": patch}
+    played = patch.get("preset", "studio_any_string") if isinstance(patch, dict) else getattr(patch, "preset", "")
+    string = rest.pop("string", None)
+    return {**rest, "instrument": patch, "string": string if preset in ("", played) else None}
 
 
 class Session:
     """The present choices.
 
-    Signals carry the set of the names of the fields that have new values. `changed` is emitted after every change,
-    `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
+    Signals carry the set of the names of the fields that have new values, of `OBSERVED`. `changed` is emitted after
+    every change, `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
 
-    While keys play the patch, its pick-up is what `listen`, `listen_right`, `stereo` and `pickup` say: whichever of
-    the two changes, the other follows, so that what is heard is what is saved, recorded and exported.
+    While a patch is played, its pick-up is what `listen`, `listen_right`, `stereo` and `pickup` say: whichever of the
+    two changes, the other follows, so that what is heard is what is saved, recorded and exported.
     """
 
     changed = Signal(frozenset)
     played = Signal(frozenset)
 
     def __init__(self, choices: Choices | None = None) -> None:
-        self._choices = _with_one_ear(choices or Choices(), ())
+        self._choices = _with_one_pickup(choices or Choices(), ())
 
     @property
     def choices(self) -> Choices:
         return self._choices
 
     def update(self, **changes: Any) -> None:
-        """Takes new values, all or none. A preset sets `keys_play` too, unless given: "pitch" if it is the patch's.
+        """Takes new values, all or none, as `Choices.changed`; the preset of the patch chooses the patch.
 
         Raises:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
         """
-        if "preset" in changes and "keys_play" not in changes:
-            patch = changes.get("patch", self._choices.patch)
-            plays = "pitch" if patch is not None and patch.preset == changes["preset"] else "place"
-            changes = {**changes, "keys_play": plays}
+        patch = self._choices.patch
+        if patch is not None and changes.get("preset") == patch.preset:
+            changes = {"instrument": patch, **changes}
+            del changes["preset"]
         if names := self._take(changes):
             self.changed.emit(names)
 
     def play(self, **changes: Any) -> None:
-        """Takes the values that a note brings: as `update`, but no step of undo, and `keys_play` stays."""
+        """Takes the values that a note brings: as `update`, but no step of undo."""
         if names := self._take(changes):
             self.played.emit(names)
             self.changed.emit(names)
 
     def _take(self, changes: Mapping[str, Any]) -> frozenset[str]:
-        """Returns the fields that have new values."""
+        """Returns the names that have new values."""
         before, self._choices = self._choices, self._choices.changed(changes)
-        return frozenset(n for n in Choices.model_fields if getattr(before, n) != getattr(self._choices, n))
+        return frozenset(name for name in OBSERVED if getattr(before, name) != getattr(self._choices, name))
+
+    def play_patch(self) -> None:
+        """Makes the patch that is there the instrument: keys are pitches."""
+        if (patch := self._choices.patch) is not None:
+            self.update(instrument=patch)
+
+    def play_string(self) -> None:
+        """Makes the string that is shown the instrument: keys are places along it."""
+        choices = self._choices
+        self.update(instrument=SingleString(preset=choices.preset), string=choices.string)
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
         """Takes the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
@@ -166,18 +213,13 @@ class Session:
     def move_listening_point(self, listen: float) -> None:
         self.update(listen=OF_CHOICES["listen"].clamped(listen))
 
-    @property
-    def source_heard(self) -> str:
-        """The source in the slot that is heard."""
-        return self._choices.source_heard
-
     def switch_source(self) -> None:
         """Switches what is heard from slot A to slot B, or back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
 
 
-def _with_one_ear(choices: Choices, asked: Collection[str]) -> Choices:
-    """`choices` in which the patch that keys play is heard where its own pick-up says.
+def _with_one_pickup(choices: Choices, asked: Collection[str]) -> Choices:
+    """`choices` in which a patch that is played is heard where its own pick-up says.
 
     Args:
         asked: the fields that were asked to change. Of these the patch counts before listening points and pick-up,
@@ -186,10 +228,9 @@ def _with_one_ear(choices: Choices, asked: Collection[str]) -> Choices:
     Raises:
         ValueError: the patch cannot be heard so.
     """
-    patch = choices.patch
-    if patch is None or not choices.plays_pitches:
+    patch = choices.instrument
+    if not isinstance(patch, Patch):
         return choices
-    if "patch" not in asked and any(name in asked for name in EARS):
-        heard = picked_up(patch, choices.listen, choices.listen_right, choices.stereo, choices.pickup)
-        return choices.model_copy(update={"patch": heard})
-    return choices.model_copy(update=heard_at(patch))
+    if "instrument" not in asked and any(name in asked for name in Listener.model_fields if name != "solo"):
+        return choices.model_copy(update={"instrument": choices.picked_up(patch)})
+    return choices.model_copy(update=points_of(patch.pickup))

@@ -12,13 +12,14 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from app.session.choices import Choices, Session
-from app.session.instrument import EARS
+from app.session.choices import Choices, PluckedString, Session
+from app.session.listener import Listener
 from app.session.step_words import step_words, turned_fields
 
 # Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
-PLUCK = ("preset", "string", "patch", "position", "amplitude_mm", "shape", "width", "seconds")
-RECORDED = frozenset({*PLUCK, *EARS})
+RECORDED = frozenset(
+    {"instrument", "kept", "seconds", *PluckedString.model_fields, *Listener.model_fields} - {"solo"}
+)
 GATHER_S = 0.5
 LARGEST_STEPS = 200
 
@@ -109,9 +110,6 @@ class History:
         values = _recorded(self._session.choices)
         fields = names & RECORDED
         if self._restoring or not fields or values == self._present:  # the latter where a note was played
-            return
-        if "keys_play" in names and fields <= set(EARS):  # these came with the patch that keys play now
-            self._present = values
             return
         if self._held and not self._still_held():
             self.let_go()

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 from app.presets.library import Library
 from app.session.choices import Choices
+from app.session.monitor import Monitor
 from app.session.slots import source_title
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import FULL_SCALE_M_S
 from engine.sources import FULL_SCALE_M
 
-LEGEND_FIELDS = {"heard", "a", "b", "difference_gain_db", "solo", "stereo"}  # of `Choices`: what legends depend on
+LEGEND_FIELDS = {*Monitor.model_fields, "solo", "stereo"}  # of `Choices`: what legends depend on
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from app.presets.library import Library
 from app.rendering import SOURCES, Take
 from app.session.choices import Choices
-from app.session.ears import heard_ear
 from app.session.slots import info_of, other_preset
 from app.shared.parameters import OF_CHOICES
 from engine.presets import outside_training
@@ -49,7 +48,7 @@ def why_ran_away(take: Take) -> str:
 
 def why_difference_silent(choices: Choices, take: Take) -> str:
     """Why the difference of model and truth of a take cannot be heard; "" also until its signals are complete."""
-    ear, listened = heard_ear(choices), take.listened
+    ear, listened = choices.ear, take.listened
     if listened.ear != ear or not listened.complete:
         return ""
     model, truth = (listened.signals[name].read() for name in SOURCES)
@@ -63,7 +62,7 @@ def why_difference_silent(choices: Choices, take: Take) -> str:
 
 
 def _why_points_silent(choices: Choices) -> str:
-    ear = heard_ear(choices)
+    ear = choices.ear
     ends = [point in (0.0, 1.0) for point in ear.points]
     nodes = [ear.is_on_node(point) for point in ear.points]
     if not any(nodes):

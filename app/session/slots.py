@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+from pathlib import Path
 
 from app.presets.library import Library, PresetEntry
+from app.rendering import RenderRequest
+from app.rendering.subject import StringOf, Subject
 from app.session.choices import Choices
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetInfo
@@ -36,3 +39,19 @@ def missing_presets(choices: Choices, library: Library) -> dict[str, str]:
     """By slot, the name of the preset that it holds, for those that are not in the library (any more)."""
     held = {"a": other_preset(choices.a), "b": other_preset(choices.b)}
     return {slot: name for slot, name in held.items() if name and library.find(name) is None}
+
+
+def subject_of(choices: Choices, preset: Path) -> Subject:
+    """The string that is shown: the preset's own, or the one that is chosen for a preset of many."""
+    return preset if choices.string is None else StringOf(preset, choices.string.parameters)
+
+
+def request_of(choices: Choices, library: Library) -> RenderRequest | None:
+    """The chosen pluck, with the other presets that slots hold; None where its preset is not in the library."""
+    entry = library.find(choices.preset)
+    if entry is None:
+        return None
+    others = [library.find(name) for name in dict.fromkeys(map(other_preset, (choices.a, choices.b)))]
+    paths = tuple(other.path for other in others if other is not None)
+    subject = subject_of(choices, entry.path)
+    return RenderRequest(subject, choices.pluck, choices.seconds, choices.ear, choices.speed, paths)

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from app.patches.patch import Patch
-from app.session.instrument import EARS
+from app.session.listener import Listener
 from app.shared.parameters import OF_CHOICES, OF_PATCHES
 
 MOST_NAMED = 2  # fields in one step's name
@@ -37,7 +37,7 @@ PATCH = {  # other fields of a patch than parameters, by their path; the rest ar
     "tuning.keymap": "keyboard mapping",
     "body.name": "body",
 }
-PICKUP = {"pickup.points", "pickup.kind"}  # fields of a patch that are EARS of `Choices` too
+PICKUP = {"pickup.points", "pickup.kind"}  # fields of a patch that are those of `Listener` too
 
 
 def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
@@ -47,28 +47,33 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         before, after: the same fields of `Choices` with their values before and after the step.
     """
     changed = [name for name in after if before[name] != after[name]]
-    if "patch" in changed:
-        return _of_ears(changed, before, after) or _of_patch(before["patch"], after["patch"])
-    if "preset" in changed:
-        return f"preset {after['preset']}"
+    if "instrument" in changed:
+        old, new = before["instrument"], after["instrument"]
+        if not isinstance(new, Patch):
+            return f"preset {new.preset}"
+        if not isinstance(old, Patch):
+            return f"patch {new.name}"
+        return _of_ears(changed, old, new) or _of_patch(old, new)
+    if "kept" in changed:
+        return _of_patch(before["kept"], after["kept"])
     return _together([words for name, words in CHOICES.items() if name in changed])
 
 
 def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
-    """The changed fields: `names` of `Choices` and, if the patch has kept its name, its own as "patch.PATH"."""
+    """The changed fields: `names` of `Choices` and, of a patch that has kept its name, its own as "patch.PATH"."""
     found = set(names)
-    old, new = before.get("patch"), after.get("patch")
-    if "patch" in found and old is not None and new is not None and old.name == new.name:
-        found |= {f"patch.{field}" for field in _changed(old, new)}
+    for field in ("instrument", "kept"):
+        old, new = before.get(field), after.get(field)
+        if field in found and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
+            found |= {f"patch.{path}" for path in _changed(old, new)}
     return frozenset(found)
 
 
-def _of_ears(changed: list[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+def _of_ears(changed: list[str], before: Patch, after: Patch) -> str:
     """Where and how the patch is heard, if nothing else of it has changed; else ""."""
-    old, new, ears = before["patch"], after["patch"], [CHOICES[name] for name in EARS if name in changed]
-    if old is None or new is None or not set(_changed(old, new)) <= PICKUP:
+    if not set(_changed(before, after)) <= PICKUP:
         return ""
-    return _together(ears) if ears else ""
+    return _together([CHOICES[name] for name in changed if name in Listener.model_fields])
 
 
 def _of_patch(before: Patch | None, after: Patch | None) -> str:

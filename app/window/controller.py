@@ -20,12 +20,11 @@ from PySide6.QtGui import QGuiApplication
 from app.analysis.abx.record import material_of
 from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
-from app.instrument.events import Event, NoteOn
-from app.instrument.player import Struck
-from app.playing.chosen import mix_of
+from app.instrument.events import Event, NoteOn, PluckAt
 from app.playing.due import Due
+from app.playing.note import Note
 from app.presets.library import Library, PresetEntry
-from app.session.choices import Choices, Session
+from app.session.choices import OBSERVED, Session
 from app.session.history import History
 from app.session.slots import missing_presets
 from app.shared.log import log_file
@@ -118,7 +117,9 @@ class Controller(QObject):
             problems.append(f"The preset {name}, which slot {slot.upper()} held, was not found.")
         self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._connect_history()
-        self.instruments = Instruments(window, self.session, self.library, settings.midi, self._strike, self._handle)
+        self.instruments = Instruments(
+            window, self.session, self.library, settings.midi, self._handle, self.performance.play_preset
+        )
         self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
@@ -157,7 +158,7 @@ class Controller(QObject):
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
             self.window.notices.tell(problem)
-        everything = frozenset(type(self.session.choices).model_fields)
+        everything = frozenset(OBSERVED)
         self.session.changed.connect(self._choices_changed)
         self.performance.choices_changed(everything)
         self.instruments.choices_changed()
@@ -230,16 +231,11 @@ class Controller(QObject):
         if self._abx is None:
             self.performance.pluck()
 
-    def _strike(self, choices: Choices) -> None:
-        """A note of an instrument; called in the instrument's thread."""
-        if self._abx is None:
-            self.performance.strike(choices)
-
-    def _handle(self, event: Event, due: Due | None) -> Struck | None:
-        """An event of an instrument; called in the instrument's thread."""
-        if self._abx is not None and isinstance(event, NoteOn):
+    def _handle(self, event: Event, due: Due | None) -> Note | None:
+        """An event of the instrument; called in the thread of the event."""
+        if self._abx is not None and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
-        return self.performance.handle(event, due)
+        return self.performance.notes.handle(event, due)
 
     def play_or_stop(self) -> None:
         if self._abx is None:
@@ -386,8 +382,8 @@ class Controller(QObject):
         self._ticks += 1
         if now_s >= self._facts_due_s:
             self._facts_due_s = now_s + FACTS_S
-            mix, choices = mix_of(self.session.choices), self.session.choices
-            window.transport.slots.show_gains({s: mix.gain_db(getattr(choices, s), performance.match) for s in SLOTS})
+            choices = self.session.choices
+            window.transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
             self.audio.show(status, performance.notes, take)
         moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
         for panel in self.panels:

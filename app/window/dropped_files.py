@@ -9,6 +9,7 @@ from typing import Any
 from app.audio.impulse_file import ImpulseError, cut_words
 from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
+from app.patches.instrument import SingleString
 from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
@@ -70,7 +71,7 @@ def _preset(file: Path, library: Library) -> Dropped:
 def _recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
-    choices = {"preset": path.stem, **restored_choices(recipe)}
+    choices = {"instrument": SingleString(preset=path.stem), **restored_choices(recipe)}
     notices = [] if exact else [changed_preset_notice(recipe)]
     if recipe.through is not None:
         notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
@@ -83,28 +84,26 @@ def _recipe(file: Path, library: Library) -> Dropped:
 
 
 def restored_choices(recipe: Recipe) -> dict[str, Any]:
-    """The fields of `Choices` that a recipe sets, without the preset.
+    """The fields of `Choices` that a recipe sets, without the instrument, which is a single string.
 
-    Its pluck is one at a place of the string, so that keys choose places: the patch and its pick-up stay as they are.
+    The patch that is there and its pick-up stay as they are.
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
     """
     found: dict[str, Any] = {
-        "position": recipe.pluck.position,
-        "amplitude_mm": recipe.pluck.amplitude_mm,
-        "shape": recipe.pluck.shape,
-        "width": recipe.pluck.width,
+        **asdict(recipe.pluck),
+        "string": None if recipe.string is None else asdict(recipe.string),
         "listen": recipe.listen,
-        "keys_play": "place",
+        "stereo": recipe.listen_right is not None,
+        "pickup": recipe.pickup,
+        "solo": 0,
+        "a": "difference" if recipe.source == "difference" else "model",
+        "b": "truth",
+        "heard": "b" if recipe.source == "truth" else "a",
     }
-    if recipe.decay_db is None:
-        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
-    found |= {"a": "model", "b": "truth", "heard": "b" if recipe.source == "truth" else "a", "solo": 0}
-    if recipe.source == "difference":
-        gain_db = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
-        found |= {"a": "difference", "difference_gain_db": gain_db}
-    if recipe.string is not None:
-        found["string"] = asdict(recipe.string)
-    found |= {"stereo": recipe.listen_right is not None, "pickup": recipe.pickup}
     if recipe.listen_right is not None:
         found["listen_right"] = recipe.listen_right
+    if recipe.decay_db is None:
+        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
+    if recipe.source == "difference":
+        found["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
     return found

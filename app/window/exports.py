@@ -111,7 +111,7 @@ def heard_note(choices: Choices, library: Library, through: Through | None) -> H
     """The chosen pluck as it is heard, of another preset where that is heard; None: there is no preset."""
     source, another = choices.source_heard, library.find(other_preset(choices.source_heard) or "")
     if another is not None:
-        choices = choices.model_copy(update={"preset": another.name, "string": None})
+        choices = choices.changed({"preset": another.name})
     entry = library.find(choices.preset)
     if entry is None:
         return None

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 
-from app.instrument.events import KEYS, Event, NoteOff, NoteOn
-from app.instrument.player import Struck
-from app.patches.patch import Patch, PhysicalString
+from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
+from app.patches.instrument import SingleString
+from app.patches.patch import PhysicalString
 from app.playing.due import Due
-from app.playing.keyboard import LOWEST_C, KeyPress, Reach, play, semitone_of, turn
+from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, Reach, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
+from app.playing.note import Note
 from app.presets.library import Library
-from app.session.choices import Choices, Session
+from app.rendering.subject import string_of
+from app.session.choices import Session
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
@@ -25,22 +27,22 @@ HIGHEST_KEY = 127
 
 
 class Instruments(QObject):
-    """Plays gestures at once, in the thread of each; the session, and with it the window, learns of them later.
+    """Plays events at once, in the thread of each; the session, and with it the window, follows later.
 
     Args:
-        strike: plucks the string as `Choices` say; called in the gesture's thread.
-        handle: plays an event through the patch and returns what it struck; called in the gesture's thread.
+        handle: plays an event and returns the note that it began; called in the event's thread.
+        play_preset: lets events pluck the string of a preset, by its name; called in the event's thread.
 
     Attributes:
-        latest: the note that was struck last and the patch that played it; None: a pluck at a place, or none yet.
-        latest_key: the key that was struck last through a patch, and on which string of its set, as in `Struck`;
-            None before the first.
+        latest: the note that was begun last; None before the first.
+        latest_key: the key of a patch that was struck last, and on which string of its set, as in `Struck`; None
+            before the first.
     """
 
-    played = Signal()  # a note was struck, and the session knows it
+    played = Signal()  # a note has begun, and the session has its values
     told = Signal(str)  # an error, for the user
 
-    _struck = Signal(dict)  # emitted in any thread
+    _begun = Signal()  # emitted in any thread
 
     def __init__(
         self,
@@ -48,32 +50,24 @@ class Instruments(QObject):
         session: Session,
         library: Library,
         midi: MidiChoices,
-        strike: Callable[[Choices], object],
-        handle: Callable[[Event, Due | None], Struck | None],
+        handle: Callable[[Event, Due | None], Note | None],
+        play_preset: Callable[[str], None],
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
-        self._strike, self._handle = strike, handle
+        self._handle, self._play_preset = handle, play_preset
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
-        self._told: dict[str, Any] = {}  # values of `Choices` of struck notes, not in the session yet
-        self.latest: tuple[Patch, Struck] | None = None
+        self._told: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
+        self.latest: Note | None = None
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
-        self._struck.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
+        self._begun.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
         self._keys.pressed.connect(self._press)
         self._keys.released.connect(self._release)
-        self.midi = MidiControl(
-            midi,
-            lambda: self.reach,
-            lambda: library.names,
-            lambda changes: self.perform(changes, True),
-            self.play,
-            self,
-        )
-        self.midi.performed.connect(lambda changes: self.perform(changes, False))
-        self.midi.patch_turned.connect(self._turn_patch)
+        self.midi = MidiControl(midi, self.play, self._play_note, self)
+        self.midi.performed.connect(lambda changes: session.update(**changes))
         self.midi.told.connect(self.told)
         window.midi_asked.connect(lambda: self.midi.show_dialog(window))
 
@@ -90,73 +84,55 @@ class Instruments(QObject):
         entry = self._library.find(self._session.choices.preset)
         return Reach.of(entry.info if entry else None)
 
-    @property
-    def plays_pitches(self) -> bool:
-        """As `Choices.plays_pitches`: what the computer's keys are."""
-        return self._session.choices.plays_pitches
-
     def choices_changed(self) -> None:
-        self._keys.piano = self.plays_pitches
+        self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
 
-    def play(self, event: Event, due: Due | None = None) -> bool:
-        """Plays an event through the patch, at once or when it is due. Any thread. False where no patch is chosen."""
-        if self._session.choices.patch is None:
-            return False
-        struck = self._handle(event, due)
-        if struck is not None:
-            self.latest = struck.key.patch, struck
-            self.latest_key = struck.event.key, struck.string
-            changes = {
-                "preset": struck.key.patch.preset,
-                "string": PhysicalString(**asdict(struck.key.string.parameters)),
-                "position": struck.pluck.position,
-                "amplitude_mm": struck.pluck.amplitude_mm,
-                "shape": struck.pluck.shape,
-                "width": struck.pluck.width,
-            }
-            self._note(changes)
-            self._struck.emit(changes)
-        return True
-
-    def perform(self, changes: dict[str, Any], plucks: bool) -> None:
-        """Applies new values of `Choices`, and plucks with them. Without `plucks` in the window's thread alone."""
-        if plucks:
-            self.latest = None
-            self._strike(self._note(changes))
-            self._struck.emit(changes)
-        else:
-            self._session.update(**changes)
-
-    def _note(self, changes: dict[str, Any]) -> Choices:
-        """Keeps the values of a struck note for the session; the choices with them and all notes before it."""
+    def play(self, event: Event, due: Due | None = None) -> None:
+        """Plays an event, at once or when it is due. Any thread."""
+        note = self._handle(event, due)
+        if note is None:
+            return
+        self.latest = note
+        if note.struck is not None:
+            self.latest_key = note.struck.event.key, note.struck.string
+        string = string_of(note.request.preset)
+        shown = {"string": None if string is None else PhysicalString(**asdict(string)), **asdict(note.request.pluck)}
         with self._lock:
-            after = self._session.choices.changed(self._told).changed(changes)
-            self._told = {name: getattr(after, name) for name in {*self._told, *changes, "string"}}
-        return after
+            self._told |= shown
+        self._begun.emit()
 
-    def _turn_patch(self, field: str, value: object) -> None:
-        patch = self._session.choices.patch
-        if patch is not None:
-            self._session.update(patch=Patch.model_validate({**dict(patch), field: value}))
+    def _play_note(self, event: NoteOn, mode: str) -> None:
+        """Plays a note of MIDI that says where the string is plucked, or which preset. In the input's thread."""
+        pluck, reach = self._session.choices.pluck, self.reach
+        if mode == "position":
+            pluck = reach.pluck(event.key, event.velocity, pluck)
+        elif names := self._library.names:
+            name = names[(event.key - LOWEST_PLACE) % len(names)]
+            pluck = replace(pluck, amplitude_mm=reach.amplitude_of(event.velocity))
+            self._play_preset(name)
+            with self._lock:
+                self._told |= {"instrument": SingleString(preset=name)}
+        self.play(PluckAt(pluck))
 
-    def _tell_session(self, changes: dict[str, Any]) -> None:
-        """Updates the session, once for all notes that were struck meanwhile."""
+    def _tell_session(self) -> None:
+        """Updates the session, once for all notes that have begun meanwhile."""
         with self._lock:
             told = self._told
+            self._told = {}
         if told:
             self._session.play(**told)
-            with self._lock:  # a note that was struck meanwhile has a message of its own
-                self._told = {name: value for name, value in self._told.items() if told.get(name, told) != value}
             self.played.emit()
 
     def _press(self, press: KeyPress) -> None:
-        if self.plays_pitches:
+        choices = self._session.choices
+        if choices.plays_patch:
             self._press_piano(press)
             return
-        played = play(press, self.reach, self._session.choices.amplitude_mm)
-        if played is not None:
-            self.perform(dict(played.changes), played.plucks)
+        if (place := place_of(press)) is not None:
+            self.play(PluckAt(replace(choices.pluck, position=self.reach.row[place])))
+        elif (amplitude_mm := self.reach.turned(press, choices.amplitude_mm)) is not None:
+            self._session.update(amplitude_mm=amplitude_mm)
 
     def _press_piano(self, press: KeyPress) -> None:
         choices, semitone = self._session.choices, semitone_of(press)

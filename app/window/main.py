@@ -19,7 +19,6 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from app.patches.library import SHIPPED, PatchError, read_patch
-from app.session.instrument import choices_of
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
 from app.views.theme import apply_theme
@@ -46,7 +45,7 @@ def with_patch(settings: Settings) -> Settings:
         return settings
     with contextlib.suppress(PatchError):  # without a patch, keys pluck at ten places
         patch = read_patch(FIRST_PATCH)
-        update = {"patch": patch} if settings.choices.preset else choices_of(patch)
+        update = {"patch" if settings.choices.preset else "instrument": patch}
         return settings.model_copy(update={"choices": settings.choices.changed(update)})
     return settings
 
@@ -128,7 +127,8 @@ class _Start(QObject):
 def _playable(controller: Controller) -> bool:
     """Whether a pluck would sound at once, and a key of the patch if there is one."""
     performance = controller.performance
-    return performance.at_hand and (controller.session.choices.patch is None or performance.live.ready)
+    ready = controller.session.choices.patch is None or performance.notes.keys.player is not None
+    return performance.at_hand and ready
 
 
 def load_engine() -> None:

@@ -1,4 +1,4 @@
-"""MIDI in the window: messages of the input become notes and new values of `Choices`; the dialog sets both up.
+"""MIDI in the window: messages of the input are events and new values of `Choices`; the dialog sets both up.
 
 Messages come in the input's thread. Notes are played there, without the window; controllers reach the window's thread
 through a queued signal.
@@ -7,15 +7,13 @@ through a queued signal.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.instrument.events import Controller, Event, NoteOn, fixed_function
 from app.patches.patch import Patch
-from app.playing.keyboard import Reach
-from app.playing.midi import MidiChoices, meaning_of
+from app.playing.midi import MidiChoices, turns_of
 from app.playing.midi_backend import Backend, MidiUnavailable, load_backend
 from app.playing.midi_port import MidiInput
 from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
@@ -26,35 +24,28 @@ class MidiControl(QObject):
     """Lives in the window's thread; notes are played in the input's.
 
     Args:
-        reach: the positions and amplitudes that notes pluck with; called in any thread.
-        presets: the names that notes may select; called in any thread.
-        play: plucks with new values of `Choices`; called in the input's thread.
-        handle: plays an event as a pitch; False where there is no patch to play. Called in the input's thread.
+        handle: plays an event; called in the input's thread.
+        play_note: plays a note that does not play a key of the instrument, by `MidiChoices.notes`; called there too.
 
     Attributes:
         choices: what is to be remembered.
     """
 
-    performed = Signal(dict)  # new values of `Choices`, by a controller
-    patch_turned = Signal(str, object)  # field and value of the patch, by the dialog
+    performed = Signal(dict)  # new values for `Choices.changed`, by a controller or the dialog
     told = Signal(str)  # an error, for the user
     _received = Signal(object)  # emitted in the input's thread
 
     def __init__(
         self,
         choices: MidiChoices,
-        reach: Callable[[], Reach],
-        presets: Callable[[], list[str]],
-        play: Callable[[dict[str, Any]], None],
-        handle: Callable[[Event], bool],
+        handle: Callable[[Event], object],
+        play_note: Callable[[NoteOn, str], None],
         parent: QObject | None = None,
         load: Callable[[], Backend] = load_backend,
     ) -> None:
         super().__init__(parent)
         self.choices = choices
-        self._reach = reach
-        self._presets = presets
-        self._play, self._handle = play, handle
+        self._handle, self._play_note = handle, play_note
         self._learning: str | None = None  # the field to which the next controller is assigned
         self._dialog: MidiDialog | None = None
         self._patch: Patch | None = None
@@ -82,7 +73,7 @@ class MidiControl(QObject):
                 {each.id: each.name for each in modulated_by("wheel")},
                 window,
             )
-            dialog.patch_turned.connect(self.patch_turned)
+            dialog.patch_turned.connect(self._turn_patch)
             dialog.port_chosen.connect(self._choose_port)
             dialog.notes_chosen.connect(self._choose_notes)
             dialog.learn_asked.connect(self._learn)
@@ -115,6 +106,10 @@ class MidiControl(QObject):
             self._dialog.set_patch_turnable(patch is not None)
             if patch is not None:
                 self._dialog.show_patch(patch.mode, patch.bend_semitones, patch.bend_by, patch.mod_wheel)
+
+    def _turn_patch(self, field: str, value: object) -> None:
+        if self._patch is not None:
+            self.performed.emit({"patch": Patch.model_validate({**dict(self._patch), field: value})})
 
     def _choose_port(self, name: str) -> None:
         assert self._dialog is not None
@@ -158,14 +153,14 @@ class MidiControl(QObject):
             self._received.emit(event)
             if not fixed_function(event.number):
                 return
-        if self.choices.notes == "pitch" and self._handle(event):
-            return
-        if isinstance(event, NoteOn):
-            self._play(meaning_of(event, self.choices, self._reach(), self._presets()).changes)
+        if self.choices.notes == "pitch":
+            self._handle(event)
+        elif isinstance(event, NoteOn) and event.velocity > 0:
+            self._play_note(event, self.choices.notes)
 
-    def _answer(self, event: Event) -> None:
+    def _answer(self, event: Controller) -> None:
         """In the window's thread: assigns a controller that is waited for, and applies its value."""
-        if self._learning is not None and isinstance(event, Controller):
+        if self._learning is not None:
             if does := fixed_function(event.number):
                 if self._dialog is not None:
                     self._dialog.show_problem(f"Controller {event.number} {does}: move another control.")
@@ -175,6 +170,5 @@ class MidiControl(QObject):
             if self._dialog is not None:
                 self._dialog.show_problem("")
             self.input.let_go()  # it may be the modulation wheel, whose way back would no longer be played
-        meaning = meaning_of(event, self.choices, self._reach(), self._presets(), self._patch)
-        if meaning.changes:
-            self.performed.emit(meaning.changes)
+        if changes := turns_of(event, self.choices, self._patch):
+            self.performed.emit(changes)

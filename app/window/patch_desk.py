@@ -17,6 +17,7 @@ from app.instrument.facts import facts_of, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.player import is_another
 from app.instrument.strings import KeyString, Strings
+from app.patches.instrument import SingleString
 from app.patches.library import (
     SUFFIX,
     PatchEntry,
@@ -33,7 +34,7 @@ from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letter
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
-from app.session.instrument import choices_of
+from app.session.monitor import Monitor
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
 from app.views.controls.browser import Browser
@@ -96,17 +97,17 @@ class PatchDesk(QObject):
         self._shown_s = 0.0
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._told_other = ""  # the source that the user was told is not heard from keys
-        self._playback = Playback(instruments.play, performance.notes, performance.live.cancel)
+        self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
-        self.recordings = Recordings(session, performance.live, panel.bar, self)
+        self.recordings = Recordings(session, performance.notes.keys, panel.bar, self)
         self.recordings.told.connect(self.told)
         self.recordings.informed.connect(self.informed)
         self.reload()
         self._connect()
 
     def _connect(self) -> None:
-        panel, bar, browser = self._panel, self._panel.bar, self.browser
+        session, panel, bar, browser = self._session, self._panel, self._panel.bar, self.browser
         panel.pressed.connect(self._press)
         panel.released.connect(lambda key: self._instruments.play(NoteOff(key, KEYS)))
         bar.previous_asked.connect(lambda: self.desk.step(-1))
@@ -117,7 +118,9 @@ class PatchDesk(QObject):
         bar.revert_asked.connect(self.revert)
         bar.compare_asked.connect(self.compare)
         bar.scala_remove_asked.connect(self.remove_scala)
-        panel.keys_play_asked.connect(lambda plays: self._session.update(keys_play=plays))
+        panel.keys_play_asked.connect(
+            lambda plays: session.play_patch() if plays == "pitch" else session.play_string()
+        )
         bar.octave_asked.connect(self._move_octave)
         bar.macro_turned.connect(self._turn_macro)
         bar.changed.connect(self.change)
@@ -133,6 +136,7 @@ class PatchDesk(QObject):
 
     @property
     def patch(self) -> Patch | None:
+        """The one that is there, played or not."""
         return self._session.choices.patch
 
     @property
@@ -158,12 +162,13 @@ class PatchDesk(QObject):
         """Makes a patch, by the name of its entry, the one that keys play."""
         for entry in self._entries:
             if entry.name == name:
-                self._session.update(**choices_of(entry.patch))
+                self._session.update(instrument=entry.patch)
 
     def audition(self, name: str) -> None:
         """Chooses a patch, unless it is there already, maybe changed, and plays a note in the middle of its range."""
         if self.entry is None or self.entry.name != name:
             self.choose(name)
+        self._session.play_patch()
         if self.patch is not None:
             key = sum(self.patch.range) // 2
             self._playback.play(_note(key))
@@ -271,7 +276,7 @@ class PatchDesk(QObject):
     def revert(self) -> None:
         """Goes back to the patch as it was saved."""
         if (entry := self.entry) is not None:
-            self._session.update(**choices_of(entry.patch))
+            self._session.update(instrument=entry.patch)
 
     def compare(self, saved: bool) -> None:
         """Lets keys play the patch as it was saved, or as it is now. The choices stay; any change of them ends it."""
@@ -289,7 +294,7 @@ class PatchDesk(QObject):
             elif file.suffix.lower() == STRING_FILE:
                 self._take_string(file)
             else:
-                self._session.update(**choices_of(read_patch(file)))
+                self._session.update(instrument=read_patch(file))
         except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
             self.told.emit(one_line(str(error)))
 
@@ -297,10 +302,11 @@ class PatchDesk(QObject):
         song = read_song(file, self.patch)
         if song.left_out:
             self.informed.emit(f"{song.left_out}.")
+        self._session.play_patch()
         self._playback.play(song.events)
 
     def _take_string(self, file: Path) -> None:
-        """Chooses the string whose physical parameters the file has, plucked by the model of many strings."""
+        """Makes the string whose physical parameters the file has the instrument, by the model of many strings."""
         many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
         if many is None:
             self.told.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
@@ -310,7 +316,7 @@ class PatchDesk(QObject):
             of_string(preset, string)  # it can be plucked
         except PresetError as error:
             raise PresetError(f"{file.name}: {error}") from error
-        self._session.update(preset=many.name, string=PhysicalString(**asdict(string)))
+        self._session.update(instrument=SingleString(preset=many.name), string=PhysicalString(**asdict(string)))
         outside = [one.words for one in many.info.family.outside(string)] if many.info.family is not None else []
         beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""
         self.informed.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
@@ -367,15 +373,15 @@ class PatchDesk(QObject):
             self._panel.bar.show_comparing(False)
         if names & {"octave", "patch"}:
             self._keep_octave_in_range("octave" in names)
-        if names & {"octave", "velocity", "keys_play", "patch"}:
-            choices, pitches = self._session.choices, self._instruments.plays_pitches
+        if names & {"octave", "velocity", "instrument", "patch"}:
+            choices, pitches = self._session.choices, self._session.choices.plays_patch
             self._panel.set_octave(*(C_OF_OCTAVE_0 + octave for octave in (choices.octave, *self._octaves)))
             self._panel.bar.show_velocity(choices.velocity)
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
-        if names & {"keys_play", "patch"}:
+        if names & {"instrument", "patch"}:
             self._judge_anew()
-        if names & {"heard", "a", "b", "keys_play", "patch"}:
+        if names & {"instrument", "patch", *Monitor.model_fields}:
             self._show_source()
 
     @property
@@ -399,8 +405,8 @@ class PatchDesk(QObject):
 
     def _show_source(self) -> None:
         """In whose colour keys are lit; says once that keys do not play another preset which a slot holds."""
-        choices, heard = self._session.choices, self._session.source_heard
-        other = heard if self._instruments.plays_pitches and other_preset(heard) else ""
+        choices, heard = self._session.choices, self._session.choices.source_heard
+        other = heard if choices.plays_patch and other_preset(heard) else ""
         if self._told_other not in (choices.a, choices.b):
             self._told_other = ""
         self._panel.show_source("model" if other else heard)
@@ -422,8 +428,7 @@ class PatchDesk(QObject):
         Another patch, or keys that choose places, leave nothing to say.
         """
         patch, before, self._noted = self.patch, self._noted, self.patch
-        pitches = self._instruments.plays_pitches
-        if patch is None or not pitches or before is None or is_another(patch, before):
+        if patch is None or not self._session.choices.plays_patch or before is None or is_another(patch, before):
             self._instruments.latest = None
         if self._instruments.latest is not None:
             self.show_played()
@@ -446,8 +451,9 @@ class PatchDesk(QObject):
         entry = self._library.find(choices.preset)
         if entry is None:
             return []
-        if latest is not None and patch is not None and latest[0] != patch:
-            return outside_of_key(entry.info, patch, latest[1].event, latest[1].string)
+        struck = None if latest is None else latest.struck
+        if struck is not None and patch is not None and struck.key.patch != patch:
+            return outside_of_key(entry.info, patch, struck.event, struck.string)
         if choices.string is None:
             return []
         return outside_of_string(entry.info, choices.string.parameters, choices.pluck)
@@ -476,7 +482,7 @@ class PatchDesk(QObject):
         if now_s - self._shown_s < SHOWN_EVERY_S or not self._panel.isVisible():
             return
         self._shown_s = now_s
-        self._panel.show_sounding(self._performance.live.sounding())
+        self._panel.show_sounding(self._performance.notes.keys.sounding())
         self._panel.bar.show_voices(self._performance.notes.ringing)
         self.recordings.tick(now_s)
 
@@ -501,8 +507,8 @@ class PatchDesk(QObject):
         self.desk.show_chosen()
 
     def _press(self, key: int, velocity: int) -> None:
-        """Plays a key on the screen; these are always pitches."""
-        self._session.update(keys_play="pitch")
+        """Plays a key on the screen, which is one of the patch, where there is one."""
+        self._session.play_patch()
         self._instruments.play(NoteOn(key, velocity, KEYS))
 
     def _move_octave(self, octaves: int) -> None:

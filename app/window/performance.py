@@ -1,7 +1,7 @@
-"""The pluck that is played and the pluck that is shown.
+"""The note that is played and the pluck that is shown.
 
-A gesture strikes a note, which sounds at once; the picture follows: the render worker makes the motion of the same
-pluck, and the views show it at the note's own time. All but `strike` and `handle` runs in the window's thread.
+An event begins a note, which sounds at once; the picture follows: the render worker makes the motion of the same
+pluck, and the views show it at the note's own time. All but `play_preset` runs in the window's thread.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,42 +16,29 @@ from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
 from app.export.sound import Through
-from app.instrument.events import Event
-from app.instrument.player import Struck
+from app.instrument.events import PluckAt
+from app.patches.instrument import SingleString
 from app.patches.patch import Patch
-from app.playing.chosen import mix_of, render_request, stroke_of, subject_of
-from app.playing.due import Due
-from app.playing.keyboard import PLACES, Reach
-from app.playing.live import Live
-from app.playing.notes import Note, Notes
+from app.playing.keyboard import Reach
+from app.playing.note import Note
+from app.playing.notes import Notes
 from app.playing.sources import Sources
-from app.playing.stroke import Stroke
 from app.presets.library import Library, PresetEntry
 from app.presets.words import model_word, percent
 from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import Choices, Session
-from app.session.ears import heard_ear
-from app.session.instrument import choices_of
+from app.session.choices import Choices, PluckedString, Session
+from app.session.listener import Listener
+from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
+from app.session.slots import request_of
+from app.shared.vocabulary import DIFFERENCE
 from app.window.main_window import MainWindow
 from app.window.panels import Panel
 from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
-from engine.pluck import Pluck
-from engine.resonators.string import StringParameters
 
-MotionKey = tuple[str, StringParameters, Pluck, float]  # the preset's name, its string, the pluck, how long it is
-LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
-EAR_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo"}
-PLACE_FIELDS = {"preset", "string", "amplitude_mm", "shape", "width", "patch", "keys_play"}  # of keys at ten places
-SLOT_FIELDS = {"a", "b", "heard"}
-MIX_FIELDS = {"a", "b", "heard", "level_match", "difference_gain_db"}
-
-
-def motion_key(take: Take) -> MotionKey:
-    """What the motion of a take depends on."""
-    return take.preset_name, take.info.string, take.pluck, take.seconds
+PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
 @dataclass
@@ -65,7 +51,7 @@ class _Shown:
 
 
 class Performance(QObject):
-    """Owns the notes, the patch that is played (`live`) and the render worker. Times are in s from the pluck."""
+    """Owns the notes and the render worker. Times are in s from the pluck."""
 
     def __init__(
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
@@ -75,7 +61,6 @@ class Performance(QObject):
         self._panels = panels
         self._asked: RenderRequest | None = None
         self._shown = _Shown()
-        self._latest: Note | None = None  # struck last
         self._next_turn: Note | None = None  # of the loop, which waits in the mixer for its frame
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
@@ -85,8 +70,7 @@ class Performance(QObject):
         mail.failed.connect(self._render_failed)
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
-        self.notes = Notes(sound, self._sources, mail.refused.emit)
-        self.live = Live(self.notes, self._sources, self._path_of, mail.refused.emit, sound.set_effects)
+        self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
 
     @property
@@ -102,13 +86,12 @@ class Performance(QObject):
     @property
     def ready(self) -> bool:
         """Whether the motion that is shown is that of the chosen pluck."""
-        return self.take is not None and motion_key(self.take) == self._key(self._session.choices)
+        return self.take is not None and self._is_of_chosen(self.take)
 
     @property
     def at_hand(self) -> bool:
         """Whether the chosen pluck would sound at once: its sources are loaded, and the output is open."""
-        stroke = self._stroke()
-        return stroke is not None and self._sound.status().changes_done > 0 and self.notes.have(stroke)
+        return self._sound.status().changes_done > 0 and self.notes.at_hand
 
     @property
     def playing(self) -> bool:
@@ -140,41 +123,21 @@ class Performance(QObject):
     @property
     def match(self) -> Mapping[str, float] | None:
         """By source, the factor that brings the latest note to the level of the truth; None: not known yet."""
-        return None if self._latest is None else self._latest.match
+        return None if self.notes.latest is None else self.notes.latest.match
 
     # Intents
 
-    def strike(self, choices: Choices) -> Note | None:
-        """Plucks the string as `choices` say, while other notes ring on. Any thread; `follow` then shows it.
-
-        None where the preset is not in the library.
-        """
-        entry = self._library.find(choices.preset)
-        if entry is None:
-            return None
-        note = self.notes.strike(self._stroke_of(choices, entry))
-        self._latest = note
-        return note
-
-    def handle(self, event: Event, due: Due | None = None) -> Struck | None:
-        """Plays an event through the patch. Any thread; `follow` then shows it. None where it struck no string."""
-        made = self.live.handle(event, due)
-        if made is None:
-            return None
-        struck, self._latest = made
-        return struck
-
     def pluck(self) -> None:
         """Plucks the string as chosen, and shows it."""
-        self.strike(self._session.choices)
+        self.notes.handle(PluckAt(self._session.choices.pluck))
         self.follow()
 
     def follow(self) -> None:
         """Shows the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
-        latest = self._latest
+        latest = self.notes.latest
         if latest is None or latest is self._shown.note or latest.released or latest.over:
             return
-        if self.ready and self._is_of(latest, self._session.choices):
+        if self.ready and self._is_chosen(latest):
             self._forget_turn()
             self._shown.note, self._shown.parked_s = latest, latest.from_s
 
@@ -190,7 +153,6 @@ class Performance(QObject):
         self._forget_turn()
         self._shown.parked_s = self.position_s
         self._shown.note = None
-        self.live.stop()
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
@@ -200,72 +162,64 @@ class Performance(QObject):
         position_s = min(max(position_s, 0.0), self.take.seconds)
         self._forget_turn()
         self._shown.note, self._shown.parked_s = None, position_s
-        if self.playing and (stroke := self._stroke()) is not None:
-            self._latest = self._shown.note = self.notes.strike(stroke, from_s=position_s, alone=True)
-
-    def render(self) -> None:
-        """Asks for the motion of what is chosen."""
-        entry = self.entry
-        self._asked = None if entry is None else render_request(self._session.choices, entry.path, self._library)
-        if self._asked is None:
-            self._window.notices.tell("No preset was found: install the presets again, or train one.")
-            return
-        self.notes.prepare(self._asked.preset, *self._asked.others)
-        self._worker.submit(self._asked)
+        if self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
+            self.notes.latest = self._shown.note = note
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Applies changed fields of `Choices` to the notes, and asks for another motion where that has changed."""
         choices, entry = self._session.choices, self.entry
-        if names & MIX_FIELDS:
-            self.notes.set_mix(mix_of(choices))
-        if names & {*EAR_FIELDS, "patch"}:  # another patch ends a comparison, which was heard elsewhere
-            self.notes.listen(heard_ear(choices))
-        if names & SLOT_FIELDS:
+        if names & Monitor.model_fields.keys():
+            self.notes.set_monitor(choices)
             self.hear_dry(False)
-        if "patch" in names:
-            self.live.set_patch(choices.patch, heard_ear(choices))
-        elif names & EAR_FIELDS:
-            self.live.listen(heard_ear(choices))
-        self.live.seconds = choices.seconds
-        if names & PLACE_FIELDS and entry is not None and not choices.plays_pitches:
-            reach = Reach.of(entry.info)
-            places = (reach.place(number / (PLACES - 1)) for number in range(PLACES))
-            plucks = [replace(choices.pluck, position=place) for place in places]
-            self.notes.prepare_plucks(subject_of(choices, entry.path), plucks)
+        if names & {"instrument", "patch"}:  # ends a comparison
+            self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
+        elif names & Listener.model_fields.keys():
+            self.notes.listen(choices.ear)
+        asked = request_of(choices, self._library)
+        self.notes.choose(asked)
+        if names & PLACED and not (choices.plays_patch or entry is None or asked is None):
+            plucks = [replace(asked.pluck, position=place) for place in Reach.of(entry.info).row]
+            self.notes.prepare_plucks(asked.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
-        if entry is not None and render_request(choices, entry.path, self._library) != self._asked:
-            self.render()
+        if asked is not None and asked != self._asked:
+            self._asked = asked
+            self.notes.prepare(asked.preset, *asked.others)
+            self._worker.submit(asked)
         self.follow()
+
+    def play_preset(self, name: str) -> None:
+        """Lets events pluck this preset's string from now on. Any thread; the choices must follow."""
+        choices = self._session.choices
+        self.notes.set_instrument(SingleString(preset=name), choices.ear, choices.patch)
 
     def hear_dry(self, dry: bool) -> None:
         """Leaves body and room out where `dry` is True; else only while the difference is heard."""
-        self.live.hear_dry(dry or self._session.source_heard == "difference")
+        self.notes.hear_dry(dry or self._session.choices.source_heard == DIFFERENCE)
 
     def hear_patch(self, patch: Patch | None) -> None:
         """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
         if patch is not None:
-            choices = choices.changed(choices_of(patch))
-        self.notes.listen(heard_ear(choices))
-        self.live.set_patch(choices.patch, heard_ear(choices))
+            choices = choices.changed({"instrument": patch})
+        self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
 
     def through(self, choices: Choices) -> Through | None:
         """What the instrument adds to the chosen string: its level, body and room; None: there is no instrument."""
-        patch, string = self.live.heard_through, choices.string
+        keys, string = self.notes.keys, choices.string
+        patch = keys.heard_through
         if patch is None:
             return None
-        return Through.of(patch, 1.0 if string is None else self.live.gain_of(string.parameters))
+        return Through.of(patch, 1.0 if string is None else keys.gain_of(string.parameters))
 
     def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
         """Model and truth of a pluck as they are heard, (frames, channels) by source, rendered in the background.
 
         `choices.preset` must be in the library.
         """
-        entry = self._library.find(choices.preset)
-        assert entry is not None
-        stroke = replace(stroke_of(choices, entry.path, self._library), sources=("model", "truth"))
-        return self.notes.render(stroke, rate_hz, choices.seconds)
+        asked = request_of(choices, self._library)
+        assert asked is not None
+        return self.notes.render(asked, rate_hz)
 
     def close(self) -> None:
         """Ends the threads; may be called again."""
@@ -287,34 +241,29 @@ class Performance(QObject):
 
     def _waiting(self) -> str:
         """When a model that is rendered before it is heard will sound; "" where none waits."""
-        latest = self._latest
+        latest = self.notes.latest
         if latest is None or not latest.waits_s:
             return ""
-        entry = self._library.find(path_of(latest.stroke.preset).stem)
+        entry = self._library.find(path_of(latest.request.preset).stem)
         name = model_word(entry.info.model) if entry else "model"
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
     def _turn(self) -> None:
-        """Hands the next turn of the loop to the mixer, LOOP_AHEAD_S before it begins."""
+        """Hands the next turn of the loop to the mixer, shortly before it begins."""
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
-        note, take, turn = self._shown.note or self._latest, self._shown.take, self._next_turn
+        note, take, turn = self._shown.note or self.notes.latest, self._shown.take, self._next_turn
         if note is None or take is None or not note.began:
             return
         if turn is not None:
             if turn.began and not turn.cut:
-                self._latest = turn
-                if self._is_of(turn, self._session.choices):
+                self.notes.latest = turn
+                if self._is_chosen(turn):
                     self._shown.note = turn
             if turn.began:  # it sounds, or it was cut with its mixer: the next call hands over another
                 self._next_turn = None
             return
-        if note.cut or note.released or (stroke := self._stroke()) is None:
-            return
-        frame, mixer = note.frame_at(take.seconds), self._sound.mixer
-        if frame > (mixer.seconds + LOOP_AHEAD_S) * mixer.rate_hz:
-            return
-        note.release_at(frame)
-        self._next_turn = self.notes.strike(stroke, begin_frame=frame)
+        if not (note.cut or note.released):
+            self._next_turn = self.notes.turn(note, take.seconds)
 
     def _forget_turn(self) -> None:
         turn, self._next_turn = self._next_turn, None
@@ -326,7 +275,7 @@ class Performance(QObject):
     # Signals of the render worker
 
     def _take_started(self, take: Take) -> None:
-        if motion_key(take) != self._key(self._session.choices):  # overtaken by the next one
+        if not self._is_of_chosen(take):  # overtaken by the next one
             return
         self._shown = _Shown(take)
         for panel in self._panels:
@@ -364,29 +313,16 @@ class Performance(QObject):
         """In the header: how long a model is still waited for, or the error."""
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
-    def _stroke(self) -> Stroke | None:
-        entry = self.entry
-        return None if entry is None else self._stroke_of(self._session.choices, entry)
+    def _is_chosen(self, note: Note) -> bool:
+        """Whether a note is of the chosen pluck."""
+        asked = self._asked
+        return asked is not None and (note.request.preset, note.request.pluck) == (asked.preset, asked.pluck)
 
-    def _stroke_of(self, choices: Choices, entry: PresetEntry) -> Stroke:
-        """The chosen pluck, with the gain that its string has when a key plays it."""
-        stroke = stroke_of(choices, entry.path, self._library)
-        string = string_of(stroke.preset)
-        return stroke if string is None else replace(stroke, gain=self.live.gain_of(string))
-
-    def _is_of(self, note: Note, choices: Choices) -> bool:
-        entry = self._library.find(choices.preset)
-        if entry is None or note.stroke.pluck != choices.pluck or path_of(note.stroke.preset) != entry.path:
+    def _is_of_chosen(self, take: Take) -> bool:
+        """Whether a take is of the chosen pluck."""
+        asked, entry = self._asked, self.entry
+        if asked is None or entry is None:
             return False
-        return string_of(note.stroke.preset) == string_of(subject_of(choices, entry.path))
-
-    def _key(self, choices: Choices) -> MotionKey | None:
-        entry = self._library.find(choices.preset)
-        if entry is None:
-            return None
-        string = choices.string.parameters if choices.string is not None else entry.info.string
-        return entry.name, string, choices.pluck, choices.seconds
-
-    def _path_of(self, preset: str) -> Path | None:
-        entry = self._library.find(preset)
-        return None if entry is None else entry.path
+        string = string_of(asked.preset) or entry.info.string
+        chosen = entry.name, string, asked.pluck, asked.seconds
+        return (take.preset_name, take.info.string, take.pluck, take.seconds) == chosen

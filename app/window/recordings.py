@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QMessageBox
 
 from app.export.played import Played
 from app.instrument.events import PatchTurned
-from app.playing.live import Live
+from app.playing.keys import Keys
 from app.session.choices import Session
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.views.instrument.patch_bar import PatchBar
@@ -27,9 +27,9 @@ class Recordings(QObject):
     save_asked = Signal()  # of the latest one
     unsaved_changed = Signal()
 
-    def __init__(self, session: Session, live: Live, bar: PatchBar, parent: QObject) -> None:
+    def __init__(self, session: Session, keys: Keys, bar: PatchBar, parent: QObject) -> None:
         super().__init__(parent)
-        self._session, self._live, self._bar = session, live, bar
+        self._session, self._keys, self._bar = session, keys, bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
         self._unsaved: list[Played] = []
         bar.record_asked.connect(self.record)
@@ -43,12 +43,14 @@ class Recordings(QObject):
 
     def record(self) -> None:
         """Begins to record; or ends it and has it saved, as a recording that is not saved yet."""
-        if self._live.recording:
+        if self._keys.recorder.recording:
             self._end()
         elif self._unsaved:
             self.save_asked.emit()
         else:
-            self._live.begin_recording()
+            self._keys.begin_recording()
+            if not self._session.choices.plays_patch:
+                self.informed.emit("Keys of a patch are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
 
     def discard(self) -> None:
@@ -64,19 +66,19 @@ class Recordings(QObject):
 
     def tick(self, now_s: float) -> None:
         """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
-        if self._live.recording:
+        if self._keys.recorder.recording:
             self._bar.show_recording(now_s - self._began_s)
 
     def may_close(self) -> bool:
         """Whether the window may be closed; asks where that would lose what was played."""
-        if not self._unsaved and not self._live.recording:
+        if not self._unsaved and not self._keys.recorder.recording:
             return True
         question = "What was played is not saved. Quit without saving the recording?"
         answer = QMessageBox.question(self._bar, "Recording not saved", question)
         return answer == QMessageBox.StandardButton.Yes
 
     def _end(self) -> None:
-        events = self._live.end_recording()
+        events = self._keys.recorder.end()
         self._bar.show_recording(None)
         patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
         patch = patches[0] if patches else self._session.choices.patch

@@ -16,8 +16,9 @@ from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
+from app.patches.instrument import PATCH, SINGLE
 from app.playing.midi import MidiChoices
-from app.session.choices import Choices
+from app.session.choices import Choices, migrated
 from app.views.look import Look
 from engine import bounds
 from engine.plain_text import one_line
@@ -136,11 +137,14 @@ def _usable(text: bytes) -> Settings | None:
     """
     try:
         data: dict[str, Any] = parse_json(text, "settings")
+        if isinstance(data, dict) and isinstance(data.get("choices"), dict):
+            data["choices"] = migrated(data["choices"])
         for _ in range(MOST_FAULTS):
             try:
                 return Settings.model_validate(data)
             except ValidationError as error:
-                path = [str(part) for part in error.errors(include_url=False, include_input=False)[0]["loc"]]
+                found = error.errors(include_url=False, include_input=False)[0]["loc"]
+                path = [str(part) for part in found if part not in (PATCH, SINGLE)]
             if path[:1] in ([], ["version"]):  # no settings, or those of another version
                 return None
             _drop(data, path)

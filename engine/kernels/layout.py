@@ -14,6 +14,13 @@ from engine.kernels.compiled import COMPILED
 QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
 AHEAD = 32  # frames that the limiter looks ahead, and by which it delays what is heard; even, and a quantum at most
 
+ATTACK_S = 0.002  # of a voice, the very start: a pluck has an attack, which a longer fade would swallow
+FADE_S = 0.020  # another source, another gain
+END_FADE_S = 0.25  # of a model that hums on where its string has long been silent
+SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
+LONGEST_S = 1e9  # of a voice that never ends
+BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
+
 # A voice's state
 WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
 # A voice's kind
@@ -223,6 +230,8 @@ M_CONVOLVER = 25  # W address of its memory, where there are effects; it stays
 M_EFFECTS = 26  # W address of the impulse response that is wanted; 0: none
 M_EFFECTS_NOW = 27  # W of the one that is heard
 M_EFFECTS_NEXT = 28  # W of the one that is being faded to; 0: none is, or to none
+M_PLAYER = 29  # W address of the player whose events are played; 0: none
+M_HERE = 30  # W its own address
 M_VOICES = 32  # W addresses
 M_RING = M_VOICES + MOST_VOICES  # W addresses
 M_GAP_LIST = M_RING + RING  # R

@@ -16,6 +16,7 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
+from engine.kernels.player import play
 from engine.kernels.voice import add, note_gap, take_over
 
 TONE_HZ, TONE_LEVEL, TONE_FADE_S = 440.0, 0.1, 0.020
@@ -53,6 +54,10 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
     _take_up(counts)
+    player = counts[at.M_PLAYER]
+    fence()
+    if player != 0:
+        play(player, counts[at.M_HERE])
     for place in range(counts[at.M_ACTIVE]):  # before any sounds on
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)

@@ -5,6 +5,7 @@ It takes the better part of a minute where nothing has been compiled yet, and ab
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from engine.presets import PresetInfo, TrainedRange
 from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import StringParameters
 from engine.sources import TruthSource, project
-from engine.voices import Ear, Mixer, Program, Voice, bank_program, plain_program, truth_program
+from engine.voices import CompiledPlayer, Ear, Mixer, Program, Voice, bank_program, plain_program, truth_program
 
 RATE_HZ = 48_000
 INFO = PresetInfo(
@@ -65,6 +66,8 @@ def voices() -> None:
             _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
     Mixer(RATE_HZ).set_effects(Effects(room=Room()))
+    CompiledPlayer(RATE_HZ, INFO.modes).catch_up(Mixer(RATE_HZ))
+    _string()
 
 
 def models() -> None:
@@ -82,6 +85,17 @@ def models() -> None:
             model.advance(state, 2, readout)
     truth = TruthSource(INFO)
     truth.advance(truth.start(_initial_m()[None]), 2)
+
+
+def _string() -> None:
+    """What a bend, a slide, a damper and a knob make of a string."""
+    from engine.kernels import strings
+
+    string = np.array(astuple(StringParameters()))
+    strings.turned(string, np.ones(len(string)), np.empty_like(string))
+    for change in (strings.fretted, strings.bent, strings.slid, strings.damped):
+        change(string, 1.5)
+    strings.pitch_hz(string)
 
 
 def _bank(sizes: dict[str, Any]) -> Program:

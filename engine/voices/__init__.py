@@ -11,6 +11,7 @@ offline    a voice for a file
 from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
 from engine.voices.offline import OfflineVoice, render_voice, voice_blocks
+from engine.voices.player import CompiledPlayer
 from engine.voices.programs import (
     Program,
     bank_program,
@@ -22,6 +23,7 @@ from engine.voices.programs import (
 from engine.voices.voice import Voice
 
 __all__ = [
+    "CompiledPlayer",
     "Ear",
     "Gap",
     "Mixer",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.derivative import differentiator_taps
 from engine.voices.voice import Voice
+
+if TYPE_CHECKING:
+    from engine.voices.player import CompiledPlayer
 
 LIMITER_RELEASE_S = 0.08
 VOLUME_SMOOTHING_S = 0.015
@@ -49,8 +53,10 @@ class Mixer:
         self.effects = Effects()
         self._convolver: NDArray[np.float64] | None = None
         self._impulses: dict[int, NDArray[np.float64]] = {}  # by address: those that may be in use
+        self._players: list[CompiledPlayer] = []  # whose memory may be in use
         memory[at.M_RATE] = rate_hz
         counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
+        counts[at.M_HERE] = memory.ctypes.data
         memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
         memory[at.M_GAINS : at.M_GAINS + at.AHEAD] = 1.0
         memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
@@ -87,6 +93,18 @@ class Mixer:
             for voice in voices[room:]:
                 voice.refuse()
             publish(counts, at.M_PUSHED, pushed + min(len(voices), room))
+
+    def set_player(self, player: CompiledPlayer) -> None:
+        """The events of this player are played from the next quantum on; what another has struck rings on.
+
+        Raises:
+            ValueError: it is of another rate.
+        """
+        if player.rate_hz != self.rate_hz:
+            raise ValueError(f"the player has {player.rate_hz} Hz, the mixer {self.rate_hz} Hz")
+        with self._lock:
+            self._players.append(player)
+            publish(self._counts, at.M_PLAYER, player.address)
 
     def set_effects(self, effects: Effects | None) -> None:
         """All voices sound through these from now on: body and room, before the volume. Any thread.
@@ -130,6 +148,11 @@ class Mixer:
         """Those that have been handed over and are not over."""
         with self._lock:
             return [voice for voice in self._voices if not voice.over]
+
+    @property
+    def active(self) -> int:
+        """Voices that sound or wait, those of a player among them."""
+        return int(self._counts[at.M_ACTIVE])
 
     def render(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), where no device takes them."""

@@ -215,9 +215,14 @@ def _tension_program(model: KoopmanTension, info: PresetInfo, rate_hz: int) -> P
     return tension_program(model, info.resonator, rate_hz)
 
 
-@torch.no_grad()
 def tension_program(model: KoopmanTension, resonator: Resonator, rate_hz: int) -> Program:
     """What the model learned, for a resonator of any kind at any rate."""
+    return _with_modes(at.TENSION, tension_memory(model, rate_hz), resonator, rate_hz)
+
+
+@torch.no_grad()
+def tension_memory(model: KoopmanTension, rate_hz: int) -> Array:
+    """What the kernels read of the model, whatever the resonator."""
     c, curves = model.configuration, torch.stack([model.A, model.r, model.p])
     reals = {
         at.S_NODE_PHASE: c.node_phase,
@@ -226,10 +231,7 @@ def tension_program(model: KoopmanTension, resonator: Resonator, rate_hz: int) -
         at.S_LOUDNESS: -math.log(FULL_SCALE_M),
         at.S_RATE: float(rate_hz),
     }
-    memory = np.concatenate(
-        [_header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), curves.flatten().numpy()]
-    )
-    return _with_modes(at.TENSION, memory, resonator, rate_hz)
+    return np.concatenate([_header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), curves.flatten().numpy()])
 
 
 def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
@@ -249,6 +251,11 @@ def solver_program(
     Args:
         aliased: modes that are too high for the rate are heard as others, as they are in data of that rate.
     """
+    return _with_modes(at.TRUTH, solver_memory(rate_hz, coarser), resonator, rate_hz, aliased)
+
+
+def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER) -> Array:
+    """What the kernels read of the solver, whatever the resonator."""
     reals = {
         at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
         at.T_SILENCE: HEARD_SILENCE,
@@ -257,7 +264,7 @@ def solver_program(
         **{at.T_ROTATIONS + stage: share for stage, share in enumerate(ROTATIONS[: at.STAGES // 2])},
         **{at.T_KICKS + stage: share for stage, share in enumerate(KICKS)},
     }
-    return _with_modes(at.TRUTH, _header(at.T_HEADER, reals, {}), resonator, rate_hz, aliased)
+    return _header(at.T_HEADER, reals, {})
 
 
 def _fits(omega: Tensor) -> Tensor:

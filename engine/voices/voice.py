@@ -10,19 +10,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
+from engine.kernels.layout import ATTACK_S, BRIGHTER, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
 from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
 from engine.voices.programs import Program
 
-ATTACK_S = 0.002  # the very start: a pluck has an attack, which a longer fade would swallow
-FADE_S = 0.020  # another source, another gain
-END_FADE_S = 0.25  # of a model that hums on where its string has long been silent
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
-SILENT_DB = -100.0  # of full scale: a voice that has fallen below is over
-LONGEST_S = 1e9  # of a voice that never ends
-BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 
 
 class Voice:

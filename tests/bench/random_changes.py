@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
+from app.patches.instrument import SingleString
 from app.patches.patch import Patch, PhysicalString, StringSet
 from app.session.choices import Choices
-from app.session.instrument import choices_of
 from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
@@ -30,7 +30,7 @@ class Repertoire:
 
 
 def random_change(random: Random, choices: Choices, repertoire: Repertoire) -> Mapping[str, Any]:
-    """New values of one field of `Choices`, or of those that choosing a patch sets."""
+    """New values of one field of `Choices`, or the instrument."""
     return random.choice(_CHANGES)(random, choices, repertoire)
 
 
@@ -70,9 +70,9 @@ _CHANGES: tuple[_Change, ...] = (
     lambda r, c, of: {"right_view": r.choice(of.right_views)},
     lambda r, c, of: {"motion": not c.motion},
     lambda r, c, of: {"envelope": not c.envelope},
-    lambda r, c, of: choices_of(r.choice(of.patches)) if of.patches else {},
+    lambda r, c, of: {"instrument": r.choice(of.patches)} if of.patches else {},
     lambda r, c, of: {"octave": r.randint(-4, 4)},
     lambda r, c, of: {"velocity": r.randint(1, 127)},
-    lambda r, c, of: {"keys_play": r.choice(("pitch", "place"))},
+    lambda r, c, of: {"instrument": r.choice((SingleString(preset=c.preset), c.patch or c.instrument))},
     lambda r, c, of: {"string": None if c.patch is None else r.choice(_strings(c.patch))},
 )

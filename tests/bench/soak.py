@@ -43,6 +43,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QKeyEvent
 
 from app.audio.choices import Buffer, SoundChoice
+from app.patches.instrument import SingleString
 from app.patches.library import list_patches
 from app.session.choices import Choices
 from app.window.main_window import MainWindow
@@ -341,7 +342,7 @@ def _weighed_at_rest(stage: Stage) -> float:
     """Resident memory in MiB with one short pluck on stage, always the same; the user's choices come back."""
     session = stage.controller.session
     before = session.choices
-    rest = Choices(preset=stage.controller.library.entries[0].name, seconds=REST_PLUCK_S)
+    rest = Choices(instrument=SingleString(preset=stage.controller.library.entries[0].name), seconds=REST_PLUCK_S)
     stage.controller.performance.stop()
     session.update(**rest.model_dump())
     stage.controller.pluck()

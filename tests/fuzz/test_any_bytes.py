@@ -50,9 +50,9 @@ def test_any_bytes_are_no_preset(tmp_path_factory: pytest.TempPathFactory, data:
         load_preset(path)
 
 
-def fields_of(kind: type) -> st.SearchStrategy[dict[str, Any]]:
+def fields_of(kind: type, *more: str) -> st.SearchStrategy[dict[str, Any]]:
     known = getattr(kind, "model_fields", None) or kind.__dataclass_fields__  # type: ignore[attr-defined]
-    return st.dictionaries(st.sampled_from(sorted(known)) | st.text(max_size=8), VALUES, max_size=6)
+    return st.dictionaries(st.sampled_from(sorted([*known, *more])) | st.text(max_size=8), VALUES, max_size=6)
 
 
 @pytest.mark.parametrize("kind", [PresetInfo, StringParameters, TrainingConfiguration])
@@ -67,7 +67,7 @@ def test_any_data_is_read_or_refused(kind: type, data: st.DataObject) -> None:
         assert read(kind, write(value), "there") == value
 
 
-@given(facts=fields_of(Settings), choices=fields_of(Choices))
+@given(facts=fields_of(Settings), choices=fields_of(Choices, "preset", "patch", "keys_play"))
 def test_any_settings_file_lets_the_app_start(
     tmp_path_factory: pytest.TempPathFactory, facts: dict[str, Any], choices: dict[str, Any]
 ) -> None:

@@ -11,7 +11,8 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationErro
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
 from app.presets.library import PresetEntry
-from app.session.choices import Choices
+from app.session.choices import Choices, PluckedString
+from app.session.listener import Listener
 from app.shared.version import program_version
 from engine.presets import preset_digest
 from engine.read_file import read_bounded
@@ -19,7 +20,7 @@ from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json
 
 LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
-PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "listen", "pickup", "solo", "seconds", "string"}
+PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo"}
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
     f"Below {LEVEL:g}, luck is an unlikely explanation; a larger value does not show that A and B sound the same, "

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QMenu, QToolButton
 
 from app.analysis.comparison import Basis, ComparedRow, compare, same_string
 from app.presets.library import Library, PresetEntry
-from app.session.choices import Session
+from app.session.choices import PluckedString, Session
 from app.session.slots import other_preset
 from app.views.controls.parts import tool_button, words_label
 from app.views.controls.progress_strip import ProgressStrip
@@ -105,7 +105,7 @@ class ComparePanel(Panel):
         lay_out_table(self, (presets,), self._words, (self._stop,), self.progress, self.table)
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        if names & {"position", "amplitude_mm", "shape", "width", "seconds", "listen", "preset", "string"}:
+        if names & {"preset", "seconds", "listen", *PluckedString.model_fields}:
             self._unchanged_s = 0.0
             if self._tried != self._wanted():
                 self._abandon()

@@ -14,11 +14,10 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
-from app.playing.chosen import subject_of
 from app.presets.library import Library
 from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
-from app.session.slots import info_of
+from app.session.slots import info_of, subject_of
 from app.shared.worker import Job
 from app.views import theme
 from app.views.controls.parts import ENTER_KEYS, lay_out_view, words_label

@@ -10,7 +10,9 @@ from app.presets.library import Library
 from app.presets.words import shape_word
 from app.rendering import Take
 from app.rendering.take import Listened
-from app.session.choices import Choices, Session
+from app.session.choices import Choices, PluckedString, Session
+from app.session.listener import Listener
+from app.session.monitor import Monitor
 from app.session.shown import LEGEND_FIELDS, shown_sources
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
@@ -27,9 +29,8 @@ from engine.presets import PresetInfo, outside_training
 MM = 1000.0
 WIDTH_STEP = 1.05  # of a wheel notch
 SHAPE_POINTS = 801  # of the pulled shape: the narrowest is round
-PLUCK_FIELDS = {"position", "amplitude_mm", "shape", "width", "preset", "string"}
-HEARING_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "volume_db"}
-WARNING_FIELDS = PLUCK_FIELDS | HEARING_FIELDS | {"difference_gain_db"}
+PLUCK_FIELDS = {"preset", *PluckedString.model_fields}
+WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.model_fields}
 
 
 class StringPanel(Panel):

@@ -10,12 +10,15 @@ from typing import Any
 
 import pytest
 
+from app.instrument.events import PluckAt
+from app.playing.note import Note
 from app.playing.notes import Notes
 from app.playing.sources import Sources
-from app.playing.stroke import Stroke
+from app.rendering import RenderRequest
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from engine.voices import Ear, Mixer
+from tests.app.monitors import hears
 
 DEADLINE_S = 30.0
 EAR = Ear((0.37,))
@@ -77,25 +80,42 @@ def reports() -> list[tuple[str, str]]:
 
 @pytest.fixture
 def notes(sound: StandingSound, sources: Sources, reports: list[tuple[str, str]]) -> Iterator[Notes]:
-    made = Notes(sound, sources, lambda message, detail: reports.append((message, detail)))  # type: ignore[arg-type]
+    report = lambda message, detail: reports.append((message, detail))  # noqa: E731
+    made = Notes(sound, sources, lambda name: None, report)  # type: ignore[arg-type]
+    made.set_monitor(hears("model"))
     yield made
     made.close()
 
 
 @pytest.fixture
-def stroke_of() -> Callable[..., Stroke]:
-    """stroke_of(path, position=…, sources=…, others=…, seconds=…, ear=…)"""
+def pluck_of() -> Callable[..., RenderRequest]:
+    """pluck_of(path, position=…, others=…, seconds=…, ear=…, amplitude_mm=…)"""
 
     def made(
         path: Path,
         position: float = 0.35,
-        sources: tuple[str, ...] = ("model", "truth"),
-        others: dict[str, Path] | None = None,
+        others: tuple[Path, ...] = (),
         seconds: float = 1.0,
         ear: Ear = EAR,
         amplitude_mm: float = 3.0,
-    ) -> Stroke:
-        return Stroke(path, Pluck(position, amplitude_mm), ear, seconds, sources, others or {})
+    ) -> RenderRequest:
+        return RenderRequest(path, Pluck(position, amplitude_mm), seconds, ear, 1.0, others)
+
+    return made
+
+
+@pytest.fixture
+def strike(notes: Notes) -> Callable[..., Note]:
+    """Chooses a pluck and plays it: as an event, or from some time or frame on."""
+
+    def made(request: RenderRequest, from_s: float = 0.0, alone: bool = False, begin_frame: int = 0) -> Note:
+        notes.choose(request)
+        if from_s or alone or begin_frame:
+            note = notes.ring(from_s, begin_frame, alone)
+        else:
+            note = notes.handle(PluckAt(request.pluck))
+        assert note is not None
+        return note
 
     return made
 

@@ -8,14 +8,15 @@ import pytest
 
 from app.playing.keyboard import (
     HIGHEST_OCTAVE,
+    HIGHEST_PLACE,
     LOWEST_C,
     LOWEST_OCTAVE,
+    LOWEST_PLACE,
     KeyPress,
     Reach,
     letters_of,
     octaves_of,
     place_of,
-    play,
     semitone_of,
     turn,
 )
@@ -26,10 +27,17 @@ REACH = Reach((0.3, 0.7), (1.0, 10.0))
 
 
 def test_the_row_goes_from_end_to_end_of_what_is_trained() -> None:
-    played = [play(KeyPress(letter), REACH, 4.0) for letter in "ASDFGHJKL;"]
-    places = [p.changes["position"] for p in played if p is not None and p.plucks]
-    assert places == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
-    assert all(p is not None and set(p.changes) == {"position"} for p in played)
+    assert [place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
+    assert REACH.row == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
+
+
+def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude() -> None:
+    wide = Pluck(0.5, 4.0, "raised_cosine", 0.2)
+    low, high, beyond = (REACH.pluck(*key, wide) for key in ((LOWEST_PLACE, 1), (HIGHEST_PLACE, 127), (127, 127)))
+    assert (low.position, low.amplitude_mm) == pytest.approx((0.3, 1))
+    assert (high.position, high.amplitude_mm) == pytest.approx((0.7, 10))
+    assert (low.shape, low.width) == ("raised_cosine", 0.2)
+    assert beyond == high
 
 
 @pytest.mark.parametrize(
@@ -48,25 +56,20 @@ def test_keys_are_known_by_their_place(platform: str, press: KeyPress, place: in
     assert place_of(press, platform) == place
 
 
-def test_digits_and_c_and_v_set_the_amplitude_and_do_not_pluck() -> None:
-    levels = []
-    for digit in "123456789":
-        played = play(KeyPress(digit), REACH, 4.0)
-        assert played is not None
-        assert not played.plucks
-        levels.append(played.changes["amplitude_mm"])
+def test_digits_and_c_and_v_set_the_amplitude() -> None:
+    levels = [REACH.turned(KeyPress(digit), 4.0) or 0.0 for digit in "123456789"]
     assert levels == sorted(levels)
     assert (levels[0], levels[-1]) == pytest.approx((1.0, 10.0))
-    harder, softer = play(KeyPress("V"), REACH, 4.0), play(KeyPress("c"), REACH, 4.0)
+    harder, softer = REACH.turned(KeyPress("V"), 4.0), REACH.turned(KeyPress("c"), 4.0)
     assert harder is not None and softer is not None
-    assert softer.changes["amplitude_mm"] < 4 < harder.changes["amplitude_mm"]
-    loudest = play(KeyPress("V"), REACH, 10.0)
-    assert loudest is not None and loudest.changes["amplitude_mm"] == 10
+    assert softer < 4 < harder
+    assert REACH.turned(KeyPress("V"), 10.0) == 10
 
 
 @pytest.mark.parametrize("letter", ["X", "0", " ", "", "É"])
 def test_other_keys_are_left_alone(letter: str) -> None:
-    assert play(KeyPress(letter), REACH, 4.0) is None
+    assert REACH.turned(KeyPress(letter), 4.0) is None
+    assert place_of(KeyPress(letter), "darwin") is None
 
 
 def test_velocity_and_amplitude_go_back_and_forth_in_equal_steps_of_level() -> None:

@@ -20,13 +20,12 @@ from app.instrument.events import Event
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Damping, Patch
-from app.playing.live import Live
 from app.playing.midi_backend import Backend, MidiUnavailable, RtMidi, load_backend
 from app.playing.midi_port import MidiInput
 from app.playing.notes import Notes
 from app.playing.sources import Sources
-from engine.presets import SHIPPED
 from engine.voices import Ear
+from tests.app.monitors import find_shipped, hears
 
 RATE_HZ = 48_000
 KEY, HZ = 57, 220.0
@@ -111,9 +110,9 @@ def patch() -> Patch:
 class Instrument:
     """A patch behind a MIDI input, whose sound the test takes as it likes."""
 
-    def __init__(self, live: Live, sound: Any, sender: Sender, wait: Wait, handled: list[Event]) -> None:
+    def __init__(self, notes: Notes, sound: Any, sender: Sender, wait: Wait, handled: list[Event]) -> None:
         self._sound, self._sender, self._wait, self._handled = sound, sender, wait, handled
-        self.live = live
+        self.notes = notes
 
     def send(self, *data: int) -> None:
         """And waits until it has come."""
@@ -132,18 +131,18 @@ def instrument(ends: tuple[Backend, Sender], sound: Any, patch: Patch, wait: Wai
     backend, sender = ends
     reports: list[str] = []
     handled: list[Event] = []
-    notes = Notes(sound, Sources(), lambda message, detail: reports.append(message))
-    live = Live(notes, notes._sources, lambda name: SHIPPED / f"{name}.safetensors", lambda m, d: reports.append(m))
+    notes = Notes(sound, Sources(), find_shipped, lambda message, detail: reports.append(message))
+    notes.set_monitor(hears("model"))
 
     def handle(event: Event) -> None:
-        live.handle(event)
+        notes.handle(event)
         handled.append(event)
 
     port = MidiInput(handle, lambda: backend)
-    live.set_patch(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind))
-    wait(lambda: live.ready)
+    notes.set_instrument(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind))
+    wait(lambda: notes.keys.player is not None)
     port.open(next(name for name in port.names() if NAME in name))
-    yield Instrument(live, sound, sender, wait, handled)
+    yield Instrument(notes, sound, sender, wait, handled)
     port.close()
     notes.close()
     assert reports == []
@@ -215,7 +214,7 @@ def test_a_chord_sounds_together_and_all_sound_off_ends_it(instrument: Instrumen
     for key in (45, 52, 57):
         wanted_hz = 440 * 2 ** ((key - 69) / 12)
         assert abs(cents(pitch_hz(heard, wanted_hz), wanted_hz)) < 12  # the partials of three strings lie close
-    assert instrument.live.sounding().keys() == {45, 52, 57}
+    assert instrument.notes.keys.sounding().keys() == {45, 52, 57}
     instrument.send(0xB0, 120, 0)
     instrument.hear(0.1)
     assert level_db(instrument.hear(0.1)) < -90

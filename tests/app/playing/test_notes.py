@@ -16,22 +16,32 @@ import torch
 from app.audio.devices import AudioDevice
 from app.audio.output import ClockOutput
 from app.audio.sound import Sound
+from app.instrument.events import NoteOff, NoteOn, PluckAt
+from app.patches.instrument import SingleString
 from app.playing import notes as module
 from app.playing.ahead import LEAST_S
-from app.playing.notes import Note, Notes
+from app.playing.due import Due
+from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, Reach
+from app.playing.note import Note
+from app.playing.notes import Notes
 from app.playing.sources import Sources
-from app.playing.stroke import Mix, Stroke
+from app.presets.library import PresetEntry
+from app.rendering import RenderRequest
 from engine.kernels import layout as at
 from engine.kernels.layout import AHEAD
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
-from engine.presets import load_preset, save_preset
+from engine.pluck import Pluck
+from engine.presets import load_preset, read_info, save_preset
 from engine.voices import Ear, Mixer, Voice
+from tests.app.monitors import hears
 
 RATE_HZ = 48_000
 QUANTUM_S = at.QUANTUM / RATE_HZ
 Wait = Callable[[Callable[[], bool]], None]
-StrokeOf = Callable[..., Stroke]
+EAR = Ear((0.37,))
+PluckOf = Callable[..., RenderRequest]
+Strike = Callable[..., Note]
 Reports = list[tuple[str, str]]
 
 
@@ -45,19 +55,18 @@ def seconds_of(mixer: Mixer, seconds: float) -> np.ndarray:
     return mixer.render(round(seconds * mixer.rate_hz))[:, 0]
 
 
-def alone(sources: Sources, stroke: Stroke, seconds: float) -> np.ndarray:
-    """What a stroke of one source sounds like in a mixer of its own, (frames,)."""
-    mixer, (source,) = Mixer(RATE_HZ), stroke.sources
-    kind = "truth" if source == "truth" else "model"
-    initial_m, begin = sources.begin(stroke.preset, kind, RATE_HZ, stroke.pluck)
-    mixer.add(Voice(sources.program(stroke.preset, kind, RATE_HZ), initial_m, stroke.ear, begin=begin))
+def alone(sources: Sources, pluck: RenderRequest, seconds: float, source: str = "model") -> np.ndarray:
+    """What one source of a pluck sounds like in a mixer of its own, (frames,)."""
+    mixer = Mixer(RATE_HZ)
+    initial_m, begin = sources.begin(pluck.preset, source, RATE_HZ, pluck.pluck)
+    mixer.add(Voice(sources.program(pluck.preset, source, RATE_HZ), initial_m, pluck.ear, begin=begin))
     return seconds_of(mixer, seconds)
 
 
 def test_a_strike_sounds_with_the_next_frame(
-    notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike, wait: Wait
 ) -> None:
-    note = notes.strike(stroke_of(bank))
+    note = strike(pluck_of(bank))
     assert not note.pending, "nobody was waited for"
     assert notes.ringing == 1
     began_s = sound.mixer.seconds
@@ -69,9 +78,9 @@ def test_a_strike_sounds_with_the_next_frame(
 
 
 def test_all_voices_of_a_note_begin_with_one_frame_and_one_is_heard(
-    notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    note = notes.strike(stroke_of(bank))
+    note = strike(pluck_of(bank))
     seconds_of(sound.mixer, 0.01)
     assert {voice.began_frame for voice in note.voices.values()} == {note.began_frame}
     assert {voice.seconds for voice in note.voices.values()} == {note.seconds}
@@ -79,46 +88,44 @@ def test_all_voices_of_a_note_begin_with_one_frame_and_one_is_heard(
 
 
 def test_a_switch_sounds_as_if_the_other_had_been_heard_all_along(
-    notes: Notes, sound: Any, sources: Sources, bank: Path, stroke_of: StrokeOf
+    notes: Notes, sound: Any, sources: Sources, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    model, truth = (
-        alone(sources, stroke_of(bank, 0.35, (name,), amplitude_mm=8.0), 0.4) for name in ("model", "truth")
-    )
-    note = notes.strike(stroke_of(bank, amplitude_mm=8.0))
+    model, truth = (alone(sources, pluck_of(bank, 0.35, amplitude_mm=8.0), 0.4, name) for name in ("model", "truth"))
+    note = strike(pluck_of(bank, amplitude_mm=8.0))
     before, fade, after = (
         slice(round(a * RATE_HZ), round(b * RATE_HZ)) for a, b in ((0, 0.2), (0.2, 0.25), (0.25, 0.4))
     )
     np.testing.assert_allclose(seconds_of(sound.mixer, 0.2), model[before], atol=1e-6)
-    notes.set_mix(Mix("truth"))
+    notes.set_monitor(hears("truth"))
     between = seconds_of(sound.mixer, 0.05)
     lowest, highest = np.minimum(model[fade], truth[fade]), np.maximum(model[fade], truth[fade])
     assert (between > lowest - 1e-6).all()
     assert (between < highest + 1e-6).all()
     np.testing.assert_allclose(seconds_of(sound.mixer, 0.15), truth[after], atol=1e-6)
     assert np.abs(model[after] - truth[after]).max() > 5e-6
-    notes.set_mix(Mix("difference", difference_gain_db=20.0))
+    notes.set_monitor(hears("difference", difference_gain_db=20.0))
     assert gains(note) == pytest.approx({"model": 10.0, "truth": -10.0})
-    notes.set_mix(Mix())
+    notes.set_monitor(hears("model"))
     assert gains(note) == {"model": 1.0, "truth": 0.0}
 
 
 def test_plucks_ring_beside_each_other(
-    notes: Notes, sound: Any, sources: Sources, bank: Path, stroke_of: StrokeOf
+    notes: Notes, sound: Any, sources: Sources, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    strokes = [stroke_of(bank, position=position, sources=("model",)) for position in (0.3, 0.5)]
-    for stroke in strokes:
-        notes.strike(stroke)
+    plucks = [pluck_of(bank, position=position) for position in (0.3, 0.5)]
+    for pluck in plucks:
+        strike(pluck)
     out = seconds_of(sound.mixer, 0.1)
-    np.testing.assert_allclose(out, sum(alone(sources, stroke, 0.1) for stroke in strokes), atol=1e-6)
+    np.testing.assert_allclose(out, sum(alone(sources, pluck, 0.1) for pluck in plucks), atol=1e-6)
 
 
 def test_the_oldest_notes_end_where_there_are_too_many(
-    notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf, monkeypatch: pytest.MonkeyPatch
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "MOST_NOTES", 3)
     struck = []
     for number in range(5):
-        struck.append(notes.strike(stroke_of(bank, position=0.3 + 0.05 * number)))
+        struck.append(strike(pluck_of(bank, position=0.3 + 0.05 * number)))
         seconds_of(sound.mixer, 0.01)
     assert [note.released for note in struck] == [True, True, False, False, False]
     assert notes.ringing == 3
@@ -129,9 +136,9 @@ def test_the_oldest_notes_end_where_there_are_too_many(
 
 
 def test_where_the_device_has_no_time_left_notes_end(
-    notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    struck = [notes.strike(stroke_of(bank)) for _ in range(6)]
+    struck = [strike(pluck_of(bank)) for _ in range(6)]
     sound.take_care()
     assert notes.ringing == 6
     sound.load = 0.9
@@ -143,16 +150,16 @@ def test_where_the_device_has_no_time_left_notes_end(
 
 
 def test_the_more_is_asked_of_the_device_the_more_notes_end_at_once(
-    notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    struck = [notes.strike(stroke_of(bank)) for _ in range(16)]
+    struck = [strike(pluck_of(bank)) for _ in range(16)]
     sound.load = 1.5
     sound.take_care()
     assert [note.released for note in struck] == [True] * 8 + [False] * 8
 
 
 def test_notes_end_under_load_while_the_window_hangs(
-    sources: Sources, bank: Path, stroke_of: StrokeOf, wait: Wait
+    sources: Sources, bank: Path, pluck_of: PluckOf, wait: Wait
 ) -> None:
     """Nothing but the sound's own thread is at work: nobody polls."""
 
@@ -166,9 +173,10 @@ def test_notes_end_under_load_while_the_window_hangs(
     with Sound(look_up=lambda *_: Laden.device, open_output=lambda _device, _buffer_s, mixer: Laden(mixer)) as sound:
         sound.open()
         wait(lambda: sound.status().changes_done > 0)
-        notes = Notes(sound, sources, lambda message, detail: None)
+        notes = Notes(sound, sources, lambda name: None, lambda message, detail: None)
         try:
-            struck = [notes.strike(stroke_of(bank)) for _ in range(6)]
+            notes.choose(pluck_of(bank))
+            struck = [note for _ in range(6) if (note := notes.ring()) is not None]
             wait(lambda: sound.status().load == laden)
             assert notes.ringing == 6
             laden = 0.9
@@ -180,8 +188,10 @@ def test_notes_end_under_load_while_the_window_hangs(
             notes.close()
 
 
-def test_stop_ends_all_without_a_click(notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf) -> None:
-    struck = [notes.strike(stroke_of(bank, amplitude_mm=5.0)) for _ in range(2)]
+def test_stop_ends_all_without_a_click(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
+) -> None:
+    struck = [strike(pluck_of(bank, amplitude_mm=5.0)) for _ in range(2)]
     loud = seconds_of(sound.mixer, 0.1)
     notes.stop()
     assert notes.ringing == 0
@@ -194,9 +204,11 @@ def test_stop_ends_all_without_a_click(notes: Notes, sound: Any, bank: Path, str
     assert sound.mixer.voices == []
 
 
-def test_a_note_rings_until_it_is_silent(notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf) -> None:
+def test_a_note_rings_until_it_is_silent(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
+) -> None:
     """Not until some number of seconds."""
-    note = notes.strike(stroke_of(bank, seconds=0.1))
+    note = strike(pluck_of(bank, seconds=0.1))
     assert np.abs(seconds_of(sound.mixer, 1.0)[-1_000:]).max() > 1e-3
     for _ in range(60):
         if note.over:
@@ -207,46 +219,54 @@ def test_a_note_rings_until_it_is_silent(notes: Notes, sound: Any, bank: Path, s
 
 
 def test_a_preset_that_is_not_there_yet_is_loaded_and_sounds(
-    notes: Notes, sound: Any, bank: Path, tmp_path: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes, sound: Any, bank: Path, tmp_path: Path, pluck_of: PluckOf, strike: Strike, wait: Wait
 ) -> None:
     path = Path(shutil.copy(bank, tmp_path))
-    note = notes.strike(stroke_of(path))
+    note = strike(pluck_of(path))
     assert notes.ringing == 1
     assert note.seconds == 0
     wait(lambda: not note.pending)
     assert np.abs(seconds_of(sound.mixer, 0.05)).max() > 0.01
-    again = notes.strike(stroke_of(path, position=0.6))
+    again = strike(pluck_of(path, position=0.6))
     assert not again.pending
 
 
 def test_what_is_prepared_is_not_waited_for(
-    notes: Notes, sources: Sources, bank: Path, tmp_path: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes, sources: Sources, bank: Path, tmp_path: Path, pluck_of: PluckOf, strike: Strike, wait: Wait
 ) -> None:
     path = Path(shutil.copy(bank, tmp_path))
-    assert not notes.have(stroke_of(path))
+    notes.choose(pluck_of(path))
+    assert not notes.at_hand
     notes.prepare(path, bank)
-    wait(lambda: notes.have(stroke_of(path)))
-    assert not notes.strike(stroke_of(path)).pending
+    wait(lambda: notes.at_hand)
+    assert not strike(pluck_of(path)).pending
 
 
 def test_what_waits_hears_of_switches_and_of_stop(
-    notes: Notes, sound: Any, sources: Sources, bank: Path, tmp_path: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes,
+    sound: Any,
+    sources: Sources,
+    bank: Path,
+    tmp_path: Path,
+    pluck_of: PluckOf,
+    strike: Strike,
+    wait: Wait,
 ) -> None:
     holding = threading.Event()
     try:
-        notes._submit(lambda: holding.wait(20) and None)
-        kept, stopped = (notes.strike(stroke_of(Path(shutil.copy(bank, tmp_path / name)))) for name in "ab")
+        notes.in_background(lambda: holding.wait(20) and None)
+        kept, stopped = (strike(pluck_of(Path(shutil.copy(bank, tmp_path / name)))) for name in "ab")
         stopped.release(0.01)
-        notes.set_mix(Mix("truth"))
+        notes.set_monitor(hears("truth"))
     finally:
         holding.set()
     wait(lambda: not kept.pending)
     assert gains(kept) == {"model": 0.0, "truth": 1.0}
     notes.stop()
-    waiting = notes.strike(stroke_of(bank), from_s=0.1)
+    waiting = strike(pluck_of(bank), from_s=0.1)
     notes.stop()
     done = threading.Event()
-    notes._submit(done.set)
+    notes.in_background(done.set)
     assert done.wait(20)
     assert stopped.over
     assert waiting.released
@@ -255,10 +275,10 @@ def test_what_waits_hears_of_switches_and_of_stop(
 
 
 def test_a_preset_that_cannot_be_played_is_told(
-    notes: Notes, sound: Any, tmp_path: Path, stroke_of: StrokeOf, reports: Reports, wait: Wait
+    notes: Notes, sound: Any, tmp_path: Path, pluck_of: PluckOf, strike: Strike, reports: Reports, wait: Wait
 ) -> None:
     (tmp_path / "broken.safetensors").write_bytes(b"damaged")
-    note = notes.strike(stroke_of(tmp_path / "broken.safetensors"))
+    note = strike(pluck_of(tmp_path / "broken.safetensors"))
     wait(lambda: reports != [])
     wait(lambda: note.over)
     ((message, detail),) = reports
@@ -269,12 +289,20 @@ def test_a_preset_that_cannot_be_played_is_told(
 
 
 def test_what_cannot_be_played_beside_a_preset_does_not_hinder_it(
-    notes: Notes, sound: Any, bank: Path, tmp_path: Path, stroke_of: StrokeOf, reports: Reports, wait: Wait
+    notes: Notes,
+    sound: Any,
+    bank: Path,
+    tmp_path: Path,
+    pluck_of: PluckOf,
+    strike: Strike,
+    reports: Reports,
+    wait: Wait,
 ) -> None:
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(b"damaged")
     for _ in range(2):
-        note = notes.strike(stroke_of(bank, sources=("model", "preset:broken"), others={"preset:broken": broken}))
+        notes.set_monitor(hears("model", "preset:broken"))
+        note = strike(pluck_of(bank, others=(broken,)))
         wait(lambda note=note: not note.pending)  # type: ignore[misc]
         assert set(note.voices) == {"model"}
     assert np.abs(seconds_of(sound.mixer, 0.05)).max() > 0.01
@@ -282,21 +310,36 @@ def test_what_cannot_be_played_beside_a_preset_does_not_hinder_it(
 
 
 def test_another_preset_sounds_at_its_own_rate_in_step(
-    notes: Notes, sound: Any, sources: Sources, bank: Path, tmp_path: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes,
+    sound: Any,
+    sources: Sources,
+    bank: Path,
+    tmp_path: Path,
+    pluck_of: PluckOf,
+    strike: Strike,
+    wait: Wait,
 ) -> None:
     other = Path(shutil.copy(bank, tmp_path / "other.safetensors"))
     notes.prepare(other)
-    stroke = stroke_of(bank, sources=("model", "preset:other"), others={"preset:other": other})
-    wait(lambda: notes.have(stroke))
-    notes.set_mix(Mix("preset:other"))
-    note = notes.strike(stroke)
+    pluck = pluck_of(bank, others=(other,))
+    notes.set_monitor(hears("preset:other", "model"))
+    notes.choose(pluck)
+    wait(lambda: notes.at_hand)
+    note = strike(pluck)
     assert gains(note) == {"model": 0.0, "preset:other": 1.0}
-    expected = alone(sources, stroke_of(bank, sources=("model",)), 0.1)
+    expected = alone(sources, pluck_of(bank), 0.1)
     np.testing.assert_allclose(seconds_of(sound.mixer, 0.1), expected, atol=1e-6)
 
 
 def test_levels_are_matched_once_they_are_known(
-    notes: Notes, sound: Any, sources: Sources, bank: Path, tmp_path: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes,
+    sound: Any,
+    sources: Sources,
+    bank: Path,
+    tmp_path: Path,
+    pluck_of: PluckOf,
+    strike: Strike,
+    wait: Wait,
 ) -> None:
     """To the truth's, without the limiter, which a loud pluck would not pass."""
     preset = load_preset(bank)
@@ -305,29 +348,30 @@ def test_levels_are_matched_once_they_are_known(
         preset.model.decoder.weight.mul_(12.0)  # type: ignore[union-attr, operator]
     save_preset(loud, preset.info, preset.model)
     notes.prepare(loud)
-    stroke = stroke_of(loud, amplitude_mm=8.0)
-    wait(lambda: notes.have(stroke))
-    note = notes.strike(stroke)
+    pluck = pluck_of(loud, amplitude_mm=8.0)
+    notes.choose(pluck)
+    wait(lambda: notes.at_hand)
+    note = strike(pluck)
     assert note.match is None
-    notes.set_mix(Mix("model", matched=True))  # while it rings
+    notes.set_monitor(hears("model", level_match=True))  # while it rings
     wait(lambda: note.match is not None and gains(note) == {"model": note.match["model"], "truth": 0.0})
     assert note.match is not None
     assert note.match["truth"] == 1.0
     assert note.match["model"] == pytest.approx(1 / 12, rel=0.02)
-    again = notes.strike(stroke)
+    again = strike(pluck)
     assert again.match == note.match, "it is known from the start"
     assert gains(again) == gains(note)
-    notes.set_mix(Mix("model"))
+    notes.set_monitor(hears("model"))
     assert gains(again)["model"] == 1.0
 
 
 @pytest.mark.parametrize("seconds", [0.5, 1.5])
 def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(
-    notes: Notes, small_preset: Path, stroke_of: StrokeOf, wait: Wait, seconds: float
+    notes: Notes, small_preset: Path, pluck_of: PluckOf, strike: Strike, wait: Wait, seconds: float
 ) -> None:
     """All of it, where that is short."""
-    notes.set_mix(Mix("model", matched=True))
-    note = notes.strike(stroke_of(small_preset, position=0.43, seconds=seconds))
+    notes.set_monitor(hears("model", level_match=True))
+    note = strike(pluck_of(small_preset, position=0.43, seconds=seconds))
     wait(lambda: not note.pending)
 
     def matched() -> bool:
@@ -341,20 +385,22 @@ def test_levels_of_a_model_that_is_rendered_are_matched_when_enough_is_there(
 
 
 def test_a_listening_point_moves_while_it_rings(
-    notes: Notes, sound: Any, sources: Sources, bank: Path, stroke_of: StrokeOf
+    notes: Notes, sound: Any, sources: Sources, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    notes.strike(stroke_of(bank, sources=("model",)))
+    strike(pluck_of(bank))
     seconds_of(sound.mixer, 0.1)
     notes.listen(Ear((0.15,)))
     notes.poll()
     seconds_of(sound.mixer, 0.1)
     out = seconds_of(sound.mixer, 0.1)
-    expected = alone(sources, stroke_of(bank, sources=("model",), ear=Ear((0.15,))), 0.3)
+    expected = alone(sources, pluck_of(bank, ear=Ear((0.15,))), 0.3)
     np.testing.assert_allclose(out, expected[-len(out) :], atol=1e-5)
 
 
-def test_latencies_are_noted_once_a_note(notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf) -> None:
-    notes.strike(stroke_of(bank))
+def test_latencies_are_noted_once_a_note(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
+) -> None:
+    strike(pluck_of(bank))
     notes.poll()
     assert notes.latencies_s == ()
     seconds_of(sound.mixer, 0.01)
@@ -362,18 +408,18 @@ def test_latencies_are_noted_once_a_note(notes: Notes, sound: Any, bank: Path, s
     notes.poll()
     limiter_s = pytest.approx(AHEAD / RATE_HZ)
     assert notes.latencies_s == (limiter_s,), "by this clock it began when it was struck"
-    later = notes.strike(stroke_of(bank), begin_frame=round(0.05 * RATE_HZ))
+    later = strike(pluck_of(bank), begin_frame=round(0.05 * RATE_HZ))
     seconds_of(sound.mixer, 0.1)
     notes.poll()
     assert later.seconds > 0
     assert len(notes.latencies_s) == 1, "a turn of a loop is no gesture"
 
 
-def test_a_note_waits_for_its_frame(notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf) -> None:
-    first = notes.strike(stroke_of(bank))
+def test_a_note_waits_for_its_frame(notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike) -> None:
+    first = strike(pluck_of(bank))
     seconds_of(sound.mixer, 0.1)
     frame = first.frame_at(0.2)
-    second = notes.strike(stroke_of(bank), begin_frame=frame)
+    second = strike(pluck_of(bank), begin_frame=frame)
     assert not second.began
     first.release_at(frame)
     seconds_of(sound.mixer, 0.2)
@@ -388,7 +434,8 @@ def test_a_seek_begins_in_the_middle_alone(
     notes: Notes,
     sound: Any,
     sources: Sources,
-    stroke_of: StrokeOf,
+    pluck_of: PluckOf,
+    strike: Strike,
     wait: Wait,
     which: str,
     request: pytest.FixtureRequest,
@@ -397,14 +444,14 @@ def test_a_seek_begins_in_the_middle_alone(
     path = request.getfixturevalue(which)
     whole = {}
     for name in ("model", "truth"):
-        notes.set_mix(Mix(name))
-        struck = notes.strike(stroke_of(path))
+        notes.set_monitor(hears(name))
+        struck = strike(pluck_of(path))
         wait(lambda struck=struck: struck.began or (not struck.pending and all(a.finished for a in struck.ahead)))  # type: ignore[misc]
         whole[name] = sound.mixer.render(500 * at.QUANTUM)[:, 0]
         notes.stop()
         sound.mixer.render(50 * at.QUANTUM)
-    before = notes.strike(stroke_of(path))
-    note = notes.strike(stroke_of(path), from_s=0.4, alone=True)
+    before = strike(pluck_of(path))
+    note = strike(pluck_of(path), from_s=0.4, alone=True)
     assert before.released
     assert note.seconds == 0.4, "the playhead is there at once"
     wait(lambda: not note.pending)
@@ -412,7 +459,7 @@ def test_a_seek_begins_in_the_middle_alone(
     assert note.seconds == pytest.approx(0.4 + 40 * QUANTUM_S, abs=QUANTUM_S)
     assert len({voice.seconds for voice in note.voices.values()}) == 1
     for name in ("model", "truth"):
-        notes.set_mix(Mix(name))
+        notes.set_monitor(hears(name))
         sound.mixer.render(30 * at.QUANTUM)
         place = round(note.seconds * RATE_HZ)
         out = sound.mixer.render(10 * at.QUANTUM)[:, 0]
@@ -438,10 +485,10 @@ def slow_model(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_a_model_that_is_rendered_begins_when_enough_is_there(
-    notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait, slow_model: None
+    notes: Notes, sound: Any, small_preset: Path, pluck_of: PluckOf, strike: Strike, wait: Wait, slow_model: None
 ) -> None:
     """With the truth beside it, at one frame; until then the note says how long it waits."""
-    note = notes.strike(stroke_of(small_preset, seconds=1.2))  # blocks of a quarter: two are left when it begins
+    note = strike(pluck_of(small_preset, seconds=1.2))  # blocks of a quarter: two are left when it begins
     assert note.pending
     wait(lambda: note.waits_s > 0)
     assert not seconds_of(sound.mixer, 0.05).any()
@@ -456,9 +503,9 @@ def test_a_model_that_is_rendered_begins_when_enough_is_there(
 
 
 def test_a_model_that_is_rendered_fades_out_where_its_samples_end(
-    notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait
+    notes: Notes, sound: Any, small_preset: Path, pluck_of: PluckOf, strike: Strike, wait: Wait
 ) -> None:
-    note = notes.strike(stroke_of(small_preset, seconds=0.5, sources=("model",)))
+    note = strike(pluck_of(small_preset, seconds=0.5))
     wait(lambda: not note.pending and all(each.finished for each in note.ahead))
     heard = seconds_of(sound.mixer, 0.7)
     end = int(np.nonzero(np.abs(heard) > 1e-6)[0][-1])
@@ -469,9 +516,9 @@ def test_a_model_that_is_rendered_fades_out_where_its_samples_end(
 
 
 def test_a_model_that_is_rendered_can_be_stopped_before_it_sounds(
-    notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait, slow_model: None
+    notes: Notes, sound: Any, small_preset: Path, pluck_of: PluckOf, strike: Strike, wait: Wait, slow_model: None
 ) -> None:
-    note = notes.strike(stroke_of(small_preset, seconds=5.0))
+    note = strike(pluck_of(small_preset, seconds=5.0))
     wait(lambda: note.waits_s > 0)
     notes.stop()
     assert note.over
@@ -481,10 +528,10 @@ def test_a_model_that_is_rendered_can_be_stopped_before_it_sounds(
 
 
 def test_a_switch_while_a_model_is_rendered_counts(
-    notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait, slow_model: None
+    notes: Notes, sound: Any, small_preset: Path, pluck_of: PluckOf, strike: Strike, wait: Wait, slow_model: None
 ) -> None:
-    note = notes.strike(stroke_of(small_preset, seconds=0.4))
-    notes.set_mix(Mix("truth"))
+    note = strike(pluck_of(small_preset, seconds=0.4))
+    notes.set_monitor(hears("truth"))
     wait(lambda: not note.pending)
     assert gains(note) == {"model": 0.0, "truth": 1.0}
 
@@ -492,13 +539,14 @@ def test_a_switch_while_a_model_is_rendered_counts(
 def test_a_model_that_fails_is_told(
     notes: Notes,
     small_preset: Path,
-    stroke_of: StrokeOf,
+    pluck_of: PluckOf,
+    strike: Strike,
     reports: Reports,
     wait: Wait,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(KoopmanVar, "encode", lambda *_: 1 / 0)
-    note = notes.strike(stroke_of(small_preset, position=0.41))
+    note = strike(pluck_of(small_preset, position=0.41))
     wait(lambda: note.over and reports != [])
     assert "cannot be rendered" in reports[0][0]
     assert notes.ringing == 0
@@ -506,12 +554,18 @@ def test_a_model_that_fails_is_told(
 
 @pytest.mark.parametrize("which", ["bank", "small_preset"])
 def test_notes_ring_on_where_the_device_changes_its_rate(
-    notes: Notes, sound: Any, stroke_of: StrokeOf, wait: Wait, which: str, request: pytest.FixtureRequest
+    notes: Notes,
+    sound: Any,
+    pluck_of: PluckOf,
+    strike: Strike,
+    wait: Wait,
+    which: str,
+    request: pytest.FixtureRequest,
 ) -> None:
     path = request.getfixturevalue(which)
-    struck = [notes.strike(stroke_of(path, position=0.3 + 0.05 * number)) for number in range(6)]
+    struck = [strike(pluck_of(path, position=0.3 + 0.05 * number)) for number in range(6)]
     wait(lambda: not any(note.pending for note in struck))
-    waiting = notes.strike(stroke_of(path), begin_frame=10 * RATE_HZ)
+    waiting = strike(pluck_of(path), begin_frame=10 * RATE_HZ)
     seconds_of(sound.mixer, 0.2)
     sound.mixer = Mixer(44_100)
     notes.poll()
@@ -521,15 +575,15 @@ def test_notes_ring_on_where_the_device_changes_its_rate(
     assert np.abs(seconds_of(sound.mixer, 0.05)).max() > 0.01
     assert [note.seconds for note in struck[2:]] == pytest.approx([0.25] * 4, abs=4 * QUANTUM_S)
     assert notes.ringing == 4
-    notes.strike(stroke_of(path))
+    strike(pluck_of(path))
     notes.poll()
     assert notes.ringing == 5
 
 
 def test_another_rate_while_a_model_is_rendered(
-    notes: Notes, sound: Any, small_preset: Path, stroke_of: StrokeOf, wait: Wait, slow_model: None
+    notes: Notes, sound: Any, small_preset: Path, pluck_of: PluckOf, strike: Strike, wait: Wait, slow_model: None
 ) -> None:
-    note = notes.strike(stroke_of(small_preset, seconds=0.6))
+    note = strike(pluck_of(small_preset, seconds=0.6))
     wait(lambda: note.waits_s > 0)
     sound.mixer = Mixer(44_100)
     wait(lambda: not note.pending)
@@ -539,24 +593,26 @@ def test_another_rate_while_a_model_is_rendered(
 
 
 def test_a_pluck_for_a_file_is_rendered_without_a_device(
-    notes: Notes, sources: Sources, sound: Any, bank: Path, small_preset: Path, stroke_of: StrokeOf
+    notes: Notes, sources: Sources, sound: Any, bank: Path, small_preset: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
-    found = notes.render(stroke_of(bank, ear=Ear((0.37, 0.6))), RATE_HZ, 0.2).result(30)
+    found = notes.render(pluck_of(bank, seconds=0.2, ear=Ear((0.37, 0.6))), RATE_HZ).result(30)
     assert {name: samples.shape for name, samples in found.items()} == dict.fromkeys(
         ("model", "truth"), (round(0.2 * RATE_HZ), 2)
     )
-    heard = alone(sources, stroke_of(bank, sources=("model",)), 0.2)
+    heard = alone(sources, pluck_of(bank), 0.2)
     np.testing.assert_allclose(found["model"][:-AHEAD, 0], heard[AHEAD:], atol=1e-6)
-    rendered = notes.render(stroke_of(small_preset), RATE_HZ, 0.2).result(30)
+    rendered = notes.render(pluck_of(small_preset, seconds=0.2), RATE_HZ).result(30)
     assert np.abs(rendered["model"]).max() > 0.01
     assert not sound.mixer.voices
 
 
-def test_strikes_come_from_many_threads(notes: Notes, sound: Any, bank: Path, stroke_of: StrokeOf) -> None:
+def test_strikes_come_from_many_threads(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
+) -> None:
     struck: list[Note] = []
     threads = [
         threading.Thread(
-            target=lambda number=number: struck.append(notes.strike(stroke_of(bank, position=0.3 + 0.02 * number)))
+            target=lambda number=number: struck.append(strike(pluck_of(bank, position=0.3 + 0.02 * number)))
         )
         for number in range(12)
     ]
@@ -571,9 +627,57 @@ def test_strikes_come_from_many_threads(notes: Notes, sound: Any, bank: Path, st
 
 
 def test_closed_it_is_silent_and_strikes_nothing_more_that_waits(
-    notes: Notes, bank: Path, tmp_path: Path, stroke_of: StrokeOf
+    notes: Notes, bank: Path, tmp_path: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
     notes.close()
     notes.close()
-    note = notes.strike(stroke_of(Path(shutil.copy(bank, tmp_path))))
+    note = strike(pluck_of(Path(shutil.copy(bank, tmp_path))))
     assert note.pending
+
+
+@pytest.fixture
+def string(notes: Notes, bank: Path, pluck_of: PluckOf, monkeypatch: pytest.MonkeyPatch) -> Reach:
+    """The reach of a single string, which is the instrument."""
+    entry = PresetEntry("bank", bank, read_info(bank), 0)
+    monkeypatch.setattr(notes, "_find", {"bank": entry}.get)
+    notes.choose(pluck_of(bank))
+    notes.set_instrument(SingleString(preset="bank"), EAR)
+    return Reach.of(entry.info)
+
+
+def test_keys_of_a_single_string_are_places_along_it_and_ring(notes: Notes, sound: Any, string: Reach) -> None:
+    """As a pluck by hand at that place; no release damps it."""
+    begun = [notes.handle(NoteOn(key, 64)) for key in (LOWEST_PLACE, HIGHEST_PLACE)]
+    plucks = [note.request.pluck for note in begun if note is not None]
+    assert [pluck.position for pluck in plucks] == list(string.position)
+    assert {pluck.amplitude_mm for pluck in plucks} == {string.amplitude_of(64)}
+    assert notes.handle(NoteOff(LOWEST_PLACE)) is None
+    assert notes.handle(NoteOn(LOWEST_PLACE, 0)) is None
+    assert np.abs(seconds_of(sound.mixer, 0.5)[-1_000:]).max() > 1e-3
+    assert notes.ringing == 2
+
+
+def test_a_key_and_a_hand_at_one_place_sound_alike(notes: Notes, sound: Any, string: Reach) -> None:
+    heard = []
+    for event in (NoteOn(50, 64), PluckAt(string.pluck(50, 64, Pluck(0.35, 3.0)))):
+        assert notes.handle(event) is not None
+        heard.append(seconds_of(sound.mixer, 0.1))
+        notes.stop()
+        seconds_of(sound.mixer, 0.1)
+    assert np.abs(heard[0]).max() > 0.001
+    np.testing.assert_allclose(heard[0], heard[1], atol=1e-6)
+
+
+def test_a_pluck_at_a_place_waits_for_its_frame_and_can_be_cancelled(notes: Notes, sound: Any, string: Reach) -> None:
+    due = Due(sound.mixer, sound.mixer.frames + 6_400, 0.0)
+    kept, cancelled = notes.handle(NoteOn(50, 64), due), notes.handle(NoteOn(55, 64), replace_frame(due, 20_000))
+    assert kept is not None and cancelled is not None
+    seconds_of(sound.mixer, 0.2)
+    assert kept.began_frame == due.frame
+    notes.cancel()
+    seconds_of(sound.mixer, 0.5)
+    assert (kept.over, cancelled.over, cancelled.began_frame) == (False, True, 0)
+
+
+def replace_frame(due: Due, frames: int) -> Due:
+    return Due(due.mixer, due.frame + frames, due.time_s)

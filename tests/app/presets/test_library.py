@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.files import SoundRequest, export_sound
+from app.patches.instrument import SingleString
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
 from app.shared.parameters import PARAMETERS
@@ -130,7 +131,8 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
     dropped = receive(tmp_path / "b.WAV", library)
     assert dropped.notice == ""
     assert dropped.choices == {
-        "preset": "second",
+        "instrument": SingleString(preset="second"),
+        "string": None,
         "position": 0.61,
         "amplitude_mm": 2.5,
         "shape": "raised_cosine",
@@ -143,7 +145,6 @@ def test_a_dropped_wav_restores_its_choices(library: Library, preset_folder: Pat
         "solo": 0,
         "stereo": False,
         "pickup": "displacement",
-        "keys_play": "place",
     }
     shutil.copy(preset_folder / "first.safetensors", preset_folder / "second.safetensors")
     os.utime(preset_folder / "second.safetensors", ns=(1, 1))

@@ -2,9 +2,9 @@
 
 import pytest
 
+from app.patches.instrument import SingleString
 from app.patches.patch import Fretted, Patch, PhysicalString, Pickup
 from app.session.choices import Choices, Session
-from app.session.instrument import choices_of
 
 STRING = {
     "length_m": 0.65,
@@ -61,16 +61,16 @@ def test_gestures_are_clamped_to_what_is_allowed() -> None:
 def test_switching_source_goes_there_and_back() -> None:
     session = Session()
     session.switch_source()
-    assert (session.choices.heard, session.source_heard) == ("b", "truth")
+    assert (session.choices.heard, session.choices.source_heard) == ("b", "truth")
     session.switch_source()
-    assert (session.choices.heard, session.source_heard) == ("a", "model")
+    assert (session.choices.heard, session.choices.source_heard) == ("a", "model")
 
 
 def test_slots_hold_any_two_sources() -> None:
     session = Session(Choices(a="preset:other one", b="difference"))
-    assert session.source_heard == "preset:other one"
+    assert session.choices.source_heard == "preset:other one"
     session.switch_source()
-    assert session.source_heard == "difference"
+    assert session.choices.source_heard == "difference"
     for wrong in ("noise", "preset:", "model "):
         with pytest.raises(ValueError, match="a: "):
             session.update(a=wrong)
@@ -85,17 +85,35 @@ def test_choices_from_before_the_slots_are_understood(source: str) -> None:
 
 def test_keys_play_what_was_chosen_last() -> None:
     patch = Patch(name="p", category="harp", preset="many", strings=Fretted(string=PhysicalString(**STRING)))
-    session = Session(Choices(preset="many", patch=patch, string=patch.strings.string))  # type: ignore[union-attr]
+    string = patch.strings.string  # type: ignore[union-attr]
+    session = Session(Choices(instrument=patch, string=string))
     session.update(preset="one")
-    assert (session.choices.keys_play, session.choices.string) == ("place", None)
+    choices = session.choices
+    assert (choices.instrument, choices.patch, choices.string) == (SingleString(preset="one"), patch, None)
     session.update(preset="many")
-    assert session.choices.keys_play == "pitch"
+    assert (session.choices.instrument, session.choices.kept) == (patch, None), "it is the preset of the patch"
     session.update(preset="one")
-    session.update(**choices_of(patch))
-    assert (session.choices.preset, session.choices.keys_play) == ("many", "pitch")
-    session.update(preset="one")
-    session.play(preset="many", string=patch.strings.string)  # type: ignore[union-attr]
-    assert session.choices.keys_play == "place", "a note chooses nothing"
+    session.play_patch()
+    assert (session.choices.preset, session.choices.plays_patch) == ("many", True)
+    session.play(string=string)
+    session.play_string()
+    choices = session.choices
+    assert (choices.instrument, choices.patch, choices.string) == (SingleString(preset="many"), patch, string)
+    session.update(patch=patch.model_copy(update={"name": "turned"}))
+    assert (session.choices.plays_patch, session.choices.patch and session.choices.patch.name) == (False, "turned")
+
+
+@pytest.mark.parametrize("plays", ["pitch", "place", None])
+@pytest.mark.parametrize("preset", ["many", "one"])
+def test_choices_from_before_the_instrument_are_understood(plays: str | None, preset: str) -> None:
+    patch = played_patch(0.2)
+    old = {"preset": preset, "patch": patch.model_dump(), "string": STRING, "position": 0.4}
+    choices = Choices.model_validate(old if plays is None else {**old, "keys_play": plays})
+    assert (choices.patch, choices.position) == (patch, 0.4)
+    assert choices.instrument == (SingleString(preset=preset) if plays == "place" else patch)
+    assert (choices.string is None) == (preset == "one" and plays != "place"), "it is no string of that preset"
+    assert Choices.model_validate({"preset": preset}).instrument == SingleString(preset=preset)
+    assert Choices.model_validate_json(choices.model_dump_json()) == choices
 
 
 def test_what_a_note_changes_is_told_as_played_before_it_is_told_as_changed() -> None:
@@ -124,7 +142,7 @@ def pickup_of(session: Session) -> tuple[tuple[float, ...], str]:
 
 def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
     session = Session()
-    session.update(**choices_of(played_patch(0.2)))
+    session.update(instrument=played_patch(0.2))
     session.update(pickup="velocity")
     session.move_listening_point(0.3)
     assert pickup_of(session) == ((0.3,), "velocity")
@@ -136,25 +154,25 @@ def test_what_is_heard_is_the_pick_up_of_the_patch_that_keys_play() -> None:
     session.update(patch=played_patch(0.6, 0.8))  # the other way
     choices = session.choices
     assert (choices.listen, choices.listen_right, choices.stereo, choices.pickup) == (0.6, 0.8, True, "displacement")
-    assert seen == [frozenset({"patch", "listen", "listen_right", "stereo", "pickup"})]
+    assert seen == [frozenset({"instrument", "patch", "listen", "listen_right", "stereo", "pickup"})]
 
 
 def test_a_patch_that_keys_do_not_play_keeps_its_pick_up() -> None:
     session = Session()
-    session.update(**choices_of(played_patch(0.2)))
+    session.update(instrument=played_patch(0.2))
     session.update(preset="one")
     session.update(listen=0.7, pickup="velocity", stereo=True)
     assert pickup_of(session) == ((0.2,), "displacement")
     session.update(patch=played_patch(0.4))
     assert session.choices.listen == 0.7
-    session.update(keys_play="pitch")  # it is heard as it is
+    session.play_patch()  # it is heard as it is
     choices = session.choices
     assert (choices.listen, choices.stereo, choices.pickup) == (0.4, False, "displacement")
 
 
 def test_remembered_choices_begin_with_the_pick_up_of_the_patch() -> None:
     """Those of earlier versions may differ."""
-    session = Session(Choices(patch=played_patch(0.2), listen=0.9, pickup="velocity"))
+    session = Session(Choices(instrument=played_patch(0.2), listen=0.9, pickup="velocity"))
     assert (session.choices.listen, session.choices.pickup) == (0.2, "displacement")
 
 
@@ -163,7 +181,7 @@ def test_a_patch_whose_macro_moves_the_right_point_stays_in_stereo() -> None:
     macro = {"name": "Width", "targets": (target,)}
     patch = Patch.model_validate({**dict(played_patch(0.2, 0.8)), "macros": (macro,)})
     session = Session()
-    session.update(**choices_of(patch))
+    session.update(instrument=patch)
     before = session.choices
     with pytest.raises(ValueError, match=r"p stays in stereo: its macro Width"):
         session.update(stereo=False)

@@ -7,7 +7,6 @@ import pytest
 from app.patches.library import SHIPPED, read_patch
 from app.session.choices import Choices, Session
 from app.session.history import GATHER_S, LARGEST_STEPS, RECORDED, History
-from app.session.instrument import choices_of
 
 
 class Clock:
@@ -161,7 +160,7 @@ def heard(session: Session) -> tuple[bool, str, float, object]:
 
 def test_where_a_patch_is_heard_is_one_step_of_undo(clock: Clock) -> None:
     session = Session()
-    session.update(**choices_of(read_patch(SHIPPED / "classical_guitar.json")))
+    session.update(instrument=read_patch(SHIPPED / "classical_guitar.json"))
     history, states, words = History(session, clock), [heard(session)], []
     for change in ({"pickup": "velocity"}, {"stereo": not session.choices.stereo}, {"listen": 0.11}):
         clock.now_s += 1
@@ -176,27 +175,24 @@ def test_where_a_patch_is_heard_is_one_step_of_undo(clock: Clock) -> None:
     assert not history.redo_words
 
 
-def test_the_patchs_own_pick_up_comes_with_the_keys_and_is_no_step(clock: Clock) -> None:
+def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(clock: Clock) -> None:
     session = Session()
-    session.update(**choices_of(read_patch(SHIPPED / "classical_guitar.json")))
+    session.update(instrument=read_patch(SHIPPED / "classical_guitar.json"))
     history = History(session, clock)
     own = heard(session)
-    session.update(keys_play="place")
+    session.play_string()
+    clock.now_s += 1
     session.update(listen=0.9)
-    assert history.undo_words == "listening point"
-    session.update(keys_play="pitch")
+    clock.now_s += 1
+    session.play_patch()
     assert heard(session) == own
-    assert not history.undo_words  # the step would lead to where it is
-    session.update(keys_play="place")
-    for listen in (0.8, 0.7):
-        clock.now_s += 1
-        session.update(listen=listen)
-    session.update(keys_play="pitch")
-    history.undo()  # of what was chosen for places; now it is heard from keys
-    moved = heard(session)
-    assert moved[2] == 0.8
-    assert moved[3] != own[3]
-    history.redo()
+    words = []
+    for plays_patch, listen in ((False, 0.9), (False, own[2]), (True, own[2])):
+        words.append(history.undo_words)
+        history.undo()
+        assert (session.choices.plays_patch, session.choices.listen) == (plays_patch, listen)
+    assert words == ["patch Classical guitar", "listening point", "preset studio_any_string"]
     assert heard(session) == own
-    history.undo()
-    assert heard(session) == moved
+    for _ in words:
+        history.redo()
+    assert (session.choices.plays_patch, heard(session)) == (True, own)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.patches.instrument import SingleString
 from app.patches.patch import PhysicalString
 from app.presets.library import Library, list_presets
 from app.rendering import Take
 from app.session.choices import Choices
-from app.session.ears import heard_ear
 from app.session.silence import why_difference_silent, why_ran_away, why_silent
 from engine.pluck import Pluck
 from engine.presets import find_string, read_info
@@ -34,7 +34,8 @@ def test_modes_are_those_of_the_string_that_is_plucked() -> None:
     library = Library(list_presets(SHIPPED)[0])
     for name, solo, words in (("nylon_e2", 60, ""), ("piano_c4", 55, "this string has 53")):
         string = PhysicalString(**asdict(read_string(find_string(name))))
-        found = why_silent(Choices(preset="studio_any_string", string=string, solo=solo, position=0.113), library)
+        many = SingleString(preset="studio_any_string")
+        found = why_silent(Choices(instrument=many, string=string, solo=solo, position=0.113), library)
         assert words in found
         assert bool(found) == bool(words)
 
@@ -59,7 +60,7 @@ def test_modes_are_those_of_the_string_that_is_plucked() -> None:
     ],
 )
 def test_the_reason_is_named(library: Library, changes: dict[str, object], words: str) -> None:
-    found = why_silent(Choices(preset="small", **changes), library)
+    found = why_silent(Choices(instrument=SingleString(preset="small"), **changes), library)
     assert words in found
     assert bool(found) == bool(words)
 
@@ -68,17 +69,17 @@ def test_a_difference_of_nothing_or_too_little_is_named(
     small_preset: Path, hear: Callable[[Take, Ear], None]
 ) -> None:
     choices = Choices()
-    take = Take("small", read_info(small_preset), Pluck(), 0.5, heard_ear(choices))
+    take = Take("small", read_info(small_preset), Pluck(), 0.5, choices.ear)
     rest = np.zeros((take.frames, take.info.grid_points), np.float32)
     assert why_difference_silent(choices, take) == ""  # nothing is known yet
     append_to(take, rest, rest)
-    hear(take, heard_ear(choices))
+    hear(take, choices.ear)
     assert "are identical" in why_difference_silent(choices, take)
     assert why_difference_silent(choices.model_copy(update={"listen": 0.2}), take) == ""  # of there nothing is known
     for off_m, gain_db, words in ((1e-7, 20, "raise its gain"), (1e-7, 60, ""), (1e-3, 0, "")):
-        take = Take("small", take.info, Pluck(), 0.5, heard_ear(choices))
+        take = Take("small", take.info, Pluck(), 0.5, choices.ear)
         append_to(take, rest + np.float32(off_m), rest)
-        hear(take, heard_ear(choices))
+        hear(take, choices.ear)
         found = why_difference_silent(Choices(difference_gain_db=gain_db), take)
         assert words in found
         assert bool(found) == bool(words)

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
+from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import ASSIGNABLE, Body, Patch, TuningChoice
 from app.session.choices import Session
 from app.session.history import RECORDED, History
-from app.session.instrument import choices_of
 from app.session.step_words import SEVERAL, step_words
 
 
@@ -24,8 +24,8 @@ def harp() -> Patch:
     return read_patch(SHIPPED / "concert_harp.json")
 
 
-def words(before: Patch | None, after: Patch | None) -> str:
-    return step_words({"patch": before}, {"patch": after})
+def words(before: Patch | SingleString, after: Patch | SingleString) -> str:
+    return step_words({"instrument": before}, {"instrument": after})
 
 
 def with_part(patch: Patch, **parts: Any) -> Patch:
@@ -35,7 +35,9 @@ def with_part(patch: Patch, **parts: Any) -> Patch:
 def test_fields_of_a_patch(guitar: Patch, harp: Patch) -> None:
     assert words(guitar, guitar) == ""
     assert words(guitar, harp) == f"patch {harp.name}"
-    assert words(None, guitar) == "patch Classical guitar"
+    assert words(SingleString(), guitar) == "patch Classical guitar"
+    assert words(guitar, SingleString(preset="nylon")) == "preset nylon"
+    assert step_words({"kept": guitar}, {"kept": guitar.with_value("knobs.stiffness", 2.0)}) == "stiffness"
     assert words(guitar, with_part(guitar, name="Mine")) == "name of the patch"
     assert words(guitar, guitar.with_value("knobs.stiffness", 2.0)) == "stiffness"
     assert words(guitar, guitar.with_value("pluck.position", 0.31)) == "pluck position"
@@ -69,11 +71,17 @@ def test_a_macro_is_told_by_its_name(guitar: Patch) -> None:
 
 
 def test_choices_of_the_pluck() -> None:
-    start = {"position": 0.3, "amplitude_mm": 2.0, "preset": "a", "string": None, "width": 0.1}
+    start = {
+        "position": 0.3,
+        "amplitude_mm": 2.0,
+        "instrument": SingleString(preset="a"),
+        "string": None,
+        "width": 0.1,
+    }
     assert step_words(start, {**start, "position": 0.5}) == "pluck position"
     assert step_words(start, {**start, "position": 0.5, "amplitude_mm": 4.0}) == "pluck position and amplitude"
-    assert step_words(start, {**start, "preset": "b"}) == "preset b"
-    every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"patch"}}
+    assert step_words(start, {**start, "instrument": SingleString(preset="b")}) == "preset b"
+    every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"instrument", "kept"}}
     assert all(told and "_" not in told for told in every.values()), every
 
 
@@ -82,8 +90,8 @@ def test_history_names_the_next_step_each_way(guitar: Patch, harp: Patch) -> Non
     clock = iter(range(1000))
     history = History(session, lambda: float(next(clock)))
     assert (history.undo_words, history.redo_words) == ("", "")
-    session.update(**choices_of(guitar))
-    session.update(**choices_of(harp))
+    session.update(instrument=guitar)
+    session.update(instrument=harp)
     session.update(patch=harp.with_value("knobs.decay", 3.0))
     session.play(position=0.2)
     session.update(position=0.5)

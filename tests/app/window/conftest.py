@@ -19,6 +19,6 @@ def played(
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
     controller.library.refresh()
     controller.patches.choose("steel_string_acoustic")
-    qtbot.waitUntil(lambda: controller.performance.live.ready)
+    qtbot.waitUntil(lambda: controller.performance.notes.keys.player is not None)
     controller.window.setFocus()
     return controller

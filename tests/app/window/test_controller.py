@@ -12,10 +12,8 @@ from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import NoteOn as MidiNote
-from app.playing.chosen import mix_of
 from app.playing.notes import Note
 from app.session.choices import Choices
-from app.session.ears import heard_ear
 from app.views.string.axes import MARGIN_X
 from app.window.controller import FRAME_MS, IDLE_MS, Controller
 from app.window.main_window import MainWindow
@@ -142,7 +140,7 @@ def test_keys(qtbot: QtBot, controller: Controller) -> None:
     qtbot.keyClick(window, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: controller.performance.playing)
     qtbot.keyClick(window, Qt.Key.Key_B)
-    assert session.source_heard == "truth"
+    assert session.choices.source_heard == "truth"
     qtbot.waitUntil(lambda: gains(controller) == {"model": 0.0, "truth": 1.0})
     qtbot.keyClick(window, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert session.choices.loop
@@ -187,7 +185,7 @@ def test_midi_plays_and_what_it_learned_is_saved(qtbot: QtBot, controller: Contr
     midi = controller.instruments.midi
     midi._receive(MidiNote(96, 127))  # as in the input's thread
     (note,) = notes(controller)
-    assert (note.stroke.pluck.position, note.stroke.pluck.amplitude_mm) == pytest.approx((0.7, 10))
+    assert (note.request.pluck.position, note.request.pluck.amplitude_mm) == pytest.approx((0.7, 10))
     assert controller.session.choices.position == Choices().position, "the window has had no time yet"
     qtbot.waitUntil(lambda: controller.session.choices.position == pytest.approx(0.7))
     assert controller.session.choices.amplitude_mm == pytest.approx(10)
@@ -272,7 +270,7 @@ def test_a_pluck_is_struck_before_its_motion_is_rendered(qtbot: QtBot, controlle
     controller.pluck()
     performance, (note,) = controller.performance, notes(controller)
     assert not performance.ready
-    assert note.stroke.pluck.position == 0.61
+    assert note.request.pluck.position == 0.61
     qtbot.waitUntil(lambda: any(voice.sounding for voice in note.voices.values()))
     qtbot.waitUntil(lambda: performance.ready)
     assert performance.take is not None
@@ -365,7 +363,7 @@ def test_plucks_ring_beside_each_other_and_a_knob_strikes_none(qtbot: QtBot, con
     assert len(notes(controller)) == 2
     controller.session.update(position=0.5)
     controller.pluck()  # another one
-    assert [note.stroke.pluck.position for note in notes(controller)] == [0.35, 0.35, 0.5]
+    assert [note.request.pluck.position for note in notes(controller)] == [0.35, 0.35, 0.5]
     struck = notes(controller)
     controller.session.update(position=0.6)  # a knob that is turned
     qtbot.waitUntil(lambda: controller.performance.ready)
@@ -385,12 +383,12 @@ def test_another_preset_leaves_what_rings(qtbot: QtBot, controller: Controller) 
     controller.session.update(preset="second")
     qtbot.waitUntil(lambda: controller.performance.ready)
     assert notes(controller) == [note]
-    assert note.stroke.preset.stem == "first"
+    assert note.request.preset.stem == "first"
     assert not controller.performance.moving
     before_s = note.seconds
     qtbot.waitUntil(lambda: note.seconds > before_s + 0.05)
     controller.pluck()
-    assert [each.stroke.preset.stem for each in notes(controller)] == ["first", "second"]
+    assert [each.request.preset.stem for each in notes(controller)] == ["first", "second"]
 
 
 def test_plucks_that_are_overtaken_sound_all_the_same(qtbot: QtBot, controller: Controller) -> None:
@@ -400,7 +398,7 @@ def test_plucks_that_are_overtaken_sound_all_the_same(qtbot: QtBot, controller: 
         controller.session.update(position=position)
         controller.pluck()
     struck = notes(controller)
-    assert [note.stroke.pluck.position for note in struck] == [0.45, 0.55]
+    assert [note.request.pluck.position for note in struck] == [0.45, 0.55]
     qtbot.waitUntil(lambda: all(note.seconds > 0 for note in struck))
 
 
@@ -409,13 +407,14 @@ def test_only_what_concerns_the_sound_is_told_to_the_notes(
 ) -> None:
     wait_for_take(qtbot, controller)
     told: list[object] = []
-    monkeypatch.setattr(controller.performance.notes, "set_mix", told.append)
+    monkeypatch.setattr(controller.performance.notes, "set_monitor", told.append)
     monkeypatch.setattr(controller.performance.notes, "listen", told.append)
     controller.session.update(left_view="waveform", speed=0.1, position=0.4)
     assert told == []
     controller.session.update(heard="b")
+    heard = controller.session.choices
     controller.session.update(listen=0.2)
-    assert told == [mix_of(controller.session.choices), heard_ear(controller.session.choices)]
+    assert told == [heard, controller.session.choices.ear]
 
 
 def test_while_nothing_moves_pictures_are_looked_at_less_often(qtbot: QtBot, controller: Controller) -> None:
@@ -450,7 +449,7 @@ def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -
     assert set(note.voices) == {"model", "preset:second"}
     assert gains(controller) == {"model": 1.0, "preset:second": 0.0}
     qtbot.mouseClick(slots._buttons["b"], LEFT)
-    assert session.source_heard == "preset:second"
+    assert session.choices.source_heard == "preset:second"
     assert gains(controller) == {"model": 0.0, "preset:second": 1.0}
     assert slots._buttons["b"].objectName() == "other"
     qtbot.keyClick(controller.window, Qt.Key.Key_B)
@@ -530,7 +529,7 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     for choices in ({}, {"stereo": False, "pickup": "displacement"}):
         session.update(**choices)
         controller.pluck()
-        ears.append(notes(controller)[-1].stroke.ear)
+        ears.append(notes(controller)[-1].request.ear)
     left, right = session.choices.listen, session.choices.listen_right
     assert ears == [Ear((left, right), "velocity"), Ear((left,))]
     assert not transport._stereo.isChecked()

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.export.files import SoundRequest, export_sound
 from app.instrument.bodies import own_bodies
+from app.patches.instrument import SingleString
 from app.patches.tuning import Tuning
 from app.window.controller import Controller
 from engine.effects import Effects
@@ -158,8 +159,8 @@ def test_a_body_that_comes_back_is_heard_again(
             and heard[-1].body.impulse is not None
         )
 
-    patched.performance.live._set_effects = heard.append
-    patched.performance.live._report = lambda message, details: told.append(message)
+    patched.performance.notes.keys._set_effects = heard.append
+    patched.performance.notes.keys._report = lambda message, details: told.append(message)
     drop(patched, knock(tmp_path / "knock.wav"))
     chosen = patched.session.choices
     qtbot.waitUntil(is_knock)
@@ -177,14 +178,14 @@ def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pic
 ) -> None:
     """The patch is heard in stereo, the recipe in mono; both are of the model of many strings."""
     before, entry = played.session.choices, played.entry
-    assert before.patch is not None and before.keys_play == "pitch" and before.stereo and entry is not None
+    assert before.patch is not None and before.plays_patch and before.stereo and entry is not None
     assert entry.name == before.patch.preset
     export_sound(SoundRequest(load_preset(entry.path), Pluck(0.3, 2.0), 0.22, 0.6), tmp_path / "a.wav")
     drop(played, tmp_path / "a.wav")
     choices = played.session.choices
     assert (choices.pluck.position, choices.listen, choices.stereo) == (0.3, 0.22, False)
-    assert choices.patch == before.patch
-    played.session.update(keys_play="pitch")
+    assert (choices.instrument, choices.patch) == (SingleString(preset=entry.name), before.patch)
+    played.session.play_patch()
     choices = played.session.choices
     assert (choices.stereo, choices.listen, choices.patch) == (True, before.listen, before.patch)
 

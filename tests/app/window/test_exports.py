@@ -17,7 +17,6 @@ from app.export.choices import ExportChoices
 from app.export.recipe import read_recipe
 from app.patches.library import find_patch
 from app.patches.patch import PhysicalString
-from app.session.instrument import choices_of
 from app.window.controller import Controller
 from engine.presets import find_string, read_string
 from engine.presets.finding import SHIPPED
@@ -62,8 +61,8 @@ def test_a_note_is_exported_through_the_instrument_that_is_heard(
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
     short.library.refresh()
     guitar = find_patch("Classical guitar").patch
-    short.session.update(**choices_of(guitar))
-    qtbot.waitUntil(lambda: short.performance.live.ready)
+    short.session.update(instrument=guitar)
+    qtbot.waitUntil(lambda: short.performance.notes.keys.player is not None)
     short.window.instrument.pressed.emit(60, 100)
     qtbot.waitUntil(lambda: short.session.choices.string is not None)
     export(qtbot, short, "Saved")
@@ -71,7 +70,7 @@ def test_a_note_is_exported_through_the_instrument_that_is_heard(
     recipe = read_recipe(file)
     assert recipe.through is not None and recipe.string is not None
     assert (recipe.through.body, recipe.through.room) == (guitar.body, guitar.room)
-    assert recipe.through.gain == short.performance.live.gain_of(recipe.string) != 1
+    assert recipe.through.gain == short.performance.notes.keys.gain_of(recipe.string) != 1
     short.take_file(file)
     assert "heard through Classical guitar" in short.window.notices.text
 

@@ -14,11 +14,13 @@ from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
 from app.instrument import events
+from app.instrument.events import PluckAt
 from app.session.choices import Choices
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings
+from engine.pluck import Pluck
 from engine.voices import Mixer
 
 Open = Callable[[AudioDevice, float, Mixer], Output]
@@ -100,8 +102,11 @@ def test_the_sound_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_pat
 
 def test_instruments_are_silent_meanwhile_and_the_test_keeps_its_pluck(qtbot: QtBot, heard: Controller) -> None:
     dialog = open_test(qtbot, heard)
-    heard.instruments.perform({"position": 0.6, "amplitude_mm": 8.0}, True)  # a MIDI keyboard
-    qtbot.waitUntil(lambda: heard.session.choices.position == 0.6)
+    before = heard.session.choices
+    for event in (PluckAt(Pluck(0.6, 8.0)), events.NoteOn(60, 90)):
+        heard.instruments.play(event)  # a MIDI keyboard
+    qtbot.wait(50)
+    assert heard.session.choices == before
     assert not heard.performance.playing
     assert not sounds(heard)
     first, model = dialog._stimuli, dialog._rendering.result()["model"]
@@ -115,7 +120,7 @@ def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
     qtbot: QtBot, heard: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken: list[object] = []
-    monkeypatch.setattr(heard.performance.live, "handle", lambda event, due: taken.append(event))
+    monkeypatch.setattr(heard.performance.notes, "handle", lambda event, due: taken.append(event))
     dialog = open_test(qtbot, heard)
     let_go = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
     for event in (events.NoteOn(52, 90), *let_go):
@@ -130,7 +135,7 @@ def test_the_volume_of_a_test_stays_what_it_was_begun_with(qtbot: QtBot, heard: 
 
     heard.session.update(volume_db=-6.0)
     dialog = open_test(qtbot, heard)
-    heard.instruments.perform({"volume_db": 12.0}, False)
+    heard.instruments.midi.performed.emit({"volume_db": 12.0})
     qtbot.waitUntil(lambda: heard.session.choices.volume_db == 12.0)
     assert heard.sound.mixer.memory[at.M_WANTED_VOLUME] == pytest.approx(10 ** (-6 / 20))
     dialog.abandon()

@@ -46,8 +46,8 @@ from app.instrument.events import NoteOn
 from app.window import main
 
 def watch(controller):
-    live, struck = controller.performance.live, []
-    handle = live.handle
+    notes, struck = controller.performance.notes, []
+    handle = notes.handle
 
     def noted(event, due=None):
         made = handle(event, due)
@@ -60,7 +60,7 @@ def watch(controller):
             print(json.dumps({"struck": struck, "patch": controller.session.choices.patch.name}))
             controller.window.close()
 
-    live.handle = noted
+    notes.handle = noted
     timer = QTimer(controller.window, interval=50)
     timer.timeout.connect(close_when_played)
     timer.start()
@@ -99,5 +99,5 @@ def test_start_and_close(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
     saved = json.loads(settings.read_text())
-    assert (ROOT / "presets" / f"{saved['choices']['preset']}.safetensors").is_file()
+    assert (ROOT / "presets" / f"{saved['choices']['instrument']['preset']}.safetensors").is_file()
     assert saved["window_geometry"]

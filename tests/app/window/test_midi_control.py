@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, let_go
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.playing.keyboard import Reach
+from app.patches.patch import Patch
 from app.playing.midi import MidiChoices
 from app.playing.midi_backend import MidiUnavailable
 from app.playing.midi_port import MidiInput, same_device
@@ -81,7 +81,7 @@ def backend() -> FakeBackend:
     return FakeBackend()
 
 
-Played = list[tuple[dict[str, Any], threading.Thread]]
+Played = list[tuple[NoteOn, str, threading.Thread]]
 
 
 @pytest.fixture
@@ -92,20 +92,19 @@ def played() -> Played:
 
 def control(
     choices: MidiChoices,
-    presets: list[str],
     played: Played,
     load: Callable[[], FakeBackend],
-    handle: Callable[[Event], bool] = lambda event: False,
+    handle: Callable[[Event], object] = lambda event: None,
 ) -> MidiControl:
-    def play(changes: dict[str, Any]) -> None:
-        played.append((changes, threading.current_thread()))
+    def play_note(event: NoteOn, mode: str) -> None:
+        played.append((event, mode, threading.current_thread()))
 
-    return MidiControl(choices, lambda: Reach((0.3, 0.7), (1, 10)), lambda: presets, play, handle, load=load)
+    return MidiControl(choices, handle, play_note, load=load)
 
 
 @pytest.fixture
 def midi(qtbot: QtBot, backend: FakeBackend, played: Played) -> MidiControl:
-    return control(MidiChoices(port="Keys:Keys 9:0"), ["a", "b"], played, lambda: backend)
+    return control(MidiChoices(port="Keys:Keys 9:0"), played, lambda: backend)
 
 
 def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
@@ -113,26 +112,26 @@ def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
 ) -> None:
     """The window may be busy with anything; it hears nothing of it here."""
     midi.start()
+    midi._remember(midi.choices.model_copy(update={"notes": "position"}))
     with qtbot.assertNotEmitted(midi.performed, wait=50):
         backend.send("note_on", note=96, velocity=127, channel=0)
-        ((changes, thread),) = played
-        assert changes == {"position": pytest.approx(0.7), "amplitude_mm": pytest.approx(10)}
+        ((event, mode, thread),) = played
+        assert (event, mode) == (NoteOn(96, 127), "position")
         assert thread is not threading.main_thread()
         backend.send("note_on", note=96, velocity=0, channel=0)  # a key is let go
         backend.send("note_off", note=96, velocity=64, channel=0)
     assert len(played) == 1
 
 
-def test_pitches_are_played_by_the_patch_with_bends_pedals_and_releases(
+def test_keys_of_the_instrument_are_played_with_bends_pedals_and_releases(
     qtbot: QtBot, backend: FakeBackend, played: Played
 ) -> None:
     came: list[tuple[Event, bool]] = []
 
-    def handle(event: Event) -> bool:
+    def handle(event: Event) -> None:
         came.append((event, threading.current_thread() is threading.main_thread()))
-        return True
 
-    midi = control(MidiChoices(port="Keys"), ["a"], played, lambda: backend, handle)
+    midi = control(MidiChoices(port="Keys"), played, lambda: backend, handle)
     backend.names = ["Keys"]
     midi.start()
     midi._remember(midi.choices.learned("width", 74))
@@ -158,7 +157,7 @@ def came() -> list[Event]:
 def heard(qtbot: QtBot, backend: FakeBackend, played: Played, came: list[Event]) -> Iterator[MidiControl]:
     """An input through which a patch is played, with the dialog open; a controller is assigned."""
     choices = MidiChoices(port="Keys:Keys 9:0", controllers={"width": 74})
-    midi = control(choices, ["a"], played, lambda: backend, lambda event: came.append(event) is None)
+    midi = control(choices, played, lambda: backend, came.append)
     window = QWidget()
     qtbot.addWidget(window)
     midi.start()
@@ -235,7 +234,7 @@ def test_a_pedal_that_an_earlier_version_assigned_is_the_pedal(
     backend: FakeBackend, played: Played, came: list[Event]
 ) -> None:
     choices = MidiChoices.model_validate_json('{"port": "Keys:Keys 9:0", "controllers": {"width": 64, "listen": 7}}')
-    midi = control(choices, ["a"], played, lambda: backend, lambda event: came.append(event) is None)
+    midi = control(choices, played, lambda: backend, came.append)
     midi.start()
     backend.send("control_change", control=64, value=127, channel=0)
     assert came == [Controller(64, 127, 0)]
@@ -293,7 +292,7 @@ def test_without_the_package_nothing_can_be_learned(qtbot: QtBot) -> None:
             raise MidiUnavailable("Install it with: pip install supriya-midi")
         return FakeBackend()
 
-    midi = control(MidiChoices(), [], [], load)
+    midi = control(MidiChoices(), [], load)
     midi.show_dialog(window)
     dialog = midi._dialog
     assert dialog is not None
@@ -319,8 +318,8 @@ def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiCont
     midi.show_patch(patch.model_copy(update=hands))
     shown = [box.currentData() for box in (dialog._channels, dialog._bends, dialog._bends_by, dialog._wheel)]
     assert shown == ["guitar", 2.5, "length", "knobs.decay"]
-    turned: list[tuple[str, object]] = []
-    midi.patch_turned.connect(lambda field, value: turned.append((field, value)))
+    turned: list[Patch] = []
+    midi.performed.connect(lambda changes: turned.append(changes["patch"]))
     for box, value in (
         (dialog._channels, "mpe"),
         (dialog._bends, 12.0),
@@ -328,8 +327,8 @@ def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiCont
         (dialog._wheel, "pluck.position"),
     ):
         box.activated.emit(box.findData(value))
-    wheel = ("mod_wheel", "pluck.position")
-    assert turned == [("mode", "mpe"), ("bend_semitones", 12.0), ("bend_by", "tension"), wheel]
+    found = [each.mode for each in turned], turned[1].bend_semitones, turned[2].bend_by, turned[3].mod_wheel
+    assert found == (["mpe", "guitar", "guitar", "guitar"], 12.0, "tension", "pluck.position")
     boxes, buttons = dialog.findChildren(QComboBox), dialog.findChildren(QPushButton)
     assert [each.accessibleName() for each in (*boxes, *buttons) if not each.toolTip()] == []
 

@@ -10,11 +10,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QInputDialog, QToolTip
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.events import NoteOff, NoteOn, PluckAt, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
 from app.patches.patch import Macro, Patch, Pickup, Target, TuningChoice
+from app.rendering.subject import string_of
 from app.shared.key_names import note_name
 from app.window.controller import Controller
 from app.window.patch_desk import NOTE_TOLD_AFTER_MS
@@ -27,7 +28,7 @@ def press(qtbot: QtBot, controller: Controller, key: Qt.Key) -> None:
 
 def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_A)
-    assert played.performance.live.sounding().keys() == {48}
+    assert played.performance.notes.keys.sounding().keys() == {48}
     qtbot.waitUntil(lambda: played.session.choices.string is not None)
     assert played.session.choices.preset == "studio_any_string"
     wanted_hz = 440 * 2 ** ((48 - 69) / 12)
@@ -39,7 +40,7 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
     qtbot.waitUntil(shown)
     qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1)
     qtbot.waitUntil(lambda: "error of this pluck" in played.window.error_label.text())
-    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    (struck,) = played.performance.notes.keys.player.sounding()  # type: ignore[union-attr]
     assert not struck.damped
     qtbot.keyRelease(played.window, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: struck.damped)
@@ -47,11 +48,13 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
 
 def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, played: Controller) -> None:
     played.window.instrument.pressed.emit(52, 100)
-    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    (struck,) = played.performance.notes.keys.player.sounding()  # type: ignore[union-attr]
     qtbot.waitUntil(lambda: played.session.choices.string is not None)
-    note = played.performance.strike(played.session.choices)
+    note = played.performance.notes.handle(PluckAt(played.session.choices.pluck))
     assert note is not None
-    assert note.stroke.gain == struck.gain != 1
+    assert note.struck is None
+    assert string_of(note.request.preset) == struck.key.string.parameters
+    assert note.gain == struck.gain != 1
 
 
 def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
@@ -59,7 +62,7 @@ def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_9)
     assert (played.session.choices.octave, played.session.choices.velocity) == (1, 127)
     press(qtbot, played, Qt.Key.Key_K)
-    assert played.performance.live.sounding().keys() == {72}
+    assert played.performance.notes.keys.sounding().keys() == {72}
     qtbot.keyRelease(played.window, Qt.Key.Key_K)
 
 
@@ -73,7 +76,7 @@ def test_octave_keys_stop_where_no_key_sounds_and_the_strip_says_so(qtbot: QtBot
         assert QToolTip.text() == f"{words} octave: Toy wires has C3 to D♯6"
     assert played.window.instrument.bar.octave.text() == "from C6"
     press(qtbot, played, Qt.Key.Key_A)
-    assert played.performance.live.sounding().keys() == {84}
+    assert played.performance.notes.keys.sounding().keys() == {84}
     played.window.instrument.bar.octave_asked.emit(1)
     assert played.session.choices.octave == 3
 
@@ -89,17 +92,17 @@ def test_the_octave_moves_into_the_range_of_another_instrument(qtbot: QtBot, pla
 
 
 def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller) -> None:
-    played.session.update(keys_play="place")
+    played.session.play_string()
     press(qtbot, played, Qt.Key.Key_A)
-    assert played.performance.live.sounding() == {}
+    assert played.performance.notes.keys.sounding() == {}
     assert played.performance.notes.ringing == 1
 
 
 def test_keys_on_the_screen_play(qtbot: QtBot, played: Controller) -> None:
     played.window.instrument.pressed.emit(60, 100)
-    assert played.performance.live.sounding().keys() == {60}
+    assert played.performance.notes.keys.sounding().keys() == {60}
     played.window.instrument.released.emit(60)
-    (struck,) = played.performance.live._player.sounding()  # type: ignore[union-attr]
+    (struck,) = played.performance.notes.keys.player.sounding()  # type: ignore[union-attr]
     assert struck.damped
 
 
@@ -107,13 +110,13 @@ def test_keys_on_the_screen_and_of_the_computer_sound_together_on_a_guitars_patc
     qtbot: QtBot, played: Controller
 ) -> None:
     played.patches.choose("oud")
-    live = played.performance.live
-    qtbot.waitUntil(lambda: live._player is not None and live._player.patch.mode == "guitar")
+    keys = played.performance.notes.keys
+    qtbot.waitUntil(lambda: keys.player is not None and keys.player.patch.mode == "guitar")
     for key in (60, 64):  # on one string
         played.window.instrument.pressed.emit(key, 100)
     press(qtbot, played, Qt.Key.Key_X)
     press(qtbot, played, Qt.Key.Key_G)
-    assert live.sounding().keys() == {60, 64, 67}
+    assert keys.sounding().keys() == {60, 64, 67}
 
 
 def test_a_files_drums_are_left_out_and_told(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
@@ -123,8 +126,8 @@ def test_a_files_drums_are_left_out_and_told(qtbot: QtBot, played: Controller, t
     informed: list[str] = []
     played.patches.informed.connect(informed.append)
     played.take_file(song)
-    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding())
-    assert 40 not in played.performance.live.sounding()
+    qtbot.waitUntil(lambda: 52 in played.performance.notes.keys.sounding())
+    assert 40 not in played.performance.notes.keys.sounding()
     assert informed == ["song.mid is played without its drums (channel 10)."]
 
 
@@ -256,7 +259,7 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     song = tmp_path / "song.mid"
     song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]))
     played.take_file(song)
-    qtbot.waitUntil(lambda: 52 in played.performance.live.sounding())
+    qtbot.waitUntil(lambda: 52 in played.performance.notes.keys.sounding())
     played.play_or_stop()
     assert not played.patches.playing
     harp = tmp_path / "harp.json"
@@ -317,9 +320,9 @@ def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, pla
     played.patches.change("knobs.brightness_decay", 0.1)
     played.patches.change("knobs.decay", 0.5)
     told(True)  # before the next key
-    played.session.update(keys_play="place")
+    played.session.play_string()
     assert not bar.note.toolTip()
-    played.session.update(keys_play="pitch")
+    played.session.play_patch()
     assert not bar.note.toolTip()
     played.window.instrument.pressed.emit(80, 100)
     told(True)
@@ -363,8 +366,9 @@ def test_a_patch_that_is_there_already_is_heard_with_its_changes(played: Control
     assert entry is not None
     played.patches.change("knobs.decay", 3.0)
     changed = played.session.choices.patch
+    played.session.play_string()
     played.patches.audition(entry.name)
-    assert played.session.choices.patch == changed
+    assert played.session.choices.instrument == changed
     played.patches.audition("concert_harp")
     assert played.session.choices.patch == read_patch(PATCHES / "concert_harp.json")
 
@@ -376,13 +380,13 @@ def test_a_switch_chooses_what_keys_play_and_is_remembered(qtbot: QtBot, played:
     strip._plays["place"].trigger()
     assert strip.plays.text().startswith("Keys choose the place")
     assert played.session.choices.preset == "studio_any_string"
-    assert played.settings().choices.keys_play == "place"
+    assert not played.settings().choices.plays_patch
     press(qtbot, played, Qt.Key.Key_A)
-    assert played.performance.live.sounding() == {}
+    assert played.performance.notes.keys.sounding() == {}
     assert played.performance.notes.ringing == 1
     strip._plays["pitch"].trigger()
     press(qtbot, played, Qt.Key.Key_A)
-    assert played.performance.live.sounding().keys() == {48}
+    assert played.performance.notes.keys.sounding().keys() == {48}
 
 
 def test_the_strip_shows_the_velocity_of_the_computers_keys(qtbot: QtBot, played: Controller) -> None:
@@ -391,7 +395,7 @@ def test_the_strip_shows_the_velocity_of_the_computers_keys(qtbot: QtBot, played
     press(qtbot, played, Qt.Key.Key_9)
     assert label.text() == "velocity 127"
     assert label.isVisible()
-    played.session.update(keys_play="place")  # the amplitude of the transport counts
+    played.session.play_string()  # the amplitude of the transport counts
     assert not label.isVisible()
 
 
@@ -408,9 +412,11 @@ def test_keys_say_once_that_they_do_not_play_another_preset(played: Controller) 
     played.session.switch_source()
     played.patches.change("knobs.decay", 2.0)
     assert len(informed) == 1
-    played.session.update(keys_play="place")
+    played.session.play_string()
     assert keys._source == "preset:second"
-    played.session.update(keys_play="pitch", a="preset:first")
+    played.session.update(a="preset:first")
+    assert len(informed) == 1
+    played.session.play_patch()
     assert len(informed) == 2
 
 
@@ -466,7 +472,7 @@ def test_the_pluck_of_a_patch_is_given_a_shape(played: Controller) -> None:
         assert knobs.knobs["pluck.width_hard"].isEnabled()
         assert played.history.undo_words == "pluck shape"
     played.window.instrument.pressed.emit(60, 100)
-    player = played.performance.live._player
+    player = played.performance.notes.keys.player
     assert player is not None
     assert [each.pluck.shape for each in player.sounding()] == ["raised_cosine"]
 
@@ -480,7 +486,7 @@ def test_transposition_is_turned_by_whole_keys(played: Controller) -> None:
 
 def heard(played: Controller) -> Patch:
     """What keys play."""
-    player = played.performance.live._player
+    player = played.performance.notes.keys.player
     assert player is not None
     return player.patch
 
@@ -530,7 +536,7 @@ def test_the_pick_ups_knob_moves_where_the_string_is_heard(played: Controller) -
     assert choices.patch is not None
     assert (choices.patch.pickup.points[0], choices.listen) == (0.11, 0.11)
     played.window.instrument.pressed.emit(60, 100)
-    player = played.performance.live._player
+    player = played.performance.notes.keys.player
     assert player is not None
     assert [each.ear.points[0] for each in player.sounding()] == [0.11]
     played.history.undo()
@@ -541,7 +547,7 @@ def test_the_difference_is_heard_without_body_and_room(
     qtbot: QtBot, played: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dry: list[bool] = []
-    monkeypatch.setattr(played.performance.live, "hear_dry", dry.append)
+    monkeypatch.setattr(played.performance.notes, "hear_dry", dry.append)
     played.session.update(b="difference", heard="b")
     played.performance.hear_dry(True)
     played.performance.hear_dry(False)  # a listening test has ended

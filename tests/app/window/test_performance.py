@@ -15,9 +15,10 @@ from pytestqt.qtbot import QtBot
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
-from app.playing.notes import Note
+from app.instrument.events import PluckAt
+from app.patches.instrument import SingleString
+from app.playing.note import Note
 from app.session.choices import Choices
-from app.session.ears import heard_ear
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.performance import Performance
@@ -25,6 +26,7 @@ from app.window.settings import Settings
 from engine.kernels.layout import QUANTUM
 from engine.models import KoopmanVar
 from engine.models.koopman_var import KoopmanState
+from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from engine.voices import Mixer
 
@@ -47,12 +49,12 @@ def window(
     shutil.copy(SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors", folder / "bank.safetensors")
     shutil.copy(small_preset, folder / "rendered.safetensors")
     monkeypatch.setattr("app.presets.library.SHIPPED", folder)
-    monkeypatch.setattr("app.window.performance.LOOP_AHEAD_S", TURN_S)
+    monkeypatch.setattr("app.playing.notes.LOOP_AHEAD_S", TURN_S)
     made = MainWindow()
     qtbot.addWidget(made)
     controller = Controller(
         made,
-        Settings(choices=Choices(preset="bank", seconds=1.0)),
+        Settings(choices=Choices(instrument=SingleString(preset="bank"), seconds=1.0)),
         tmp_path / "settings.json",
         lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output),
     )
@@ -192,7 +194,7 @@ def test_a_loop_goes_on_with_the_pluck_that_is_chosen_meanwhile(
             before = performance._shown.note
             qtbot.waitUntil(lambda before=before: performance._shown.note not in (None, before))  # type: ignore[misc]
     assert performance._shown.note is not None
-    assert performance._shown.note.stroke.pluck.position == 0.44
+    assert performance._shown.note.request.pluck.position == 0.44
     assert len(ringing(performance)) <= 3
 
 
@@ -252,7 +254,7 @@ def test_another_listening_point_and_speed_are_of_the_same_take(
     pictures = take.motion_m("truth").copy()
     for choices in ({"listen": 0.8}, {"pickup": "velocity", "stereo": True}, {"solo": 2}, {"speed": 0.1}):
         session.update(**choices)
-        qtbot.waitUntil(lambda: take.listened.ear == heard_ear(session.choices) and take.listened.complete)
+        qtbot.waitUntil(lambda: take.listened.ear == session.choices.ear and take.listened.complete)
     qtbot.waitUntil(lambda: take.motions["model"].flashes.strobe.speed == 0.1)
     performance.seek(0.3)
     string = next(panel.view for panel in window.panels if panel.key == "string")
@@ -275,9 +277,9 @@ def test_a_note_of_an_instrument_is_in_the_mixer_before_the_window_knows(
     """The window's thread is busy here until it waits."""
     qtbot.waitUntil(lambda: window.sound.mixer.voices == [])
     before = window.session.choices
-    changes = [{"position": 0.4, "amplitude_mm": 5.0}, {"position": 0.6}]
-    for number, change in enumerate(changes, 1):
-        player = threading.Thread(target=window.instruments.perform, args=(change, True))
+    for number, position in enumerate((0.4, 0.6), 1):
+        event = PluckAt(Pluck(position, 5.0))
+        player = threading.Thread(target=window.instruments.play, args=(event,))
         player.start()
         player.join()
         assert len({voice.program for voice in window.sound.mixer.voices}) == 2  # model and truth
@@ -289,7 +291,7 @@ def test_a_note_of_an_instrument_is_in_the_mixer_before_the_window_knows(
     assert window.session.choices == before
     told: list[Choices] = []
     window.instruments.played.connect(lambda: told.append(window.session.choices))
-    plucks = [note.stroke.pluck for note in ringing(performance)]
+    plucks = [note.request.pluck for note in ringing(performance)]
     assert [(each.position, each.amplitude_mm) for each in plucks] == [(0.4, 5.0), (0.6, 5.0)]
     qtbot.waitUntil(lambda: told != [])
     assert (told[-1].position, told[-1].amplitude_mm) == (0.6, 5.0)

@@ -108,7 +108,7 @@ def test_a_recording_replaces_no_file_that_nobody_asked_about(
 def test_a_recording_is_kept_until_it_is_saved_or_discarded(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
-    bar, live = played.window.instrument.bar, played.performance.live
+    bar, recorder = played.window.instrument.bar, played.performance.notes.keys.recorder
     record(played)
     assert "Unsaved" in bar.record.text()
     ask, discard = bar._unsaved_menu.actions()
@@ -117,7 +117,7 @@ def test_a_recording_is_kept_until_it_is_saved_or_discarded(
     ask.trigger()
     dialog_of(played).reject()
     played.patches.recordings.record()  # opens it again, and records nothing over it
-    assert not live.recording
+    assert not recorder.recording
     save(qtbot, played, tmp_path / "kept.wav")
     assert "Unsaved" not in bar.record.text()
     origin = read_origin(tmp_path / "kept.wav")
@@ -127,7 +127,7 @@ def test_a_recording_is_kept_until_it_is_saved_or_discarded(
     assert "Record" in bar.record.text()
     assert bar.record.menu() is None
     bar.record.click()
-    assert live.recording
+    assert recorder.recording
     assert not told.errors
 
 

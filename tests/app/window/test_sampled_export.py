@@ -16,7 +16,6 @@ from pytestqt.qtbot import QtBot
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.patches.library import find_patch
-from app.session.instrument import choices_of
 from app.shared.worker import Cancelled
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
@@ -33,7 +32,7 @@ def patched(controller: Controller, preset_folder: Path, tmp_path: Path) -> Cont
     controller.library.refresh()
     sampled = SampledChoices(folder=str(tmp_path), keys=(60, 61), layers=1, seconds=0.2)
     controller.exports._choices = controller.exports.choices[0], sampled
-    controller.session.update(**choices_of(find_patch(PATCH).patch))
+    controller.session.update(instrument=find_patch(PATCH).patch)
     return controller
 
 
@@ -60,12 +59,12 @@ def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Con
     open_dialog(qtbot, patched)
     assert patched.exports.dialog is dialog
     assert dialog.sampler.what.text().startswith(PATCH)
-    patched.session.update(**choices_of(find_patch("Concert harp").patch))
+    patched.session.update(instrument=find_patch("Concert harp").patch)
     assert dialog.sampler.what.text().startswith("Concert harp")
-    qtbot.waitUntil(lambda: patched.performance.live.ready)
+    qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog.save.click()
     qtbot.keyPress(patched.window, Qt.Key.Key_A)
-    assert patched.performance.live.sounding()
+    assert patched.performance.notes.keys.sounding()
     qtbot.keyRelease(patched.window, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert "Concert_harp.sfz" in dialog.state.text()
@@ -87,7 +86,7 @@ def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
             time.sleep(0.01)
 
     monkeypatch.setattr("app.export.sampled.export.export_sampled", export)
-    qtbot.waitUntil(lambda: patched.performance.live.ready)
+    qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog = open_dialog(qtbot, patched)
     qtbot.waitUntil(dialog.isActiveWindow)
     qtbot.mouseClick(dialog.save, Qt.MouseButton.LeftButton)
@@ -108,7 +107,7 @@ def test_keys_play_and_shortcuts_work_while_it_runs(
     assert active is not None
     focused = active.focusWidget() or active
     qtbot.keyPress(focused, Qt.Key.Key_A)
-    assert patched.performance.live.sounding()
+    assert patched.performance.notes.keys.sounding()
     qtbot.keyRelease(focused, Qt.Key.Key_A)
     looped = patched.session.choices.loop
     qtbot.keyClick(focused, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)

@@ -23,7 +23,6 @@ import psutil
 from app.audio.choices import Buffer, SoundChoice
 from app.patches.patch import Patch
 from app.session.choices import Choices
-from app.session.instrument import choices_of
 from app.window.settings import Settings
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, program
@@ -170,7 +169,7 @@ def measure(
         tell("clicks")
         clicks = click_through(server)
         tell("start")
-        choices = Choices.model_validate(choices_of(patch))
+        choices = Choices(instrument=patch)
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         control = stack.enter_context(steady_tone(server, folder, buffer))
         started_s = time.monotonic()

@@ -22,7 +22,6 @@ from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.patches.patch import Body, Patch, Room
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
-from app.session.instrument import choices_of
 from app.window.settings import Settings
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, program, score
@@ -127,7 +126,7 @@ def measure(by: By, buffer: Buffer, seed: int, patch: Patch, report: Callable[..
         clicks = click_through(server)
         tell("start")
         settings = Settings(
-            choices=Choices.model_validate(choices_of(dry)),
+            choices=Choices(instrument=dry),
             sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer),
             midi=MidiChoices(port=line.name if line else ""),
         )

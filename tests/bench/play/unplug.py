@@ -20,7 +20,6 @@ import numpy as np
 from app.audio.choices import SoundChoice
 from app.patches.patch import Patch
 from app.session.choices import Choices
-from app.session.instrument import choices_of
 from app.window.settings import Settings
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, program
@@ -100,7 +99,7 @@ def measure(times: int, seed: int, patch: Patch, report: Callable[..., None]) ->
         report(0.0, "sound card, screen, start")
         server = stack.enter_context(sound_server(folder))
         screen = stack.enter_context(private_screen())
-        settings = Settings(choices=Choices.model_validate(choices_of(patch)), sound=SoundChoice(rate_hz=RATE_HZ))
+        settings = Settings(choices=Choices(instrument=patch), sound=SoundChoice(rate_hz=RATE_HZ))
         with recording(server, folder / "before") as recorded:
             process = stack.enter_context(program.app(folder, settings, server, screen))
             program.open_window(screen, process)

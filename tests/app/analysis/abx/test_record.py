@@ -10,6 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.analysis.abx.record import AbxRecord, load_record, material_of, p_text, save_record
+from app.patches.instrument import SingleString
 from app.patches.patch import PhysicalString
 from app.presets.library import list_presets
 from app.session.choices import Choices
@@ -92,7 +93,7 @@ def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
     own = StringParameters()
     string = PhysicalString(**{name: getattr(own, name) for name in PhysicalString.model_fields})
     for stereo, chosen in ((False, None), (True, string)):
-        choices = Choices(preset=entry.name, position=0.3, string=chosen, stereo=stereo)
+        choices = Choices(instrument=SingleString(preset=entry.name), position=0.3, string=chosen, stereo=stereo)
         pluck = material_of(entry, choices).pluck
         assert pluck["position"] == 0.3
         assert pluck["string"] == (chosen and chosen.model_dump(mode="json"))

@@ -19,8 +19,10 @@ from app.export.note import HeardNote
 from app.export.recipe import read_recipe
 from app.export.sampled.choices import SampledChoices
 from app.export.sound import Through
+from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
+from app.patches.patch import Pickup
 from app.presets.library import Library, list_presets
 from app.session.choices import Choices
 from app.views.dialogs.export_dialog import ExportDialog
@@ -37,7 +39,7 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
     library = Library(list_presets(folder)[0])
 
     def note(heard: dict[str, object]) -> HeardNote | None:
-        choices = Choices(preset="small", position=0.4).model_copy(update=heard)
+        choices = Choices(instrument=SingleString(preset="small"), position=0.4).changed(heard)
         through = None if choices.patch is None else Through.of(choices.patch, 0.5)
         return heard_note(choices, library, through)
 
@@ -180,7 +182,7 @@ def test_what_the_patch_adds_is_heard_in_the_file_unless_the_string_alone_is_wan
     qtbot: QtBot, made, tmp_path: Path
 ) -> None:
     guitar = read_patch(PATCHES / "classical_guitar.json")
-    dialog = made({}, {"patch": guitar})
+    dialog = made({}, {"instrument": guitar.model_copy(update={"preset": "small", "pickup": Pickup(points=(0.1,))})})
     assert "With the body, room and level of Classical guitar" in dialog.note.what.text()
     run(qtbot, dialog, "Saved")
     path = tmp_path / "small_x0.40_a4.0_4000_model.wav"

@@ -19,7 +19,6 @@ from app.presets.library import Library
 from app.rendering import Take
 from app.rendering.take import Motion
 from app.session.choices import Choices, Session
-from app.session.ears import heard_ear
 from app.session.shown import ShownSource
 from app.window.controller import Controller
 from app.window.panels import Moment, Panel, StringPanel
@@ -43,14 +42,14 @@ Choose = Callable[..., None]
 @pytest.fixture
 def take(small_preset: Path, hear: Hear) -> Take:
     """A decaying first mode of 4 mm; the model is 1 % too loud."""
-    made = Take("small", read_info(small_preset), Pluck(0.5, 4.0, "gaussian", 0.06), 1.0, heard_ear(Choices()))
+    made = Take("small", read_info(small_preset), Pluck(0.5, 4.0, "gaussian", 0.06), 1.0, Choices().ear)
     time_s = np.arange(FRAMES)[:, None] / 4000
     shape = np.sin(np.pi * np.linspace(0, 1, 101))
     truth = (0.004 * np.exp(-3 * time_s) * np.cos(2 * np.pi * made.fundamental_hz * time_s) * shape).astype(
         np.float32
     )
     append_to(made, np.float32(1.01) * truth, truth)
-    hear(made, heard_ear(Choices()))
+    hear(made, Choices().ear)
     return made
 
 
@@ -363,7 +362,7 @@ def choose_and_hear(take: Take, hear: Hear) -> Choose:
 
     def chosen(panel: Panel, **choices: Any) -> None:
         choose(panel, **choices)
-        hear(take, heard_ear(panel.session.choices))
+        hear(take, panel.session.choices.ear)
 
     return chosen
 

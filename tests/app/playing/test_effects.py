@@ -1,4 +1,4 @@
-"""Body and room of the patch that keys play: as long as it is played, and not where models are compared."""
+"""Body and room of a patch: as long as it is played, and not where models are compared."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 
 from app.instrument.events import MOD_WHEEL, Controller
+from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
-from app.playing.live import Live
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from engine.effects import Effects
-from engine.presets import SHIPPED
 from engine.voices import Ear
+from tests.app.monitors import find_shipped
 
 Wait = Callable[[Callable[[], bool]], None]
 EAR = Ear((0.37,))
@@ -34,14 +34,12 @@ class Stage:
     def __init__(self, sound: Any) -> None:
         self.effects: list[Effects | None] = []
         self.reports: list[str] = []
-        self.notes = Notes(sound, Sources(), lambda message, detail: self.reports.append(message))
-        self.live = Live(
-            self.notes,
-            Sources(),
-            lambda name: SHIPPED / f"{name}.safetensors",
-            lambda message, detail: self.reports.append(message),
-            self.effects.append,
-        )
+        report = lambda message, detail: self.reports.append(message)  # noqa: E731
+        self.notes = Notes(sound, Sources(), find_shipped, report, self.effects.append)
+
+    @property
+    def ready(self) -> bool:
+        return self.notes.keys.player is not None
 
     def settle(self, wait: Wait) -> None:
         """Until all that was asked for is done."""
@@ -59,32 +57,32 @@ def stage(sound: Any) -> Iterator[Stage]:
 
 def test_they_are_set_once_and_go_with_the_patch(stage: Stage, patch: Patch, wait: Wait) -> None:
     for _ in range(2):
-        stage.live.set_patch(patch, EAR)
+        stage.notes.set_instrument(patch, EAR)
         stage.settle(wait)
     (effects,) = stage.effects
     assert effects is not None and effects.body is not None
     assert (effects.body.name, effects.body.mix) == ("guitar", 0.4)
-    stage.live.set_patch(None, EAR)
+    stage.notes.set_instrument(SingleString(), EAR)
     stage.settle(wait)
     assert stage.effects[1:] == [None]
 
 
 def test_they_are_off_while_models_are_compared(stage: Stage, patch: Patch, wait: Wait) -> None:
-    stage.live.set_patch(patch, EAR)
-    wait(lambda: stage.live.ready)
+    stage.notes.set_instrument(patch, EAR)
+    wait(lambda: stage.ready)
     stage.settle(wait)
     for dry in (True, False):
-        stage.live.hear_dry(dry)
+        stage.notes.hear_dry(dry)
         stage.settle(wait)
         assert (stage.effects[-1] is None) == dry
 
 
 def test_the_modulation_wheel_brings_the_room(stage: Stage, patch: Patch, wait: Wait) -> None:
-    stage.live.set_patch(patch.model_copy(update={"mod_wheel": "room.mix"}), EAR)
-    wait(lambda: stage.live.ready)
+    stage.notes.set_instrument(patch.model_copy(update={"mod_wheel": "room.mix"}), EAR)
+    wait(lambda: stage.ready)
     stage.settle(wait)
     for value, mix in ((127, 1.0), (0, patch.room.mix)):
-        stage.live.handle(Controller(MOD_WHEEL, value))
+        stage.notes.handle(Controller(MOD_WHEEL, value))
         stage.settle(wait)
         effects = stage.effects[-1]
         assert effects is not None
@@ -95,8 +93,22 @@ def test_a_body_that_is_not_here_is_told_once_however_its_knobs_are_turned(
     stage: Stage, patch: Patch, wait: Wait
 ) -> None:
     for mix in (0.2, 0.3, 0.4):
-        stage.live.set_patch(patch.model_copy(update={"body": Body(name="a cello", mix=mix)}), EAR)
+        stage.notes.set_instrument(patch.model_copy(update={"body": Body(name="a cello", mix=mix)}), EAR)
         stage.settle(wait)
     (told,) = stage.reports
     assert "is played without its body: the body a cello is not here" in told
     assert all(effects is None or effects.body is None for effects in stage.effects)
+
+
+def test_a_single_string_has_none_even_where_a_patch_is_kept_beside_it(
+    stage: Stage, patch: Patch, wait: Wait
+) -> None:
+    stage.notes.set_instrument(patch, EAR)
+    stage.settle(wait)
+    assert stage.effects[-1] is not None
+    stage.notes.set_instrument(SingleString(), EAR, patch)
+    stage.settle(wait)
+    assert stage.effects[-1] is None
+    stage.notes.set_instrument(patch, EAR)
+    stage.settle(wait)
+    assert stage.effects[-1] is not None

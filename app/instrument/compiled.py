@@ -1,0 +1,238 @@
+"""An instrument that is played by compiled code: events and tables for `engine.voices.CompiledPlayer`."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from app.instrument import events
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.loud_keys import LoudKeys
+from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
+from app.patches.patch import Patch
+from engine.kernels import playing_layout as of
+from engine.models.koopman_tension import KoopmanTension
+from engine.presets import Preset
+from engine.voices import CompiledPlayer, Ear
+from engine.voices.player import Report, Ringing, Table
+
+STOP_S = 0.03
+
+
+@dataclass(frozen=True)
+class Record:
+    """An event as the compiled player takes it: see `playing_layout`."""
+
+    kind: int
+    channel: int
+    key: int
+    value: float
+
+
+def record_of(event: NoteOn | NoteOff | Bend | Controller) -> Record:
+    """The only way from events to records."""
+    if isinstance(event, NoteOn):
+        return Record(of.NOTE_ON, event.channel, event.key, event.velocity)
+    if isinstance(event, NoteOff):
+        return Record(of.NOTE_OFF, event.channel, event.key, 0.0)
+    if isinstance(event, Bend):
+        return Record(of.BEND, event.channel, 0, event.value)
+    return Record(of.CONTROLLER, event.channel, event.number, event.value)
+
+
+def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
+    """The only way back."""
+    if record.kind == of.NOTE_ON:
+        return NoteOn(record.key, round(record.value), record.channel)
+    if record.kind == of.NOTE_OFF:
+        return NoteOff(record.key, record.channel)
+    if record.kind == of.BEND:
+        return Bend(record.value, record.channel)
+    if record.kind == of.CONTROLLER:
+        return Controller(record.key, round(record.value), record.channel)
+    raise ValueError(f"a record of kind {record.kind} is no event of a player; give one of `record_of`")
+
+
+class InstrumentPlayer:
+    """Plays one patch. Every public method may be called from any thread.
+
+    Args:
+        preset: a preset of many strings.
+        rate_hz: of the mixer that it is given to.
+        gains: by source ("model", "truth"), of all its notes.
+        ear: where strings are heard; None: at the patch's own points.
+        most_notes: that ring at once; the oldest makes room.
+
+    Raises:
+        ValueError: the preset learned one string only, or the tuning is impossible.
+    """
+
+    def __init__(
+        self,
+        patch: Patch,
+        preset: Preset,
+        rate_hz: int,
+        gains: Mapping[str, float],
+        ear: Ear | None = None,
+        most_notes: int = 40,
+    ) -> None:
+        if not isinstance(preset.model, KoopmanTension):
+            raise ValueError(
+                f"{preset.path}: it knows one string only; choose a preset of many, as studio_any_string"
+            )
+        self._grid_points = preset.model.configuration.grid_points
+        self._sources = tuple(gains)
+        self._programs = programs_of(preset.model, rate_hz, self._sources)
+        self._lock = threading.Lock()
+        self._serial = self._instrument = 0
+        self._table: Table | None = None
+        self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self._grid_points - 2), most_notes)
+        self.compiled.set_source_gains(gains.values())
+        heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
+        self._loud = LoudKeys(patch, heard, self._grid_points)
+        self.take(self._loud)
+
+    # What is played
+
+    @property
+    def patch(self) -> Patch:
+        return self._loud.patch
+
+    @property
+    def ear(self) -> Ear:
+        """Where strings are heard that are struck now."""
+        return self._loud.ear
+
+    @property
+    def heard_through(self) -> Patch:
+        """With the body and the room as the modulation wheel turns them."""
+        return wheeled(self.patch, self.compiled.wheel[0], "body.", "room.")
+
+    @property
+    def controllers(self) -> list[Event]:
+        """The events that bring wheels and pedals of a new player where they stand."""
+        found: list[Event] = []
+        for number in range(of.CHANNELS):
+            channel = self.compiled.channel(number)
+            if channel.range_semitones is not None:
+                semitones, cents = divmod(round(100 * channel.range_semitones), 100)
+                for controller, value in (
+                    (events.REGISTERED, 0),
+                    (events.FINE_REGISTERED, 0),
+                    (events.VALUE, semitones),
+                    (events.FINE_VALUE, cents),
+                    (events.REGISTERED, 127),
+                    (events.FINE_REGISTERED, 127),
+                ):
+                    found.append(Controller(controller, value, number))
+            if channel.bend:
+                found.append(Bend(channel.bend, number))
+            if channel.pedal:
+                found.append(Controller(events.SUSTAIN, 127, number))
+            if channel.slide is not None:
+                found.append(Controller(events.SLIDE, channel.slide, number))
+        wheel, moved_by = self.compiled.wheel
+        if wheel:
+            found.append(Controller(events.MOD_WHEEL, wheel, moved_by))
+        return found
+
+    def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys:
+        """What `take` needs of a patch. It takes milliseconds, in which keys are played.
+
+        Args:
+            nearly: whether body and peaks may be those of the present patch, for which it takes no time.
+
+        Raises:
+            ValueError: the tuning is impossible.
+        """
+        heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
+        return LoudKeys(patch, heard, self._grid_points, self._loud if nearly else None)
+
+    def take(self, loud: LoudKeys, frame: int = 0) -> None:
+        """Plays these keys from a frame on; strings that ring glide to them.
+
+        Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
+        """
+        with self._lock:
+            before = self._table
+            if before is None or is_another(loud.patch, self._loud.patch):
+                self._instrument += 1
+            self._serial += 1
+            self._loud, self._table = (
+                loud,
+                table_of(
+                    loud, self._grid_points, self._sources, self._programs, self._serial, self._instrument, before
+                ),
+            )
+            self.compiled.take(self._table, frame)
+
+    def prepare(self, keys: Sequence[int] | None = None) -> None:
+        """Computes the gains of keys, so that a strike need not. None: all keys of the patch."""
+        low, high = self.patch.range
+        for key in keys if keys is not None else range(low, high + 1):
+            for string in (None, *range(strings_of(self.patch))):
+                try:
+                    self._fill(key, string)
+                except ValueError:
+                    continue  # raised again when it is struck
+
+    def _fill(self, key: int, string: int | None) -> None:
+        table, loud = self._table, self._loud
+        assert table is not None
+        fill_gain(table, loud, key, string)
+
+    # Events
+
+    def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
+        """Hands an event over; its number, which the reports of a note carry.
+
+        Args:
+            frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at
+                once.
+            struck_s: the device clock's time of the gesture.
+
+        Raises:
+            ValueError: a key has no possible string.
+        """
+        if isinstance(event, PatchTurned):
+            self.take(self.loud_keys(event.patch), frame)
+            return 0
+        if isinstance(event, NoteOn) and event.velocity > 0:
+            self._make_ready(event)
+        record = record_of(event)
+        return self.compiled.give(record.kind, record.channel, record.key, record.value, frame, struck_s=struck_s)
+
+    def _make_ready(self, event: NoteOn) -> None:
+        """The gains of a key on the strings on which the event may play it."""
+        played = False  # on the string of its channel, where that plays
+        if event.channel < strings_of(self.patch):
+            with contextlib.suppress(ValueError):
+                self._fill(event.key, event.channel)
+                played = True
+        with contextlib.suppress(ValueError) if played else contextlib.nullcontext():
+            self._fill(event.key, None)
+
+    def cancel(self) -> None:
+        """Forgets the events whose frames are to come."""
+        self.compiled.give(of.CANCEL)
+
+    def stop(self, seconds: float = STOP_S) -> None:
+        """Lets all strings fade out."""
+        self.compiled.give(of.STOP, value=seconds)
+
+    # What became of them
+
+    def reports(self) -> list[Report]:
+        """What became of notes since this was asked for the last time. One thread asks."""
+        return self.compiled.reports()
+
+    def ringing(self) -> list[Ringing]:
+        """The notes that ring, one for each place."""
+        return self.compiled.ringing()
+
+
+def is_another(patch: Patch, than: Patch) -> bool:
+    """Whether a patch is another instrument: neither the same with a knob turned, nor the same under a new name."""
+    return patch.name != than.name and patch.model_copy(update={"name": than.name}) != than

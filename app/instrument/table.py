@@ -1,0 +1,151 @@
+"""An instrument's table: a patch as the compiled player reads it, prepared off the audio thread."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.instrument.loud_keys import LoudKeys
+from app.instrument.strings import KNOBS, STRING
+from app.patches.patch import Fretted, Patch, StringSet
+from app.shared.parameters import OF_PATCHES
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.models.koopman_tension import KoopmanTension
+from engine.voices.player import Table
+from engine.voices.programs import solver_memory, tension_memory
+
+VALUES = (
+    *(f"knobs.{name}" for name in KNOBS),
+    *(f"pluck.{name}" for name in ("position", "width", "width_hard", "softest_mm", "hardest_mm", "curve")),
+    "damping.release_t60_s",
+    "bend_semitones",
+)
+MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
+SHAPES = {"gaussian": of.GAUSSIAN, "triangular": of.TRIANGULAR, "raised_cosine": of.RAISED_COSINE}
+BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
+SOURCES = ("model", "truth")
+GOALS = 8  # values that are tried for a wheel all the way up
+
+
+def wheel_goal(patch: Patch) -> float | None:
+    """The value of its parameter at the modulation wheel's end; None: the wheel turns nothing."""
+    name = patch.mod_wheel
+    if name == "none":
+        return None
+    value, parameter = patch.value(name), OF_PATCHES[name]
+    goal = value * parameter.wheel_factor if parameter.wheel is None else parameter.wheel
+    for _ in range(GOALS):
+        try:
+            patch.with_value(name, goal)
+        except ValueError:  # beyond its bounds: half as far
+            goal = (goal + value) / 2
+        else:
+            return goal
+    return None
+
+
+def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
+    """The patch as the modulation wheel, 0 … 127, turns it, where it turns anything of these parts."""
+    goal = wheel_goal(patch) if wheel and patch.mod_wheel.startswith(parts) else None
+    if goal is None:
+        return patch
+    value = patch.value(patch.mod_wheel)
+    return patch.with_value(patch.mod_wheel, value + wheel / 127 * (goal - value))
+
+
+def programs_of(model: KoopmanTension, rate_hz: int, sources: Iterable[str]) -> tuple[NDArray[np.float64], ...]:
+    """What the kernels read of each source."""
+    return tuple(solver_memory(rate_hz) if each == "truth" else tension_memory(model, rate_hz) for each in sources)
+
+
+def table_of(
+    loud: LoudKeys,
+    grid_points: int,
+    sources: Iterable[str],
+    programs: tuple[NDArray[np.float64], ...],
+    serial: int,
+    instrument: int,
+    near: Table | None = None,
+) -> Table:
+    """The table of a patch. Gains of keys are filled in by `fill_gain`; until then they are those of `near`.
+
+    Args:
+        serial: above that of all tables before.
+        instrument: the same for the same instrument with a knob turned.
+    """
+    patch, ear = loud.patch, loud.ear
+    memory = np.zeros(of.table_slots(grid_points))
+    counts = memory.view(np.int64)
+    counts[of.TABLE_SERIAL], counts[of.TABLE_INSTRUMENT] = serial, instrument
+    counts[of.TABLE_MODE], counts[of.TABLE_BEND_BY] = MODES[patch.mode], BENDS[patch.bend_by]
+    counts[of.TABLE_LOW], counts[of.TABLE_HIGH] = patch.range
+    counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES[patch.pluck.shape], patch.pluck.stops
+    counts[of.TABLE_LET_RING] = patch.damping.let_ring
+    counts[of.TABLE_POINTS], counts[of.TABLE_VELOCITY] = len(ear.points), ear.pickup == "velocity"
+    memory[of.TABLE_POINT : of.TABLE_POINT + len(ear.points)] = ear.points
+    counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points
+    goal = wheel_goal(patch) if patch.mod_wheel in VALUES else None
+    counts[of.TABLE_WHEEL] = -1 if goal is None else VALUES.index(patch.mod_wheel)
+    memory[of.TABLE_WHEEL_GOAL] = 0.0 if goal is None else goal
+    for place, (source, program) in enumerate(zip(sources, programs, strict=True)):
+        counts[of.TABLE_KINDS + place] = at.TRUTH if source == "truth" else at.TENSION
+        counts[of.TABLE_PROGRAMS + place] = program.ctypes.data
+    counts[of.TABLE_SOURCES] = len(programs)
+    memory[of.TABLE_VALUES : of.TABLE_VALUES + of.VALUES] = [_value(patch, name) for name in VALUES]
+    for key in range(of.KEYS):
+        memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
+    strings = patch.strings
+    if isinstance(strings, Fretted):
+        memory[of.TABLE_OPEN + of.OPEN_STRING : of.TABLE_OPEN + of.OPEN_SLOTS] = _row(strings.string)
+    else:
+        counts[of.TABLE_STRINGS] = len(strings.strings)
+        for number, string in enumerate(strings.strings[::-1]):
+            first = of.TABLE_OPEN + number * of.OPEN_SLOTS
+            row = string.note, loud.strings.open_hz(string.note), *_row(string.string)
+            memory[first : first + of.OPEN_SLOTS] = row
+    turn = 2 * (grid_points - 1)
+    memory[of.TABLE_SINES : of.TABLE_SINES + turn] = np.sin(2 * np.pi * np.arange(turn) / turn)
+    if near is not None:
+        guesses = slice(of.TABLE_GAINS, of.TABLE_GAINS + of.KEYS * of.GAINS)
+        memory[guesses] = -np.abs(np.nan_to_num(near.memory[guesses]))
+    return Table(memory, programs)
+
+
+def fill_gain(table: Table, loud: LoudKeys, key: int, string: int | None = None) -> None:
+    """Computes the gain of a key, where it is not known, in half a millisecond. Any thread.
+
+    Args:
+        string: on which of a set it is played, as in `Strings.of_key`.
+
+    Raises:
+        ValueError: the key has no possible string.
+    """
+    slot = of.TABLE_GAINS + key * of.GAINS + (0 if string is None else 1 + string)
+    if table.memory[slot] > 0:
+        return
+    try:
+        found = loud.of_key(key, string)
+        if found is not None:
+            found.resonator.eigenvalues()
+            table.memory[slot] = found.gain
+    except ValueError:
+        table.memory[slot] = math.nan
+        raise
+
+
+def strings_of(patch: Patch) -> int:
+    """How many strings of a set channels of a guitar may choose."""
+    chosen = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
+    return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if chosen else 0  # type: ignore[union-attr]
+
+
+def _value(patch: Patch, name: str) -> float:
+    return patch.bend_semitones if name == "bend_semitones" else patch.value(name)
+
+
+def _row(string: object) -> list[float]:
+    return [getattr(string, name) for name in STRING]

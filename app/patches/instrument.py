@@ -1,0 +1,35 @@
+"""What is played: a patch, whose keys are pitches, or a single string, whose keys are places along it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Tag
+
+from app.patches.patch import Patch
+
+
+class SingleString(BaseModel):
+    """A preset that is plucked at places along its string, which rings until it is silent.
+
+    Attributes:
+        preset: the name of its file without the suffix; "": none.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    preset: str = ""
+
+
+PATCH, SINGLE = "Patch", "SingleString"  # in the paths of faults
+
+
+def _kind(value: Any) -> str:
+    more = value.keys() - {"preset"} if isinstance(value, dict) else isinstance(value, Patch)
+    return PATCH if more else SINGLE
+
+
+Instrument = Annotated[
+    Annotated[Patch, Tag(PATCH)] | Annotated[SingleString, Tag(SINGLE)],
+    Discriminator(_kind),
+]

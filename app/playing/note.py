@@ -1,0 +1,129 @@
+"""A note: what rings since an event, as voices of several sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.instrument.player import Struck
+from app.playing.ahead import AheadVoice
+from app.rendering import RenderRequest
+from app.rendering.subject import Subject
+from app.shared.vocabulary import OTHER
+from engine.kernels.layout import QUANTUM
+from engine.voices import Mixer, Voice
+
+
+class Note:
+    """Its voices begin with the same frame, so that a switch between them stays in time.
+
+    Args:
+        request: the string, how it is plucked, where it is heard, and other presets for the same pluck.
+        sources: those that get a voice: "model", "truth", and `OTHER` + the name of another preset.
+        gain: a factor for all its sources, besides the monitor's.
+        from_s: where in its motion it begins.
+        begin_frame: the frame of the mixer at which it begins; 0: at once.
+        struck: of a key of a patch, the string, whose voices the player changes; None: of any other pluck.
+
+    Attributes:
+        voices: by source.
+        ahead: those of its voices that are rendered ahead.
+        match: by source, the factor that brings it to the level of the truth; None until it is known.
+        pending: it was not handed to a mixer yet.
+        released: it was told to fade out.
+        mixer: to which it was handed.
+        cut: it is not heard any more: its mixer was replaced, or it could not be played.
+    """
+
+    def __init__(
+        self,
+        request: RenderRequest,
+        sources: tuple[str, ...],
+        gain: float = 1.0,
+        from_s: float = 0.0,
+        begin_frame: int = 0,
+        struck: Struck | None = None,
+    ) -> None:
+        self.request, self.sources, self.gain = request, sources, gain
+        self.from_s, self.begin_frame, self.struck = from_s, begin_frame, struck
+        self.voices: dict[str, Voice] = {} if struck is None else dict(struck.voices)
+        self.match: Mapping[str, float] | None = None if struck is None else dict.fromkeys(struck.voices, 1.0)
+        self.ahead: list[AheadVoice] = []
+        self.pending = True
+        self.handed_over = False  # or about to be
+        self.released = False
+        self.mixer: Mixer | None = None
+        self.cut = False
+        self.timed = False  # its latency has been noted
+        self.ahead_of_event = False  # it was handed over before its event is due, and may be cancelled until then
+
+    def subject(self, source: str) -> Subject:
+        """The preset or string whose sound a source is."""
+        others = (path for path in self.request.others if source == f"{OTHER}{path.stem}")
+        return next(others, self.request.preset)
+
+    @property
+    def matching_key(self) -> tuple[object, ...]:
+        """What the levels of its sources depend on."""
+        asked = self.request
+        return asked.preset, asked.pluck, asked.ear, asked.others, self.sources
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended: nothing of it will be heard any more."""
+        if self.cut or self.pending:
+            return self.cut or self.released
+        return all(voice.over for voice in self.voices.values())
+
+    @property
+    def seconds(self) -> float:
+        """The time in its motion up to which the device has its samples."""
+        if self.pending:
+            return self.from_s
+        return max((voice.seconds for voice in self.voices.values()), default=0.0)
+
+    @property
+    def began(self) -> bool:
+        """Whether the device has any of its samples, or it was cut after it was handed over."""
+        return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
+
+    @property
+    def waits_s(self) -> float:
+        """For how many seconds it will still be rendered before it sounds; 0: it does not wait, or not known."""
+        waits = self.pending and not self.over
+        return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
+
+    @property
+    def began_frame(self) -> int:
+        """The frame of the mixer at which it began; 0 before that."""
+        return max((voice.began_frame for voice in self.voices.values()), default=0)
+
+    def frame_at(self, seconds: float) -> int:
+        """The frame of its mixer at which its motion reaches a time; only once it has begun."""
+        assert self.mixer is not None
+        rate_hz = self.mixer.rate_hz
+        skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
+        starved_s = min(voice.starved_s for voice in self.voices.values())
+        return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
+
+    def set_begin(self, struck_s: float) -> None:
+        """Gives its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
+        for voice in self.voices.values():
+            voice.set_struck(struck_s)
+            voice.begin_at(self.begin_frame)
+
+    def release_at(self, frame: int) -> None:
+        """Lets it fade out from a frame of the mixer on; 0: not any more."""
+        for voice in self.voices.values():
+            voice.release_at(frame)
+
+    def end(self) -> None:
+        """Cuts it, where no device plays its voices any more; they are over."""
+        self.cut = True
+        for voice in self.voices.values():
+            voice.refuse()
+
+    def release(self, seconds: float) -> None:
+        """Lets it fade out within so many seconds, from now on."""
+        self.released = True
+        for voice in self.voices.values():
+            voice.release(seconds)

@@ -1,0 +1,69 @@
+"""The listener: where and how the string is heard."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.patches.patch import Patch, Pickup
+from app.shared.parameters import OF_CHOICES
+from app.shared.vocabulary import Pickup as PickupKind
+
+if TYPE_CHECKING:
+    from engine.voices import Ear
+
+HIGHEST_MODE = 9_999  # of any grid that a preset may have
+RIGHT_POINT = "pickup.points.1"  # of a patch in stereo
+
+
+class Listener(BaseModel):
+    """Listening points, pick-up and soloed mode.
+
+    Attributes:
+        listen: as a fraction of the string's length; in stereo the left point.
+        listen_right: used in stereo.
+        solo: above 0: this mode is heard alone.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    listen: float = Field(OF_CHOICES["listen"].default, ge=0, le=1)
+    listen_right: float = Field(OF_CHOICES["listen_right"].default, ge=0, le=1)
+    stereo: bool = False
+    pickup: PickupKind = "displacement"
+    solo: int = Field(0, ge=0, le=HIGHEST_MODE)
+
+    @property
+    def points(self) -> tuple[float, ...]:
+        """One a channel."""
+        return (self.listen, self.listen_right) if self.stereo else (self.listen,)
+
+    @property
+    def ear(self) -> Ear:
+        """As the engine takes it; the first point, in stereo the left, is drawn."""
+        from engine.voices import Ear  # brings torch
+
+        return Ear(self.points, self.pickup, self.solo)
+
+    def picked_up(self, patch: Patch) -> Patch:
+        """The patch with this pick-up.
+
+        Raises:
+            ValueError: in mono one of its macros would have nothing to move.
+        """
+        heard = Pickup(points=self.points, kind=self.pickup)
+        if heard == patch.pickup:
+            return patch
+        if not self.stereo:
+            for macro in patch.macros:
+                if any(target.field == RIGHT_POINT for target in macro.targets):
+                    told = f"its macro {macro.name} moves the right listening point"
+                    raise ValueError(f"{patch.name} stays in stereo: {told}")
+        return patch.model_copy(update={"pickup": heard})
+
+
+def points_of(pickup: Pickup) -> dict[str, object]:
+    """The fields of `Listener` that a patch's pick-up says."""
+    right = {"listen_right": pickup.points[1]} if len(pickup.points) > 1 else {}
+    return {"listen": pickup.points[0], "stereo": len(pickup.points) > 1, "pickup": pickup.kind, **right}

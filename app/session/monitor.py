@@ -1,0 +1,71 @@
+"""Monitor A/B: which of model, truth, their difference and other presets is heard, and with which gain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.shared.parameters import OF_CHOICES
+from app.shared.vocabulary import DIFFERENCE
+
+Slot = Literal["a", "b"]
+SLOT_PATTERN = r"^(model|truth|difference|preset:.+)$"
+
+
+class Monitor(BaseModel):
+    """Two slots to compare.
+
+    Attributes:
+        a, b: their sources: "model", "truth", "difference" (model minus truth) or "preset:NAME".
+        level_match: whether each source is brought to the level of the truth, once its gain is known.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    a: str = Field("model", pattern=SLOT_PATTERN)
+    b: str = Field("truth", pattern=SLOT_PATTERN)
+    heard: Slot = "a"
+    level_match: bool = True
+    difference_gain_db: float = Field(
+        OF_CHOICES["difference_gain_db"].default,
+        ge=OF_CHOICES["difference_gain_db"].limits[0],
+        le=OF_CHOICES["difference_gain_db"].limits[1],
+    )
+
+    @property
+    def source_heard(self) -> str:
+        """The source that is heard."""
+        return self.a if self.heard == "a" else self.b
+
+    @property
+    def voices(self) -> tuple[str, ...]:
+        """The sources that need a voice, the one that is heard first."""
+        held = (self.source_heard, self.a, self.b)
+        parts = [part for each in held for part in (("model", "truth") if each == DIFFERENCE else (each,))]
+        return tuple(dict.fromkeys(parts))
+
+    def gain(self, source: str, sources: Collection[str], match: Mapping[str, float] | None) -> float:
+        """The factor of a source's voice; 0: it is not heard.
+
+        Args:
+            sources: those of the note; where the one that is heard is missing, the model is heard.
+            match: by source, the factor that brings it to the level of the truth; None: not known yet.
+        """
+        if self.source_heard == DIFFERENCE:
+            gain = float(10 ** (self.difference_gain_db / 20))
+            return {"model": gain, "truth": -gain}.get(source, 0.0)
+        if source != (self.source_heard if self.source_heard in sources else "model"):
+            return 0.0
+        return match.get(source, 1.0) if self.level_match and match else 1.0
+
+    def gain_db(self, slot: str, match: Mapping[str, float] | None) -> float | None:
+        """The gain with which the source of slot "a" or "b" is heard, in dB; None while it is not known."""
+        source = self.a if slot == "a" else self.b
+        if source == DIFFERENCE:
+            return self.difference_gain_db
+        if not self.level_match:
+            return 0.0
+        return None if match is None else 20 * math.log10(match.get(source, 1.0))

@@ -1,0 +1,1078 @@
+"""Events become voices, and change those that ring: the control logic of playing, without Python or allocation.
+
+Strings are known by their places: a key, or a channel of a guitar, which is one string. What plucks a place again
+stops its string first, or, where the instrument says so, adds to its motion. A key that is released damps its string,
+unless the pedal or the instrument lets it ring. Bends, slides, dampers and knobs change the modes of a string's
+voices, all of a note alike.
+
+In guitar mode the first channels are the strings, the highest first, as guitars with MIDI send them. The first of
+them alone may as well be a keyboard: until another has played, it plays any key, each on the string that the key
+chooses. So do all further channels, and the keys of the computer and the screen always.
+
+A channel's own wheel and pedal hold for what was struck on it. Those of the first channel hold for the keys of the
+computer and the screen too, which have none, and in MPE, as the master's, for every channel.
+
+Events wait in a ring until the mixer's next quantum, and in a queue until the quantum of their frame. A note begins
+at its very frame; all else counts within a quantum after it.
+
+Memory is passed twice, as real numbers and as whole ones (`players`, `tables`, `mixers`), and notes, channels and
+events by their first slot: views of slices would take the compiler five times as long.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import carray, njit
+
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels import strings
+from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import fence, pointer
+from engine.kernels.modes import TOO_HIGH
+from engine.pluck import FULL_SCALE_M, LARGEST_AMPLITUDE_MM, LEAST_PEAK_M, POSITION_RANGE, RUNAWAY_FACTOR
+
+MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
+MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
+WIDEST_SEMITONES = 96.0  # that messages may ask for
+DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
+STOP_S = 0.03  # of the fade of all strings
+STOLEN_S = 0.03  # of the fade of a note that makes room
+PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
+
+# Controllers of MIDI
+MOD_WHEEL, DATA, SUSTAIN, FINE_DATA, SLIDE = 1, 6, 64, 38, 74
+FINE_OTHER, OTHER, FINE_REGISTERED, REGISTERED, SOUND_OFF, RESET, NOTES_OFF = 98, 99, 100, 101, 120, 121, 123
+PEDAL_DOWN = 64  # from this value on
+NO_PARAMETER, BEND_RANGE = 127, 0
+
+
+@njit(inline="always", **COMPILED)
+def _at(address: int) -> np.ndarray:
+    return carray(pointer(address), (1 << 40,), np.float64)
+
+
+@njit(inline="always", **COMPILED)
+def _whole(address: int) -> np.ndarray:
+    return carray(pointer(address), (1 << 40,), np.int64)
+
+
+@njit(inline="always", **COMPILED)
+def _note(number: int) -> int:
+    """First slot of a note."""
+    return of.PLAYER_NOTES + number * of.NOTE_SLOTS
+
+
+@njit(inline="always", **COMPILED)
+def _channel(number: int) -> int:
+    """First slot of a channel."""
+    return of.PLAYER_CHANNELS + number * of.CHANNEL_SLOTS
+
+
+@njit(inline="always", **COMPILED)
+def _moment(player: np.ndarray, number: int) -> np.ndarray:
+    """Room for a string, for a moment."""
+    return player[of.PLAYER_STRINGS + number * of.STRING : of.PLAYER_STRINGS + (number + 1) * of.STRING]
+
+
+@njit(inline="always", **COMPILED)
+def _frames(player: np.ndarray, seconds: float) -> int:
+    return max(1, round(seconds * player[of.PLAYER_RATE]))
+
+
+@njit(inline="always", **COMPILED)
+def _quanta(player: np.ndarray, seconds: float) -> int:
+    return max(1, round(seconds * player[of.PLAYER_RATE] / at.QUANTUM))
+
+
+@njit(**COMPILED)
+def _voice_over(address: int) -> bool:
+    state = _whole(address)[at.STATE]
+    return state == at.OVER or state == at.RUNAWAY
+
+
+@njit(**COMPILED)
+def _over(players: np.ndarray, note: int) -> bool:
+    """Whether all voices of a note are."""
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address != 0 and not _voice_over(address):
+            return False
+    return True
+
+
+@njit(**COMPILED)
+def _sounds(players: np.ndarray, note: int) -> bool:
+    """Whether a note has its place and rings."""
+    return (
+        players[note + of.NOTE_STATE] == of.RINGS
+        and players[note + of.NOTE_HAS_PLACE] == 1
+        and not _over(players, note)
+    )
+
+
+# Channels
+
+
+@njit(**COMPILED)
+def _rest(player: np.ndarray, players: np.ndarray, number: int, pedal: int, plays: int) -> None:
+    """A channel as if nobody had moved anything on it, but for these."""
+    channel = _channel(number)
+    player[channel + of.CHANNEL_BEND] = 0.0
+    player[channel + of.CHANNEL_RANGE] = -1.0
+    players[channel + of.CHANNEL_PEDAL] = pedal
+    players[channel + of.CHANNEL_SLIDE] = -1
+    players[channel + of.CHANNEL_PLAYS] = plays
+    players[channel + of.CHANNEL_COARSE] = NO_PARAMETER
+    players[channel + of.CHANNEL_FINE] = NO_PARAMETER
+
+
+@njit(**COMPILED)
+def _is_master(mode: int, channel: int, other: int) -> bool:
+    """Whether "all notes off" and "reset all controllers" on a channel are meant for another: MPE's master's."""
+    return channel == other or (mode == of.MPE and channel == of.FIRST and other != of.ON_SCREEN)
+
+
+@njit(**COMPILED)
+def _acts_on(mode: int, channel: int, other: int) -> bool:
+    """Whether wheel and pedal of a channel hold for what was struck on another."""
+    return channel == other or (channel == of.FIRST and (mode == of.MPE or other == of.ON_SCREEN))
+
+
+@njit(**COMPILED)
+def _pedal(players: np.ndarray, mode: int, channel: int) -> bool:
+    """Whether a pedal holds what was struck on a channel."""
+    for each in range(of.CHANNELS):
+        if players[_channel(each) + of.CHANNEL_PEDAL] != 0 and _acts_on(mode, each, channel):
+            return True
+    return False
+
+
+@njit(**COMPILED)
+def _semitones(player: np.ndarray, mode: int, channel: int) -> float:
+    """How far pitch wheels bend what was struck on a channel."""
+    total = 0.0
+    for each in range(of.CHANNELS):
+        bend, wide = player[_channel(each) + of.CHANNEL_BEND], player[_channel(each) + of.CHANNEL_RANGE]
+        if bend != 0.0 and _acts_on(mode, each, channel):
+            if wide < 0.0:
+                member = mode == of.MPE and each != of.FIRST and each != of.ON_SCREEN
+                wide = MPE_BEND_SEMITONES if member else player[of.PLAYER_VALUES + of.BEND_SEMITONES]
+            total += bend * wide
+    return total
+
+
+@njit(**COMPILED)
+def _set_range(player: np.ndarray, players: np.ndarray, channel: int, number: int, value: int) -> bool:
+    """Follows the controllers that choose a parameter and set it; whether they set the range of bends."""
+    coarse, fine, wide = channel + of.CHANNEL_COARSE, channel + of.CHANNEL_FINE, channel + of.CHANNEL_RANGE
+    chosen = players[coarse] == BEND_RANGE and players[fine] == BEND_RANGE
+    if number in (OTHER, FINE_OTHER):
+        players[coarse] = NO_PARAMETER
+        players[fine] = NO_PARAMETER
+    elif number == REGISTERED:
+        players[coarse] = value
+    elif number == FINE_REGISTERED:
+        players[fine] = value
+    elif chosen and number == DATA:
+        player[wide] = min(float(value), WIDEST_SEMITONES)
+        return True
+    elif chosen and number == FINE_DATA and player[wide] >= 0.0:
+        player[wide] = min(math.floor(player[wide]) + value / 100, WIDEST_SEMITONES)
+        return True
+    return False
+
+
+@njit(**COMPILED)
+def _is_string(players: np.ndarray, tables: np.ndarray, channel: int) -> bool:
+    """Whether a channel is one string of a guitar. The first one is, once another string has played."""
+    if tables[of.TABLE_MODE] != of.GUITAR:
+        return False
+    count = of.GUITAR_STRINGS
+    if tables[of.TABLE_STRINGS] > 0:
+        count = min(count, tables[of.TABLE_STRINGS])
+    others = 0
+    for each in range(of.FIRST + 1, count):
+        others += players[_channel(each) + of.CHANNEL_PLAYS]
+    return channel < count and others > 0
+
+
+# The string of a key
+
+
+@njit(**COMPILED)
+def _value(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, which: int) -> float:
+    """One of the instrument's values, as the modulation wheel turns it."""
+    value, wheel = player[of.PLAYER_VALUES + which], players[of.PLAYER_WHEEL]
+    if wheel != 0 and tables[of.TABLE_WHEEL] == which:
+        return value + wheel / 127 * (table[of.TABLE_WHEEL_GOAL] - value)
+    return value
+
+
+@njit(**COMPILED)
+def _chosen(table: np.ndarray, count: int, key: int) -> int:
+    """Which string of a set, from the highest, 0, a key chooses: the highest at or below it, else the lowest."""
+    for number in range(count):
+        if table[of.TABLE_OPEN + number * of.OPEN_SLOTS + of.OPEN_NOTE] <= key:
+            return number
+    return count - 1
+
+
+@njit(**COMPILED)
+def _string_of(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    key: int,
+    number: int,
+    pitch_hz: float,
+    wheeled: bool,
+    out: np.ndarray,
+) -> tuple[int, float]:
+    """The string of a key, before bends: its modes, 0 where there is none, and its share of the whole string.
+
+    Args:
+        number: on which of a set it is played, from the highest, 0; -1, or one that would have to be slackened too
+            far: the one that the key itself chooses.
+        wheeled: whether with the knob that the modulation wheel turns, as far as it does.
+    """
+    whole, knobs, count = _moment(player, 0), _moment(player, 1), tables[of.TABLE_STRINGS]
+    for which in range(of.KNOBS):
+        knobs[which] = player[of.PLAYER_VALUES + which]
+        if wheeled:
+            knobs[which] = _value(player, players, table, tables, which)
+    first = of.TABLE_OPEN
+    if count > 0:
+        note = table[first + number * of.OPEN_SLOTS + of.OPEN_NOTE] if 0 <= number < count else 0.0
+        if not 0 <= number < count or key < note - of.MOST_SLACKENED:
+            number = _chosen(table, count, key)
+        first += number * of.OPEN_SLOTS
+    strings.turned(table[first + of.OPEN_STRING : first + of.OPEN_SLOTS], knobs, whole)
+    if not strings.possible(whole):
+        return 0, 1.0
+    if count > 0 and key < table[first + of.OPEN_NOTE]:  # slackened
+        whole[of.TENSION] = strings.bent(whole, pitch_hz / table[first + of.OPEN_HZ])
+        if not strings.possible(whole):
+            return 0, 1.0
+    for place in range(of.STRING):
+        out[place] = whole[place]
+    out[of.LENGTH] = strings.fretted(whole, pitch_hz)
+    if not strings.possible(out):
+        return 0, 1.0
+    modes = min(strings.modes_below(out, of.HIGHEST_HZ), players[of.PLAYER_MODES])
+    return modes, out[of.LENGTH] / whole[of.LENGTH]
+
+
+@njit(**COMPILED)
+def _pitch_hz(table: np.ndarray, tables: np.ndarray, key: int, given_hz: float) -> float:
+    """Of a note; 0: its key is silent."""
+    if not tables[of.TABLE_LOW] <= key <= tables[of.TABLE_HIGH]:
+        return 0.0
+    return given_hz if given_hz > 0.0 else table[of.TABLE_PITCHES + key]
+
+
+@njit(**COMPILED)
+def _string_now(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, note: int, out: np.ndarray
+) -> None:
+    """The string of a note with the present knobs, wheels and damper; where there is none, it stays as it is."""
+    key, mode = players[note + of.NOTE_KEY], tables[of.TABLE_MODE]
+    pitch_hz, fits = _pitch_hz(table, tables, key, player[note + of.NOTE_PITCH_HZ]), True
+    if pitch_hz > 0.0:
+        number = players[note + of.NOTE_STRING] if mode == of.GUITAR else -1
+        wheeled = players[of.PLAYER_WHEEL] != 0 and 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
+        modes, _ = _string_of(player, players, table, tables, key, number, pitch_hz, wheeled, out)
+        fits = modes > 0 and (wheeled or not strings.overdamped(out, modes))
+    else:
+        for place in range(of.STRING):
+            out[place] = player[note + of.NOTE_OWN + place]
+    ratio = 2.0 ** (_semitones(player, mode, players[note + of.NOTE_CHANNEL]) / 12)
+    if fits and ratio != 1.0:
+        if tables[of.TABLE_BEND_BY] == of.BY_LENGTH:
+            out[of.LENGTH] = strings.slid(out, ratio)
+        else:
+            out[of.TENSION] = strings.bent(out, ratio)
+        fits = strings.possible(out)
+    if fits and players[note + of.NOTE_DAMPED] != 0:
+        out[of.D1] = strings.damped(out, _value(player, players, table, tables, of.RELEASE_S))
+        fits = strings.possible(out)
+    if not fits:
+        for place in range(of.STRING):
+            out[place] = player[note + of.NOTE_STRING_NOW + place]
+
+
+# Voices
+
+
+@njit(**COMPILED)
+def _pull(
+    player: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    modes: int,
+    position: float,
+    peak_m: float,
+    width: float,
+) -> float:
+    """The amplitudes of the modes of a pluck, and its highest point in m: its shape on the grid, then sines."""
+    grid, shape, highest = tables[of.TABLE_GRID], tables[of.TABLE_SHAPE], 0.0
+    for point in range(grid):
+        x = point / (grid - 1)
+        distance = (x - position) / width
+        if shape == of.TRIANGULAR:
+            found = peak_m * min(x / position, (1 - x) / (1 - position))
+        elif point == 0 or point == grid - 1:
+            found = 0.0
+        elif shape == of.GAUSSIAN:
+            found = peak_m * math.exp(-distance * distance)
+        else:
+            found = peak_m / 2 * (1 + math.cos(2 * math.pi * distance)) if abs(distance) < 0.5 else 0.0
+        player[of.PLAYER_PULLED + point] = found
+        highest = max(highest, found)
+    turn = 2 * (grid - 1)
+    for mode in range(modes):
+        total, place = 0.0, 0
+        for point in range(1, grid - 1):
+            place += mode + 1
+            if place >= turn:
+                place -= turn
+            total += player[of.PLAYER_PULLED + point] * table[of.TABLE_SINES + place]
+        player[of.PLAYER_AMPLITUDES + mode] = total * (2 / (grid - 1))
+    return highest
+
+
+@njit(**COMPILED)
+def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: int, note: int) -> None:
+    """Sets one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
+    n, solo = players[note + of.NOTE_MODES], players[note + of.NOTE_SOLO]
+    own, highest = player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING], TOO_HIGH * player[of.PLAYER_RATE]
+    for mode in range(1, n + 1):
+        sigma = strings.decay_rate(own, mode)
+        omega = math.sqrt(max(strings.omega_squared(own, mode) - sigma * sigma, 0.0))
+        for point in range(players[note + of.NOTE_POINTS]):
+            first = at.weights(n, which, point, 0) + mode - 1
+            sine = math.sin(math.pi * mode * player[note + of.NOTE_POINT + point])
+            heard = omega <= highest and (solo == 0 or solo == mode)
+            voice[first] = sine / FULL_SCALE_M if heard else 0.0
+            voice[first + n] = 0.0
+
+
+@njit(**COMPILED)
+def _slots_of_voice(players: np.ndarray, note: int, source: int) -> int:
+    """First slot of the player's own voice for a note, by its number, and a source."""
+    modes = players[of.PLAYER_MODES]
+    each = at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM + at.TRUTH_ROWS * modes + of.BLOCKS * (at.B_HEADER + 4 * modes)
+    return of.PLAYER_VOICES + (note * of.MOST_SOURCES + source) * each
+
+
+@njit(**COMPILED)
+def _make_voice(
+    player: np.ndarray,
+    players: np.ndarray,
+    address: int,
+    note: int,
+    kind: int,
+    program: int,
+    velocity: int,
+    highest_m: float,
+) -> None:
+    """A voice of the modes of a note's own string, which is let go at the amplitudes of `_pull`: as `Voice`."""
+    voice, counts, rate_hz, n = _at(address), _whole(address), player[of.PLAYER_RATE], players[note + of.NOTE_MODES]
+    for slot in range(at.state(n) + at.TRUTH_ROWS * n):
+        voice[slot] = 0.0
+    counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = kind, program, n
+    counts[at.POINTS], counts[at.VELOCITY] = players[note + of.NOTE_POINTS], velocity
+    counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n
+    counts[at.FADE_FRAMES], counts[at.ATTACK] = round(at.FADE_S * rate_hz), round(at.ATTACK_S * rate_hz)
+    counts[at.ENDS_AT], counts[at.ENDS_IN] = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
+    voice[at.SILENT], peak = at.SILENT_DB * math.log(10.0) / 20, max(highest_m, LEAST_PEAK_M)
+    voice[at.PEAK], voice[at.LIMIT] = peak, RUNAWAY_FACTOR * peak / FULL_SCALE_M * (at.BRIGHTER if velocity else 1.0)
+    first = at.state(n)
+    for mode in range(n):
+        voice[first + mode] = player[of.PLAYER_AMPLITUDES + mode]
+    first += at.OMEGA_SQUARED * n
+    strings.rows(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING], n, voice[first : first + 4 * n])
+    _weigh(player, players, voice, 0, note)
+
+
+@njit(inline="always", **COMPILED)
+def _release(address: int, frames: int) -> None:
+    """Lets a voice fade out; a release under way goes on."""
+    counts = _whole(address)
+    if counts[at.RELEASE] == 0:
+        counts[at.RELEASE] = frames
+
+
+@njit(**COMPILED)
+def _release_note(player: np.ndarray, players: np.ndarray, note: int, seconds: float, frame: int) -> None:
+    """Lets a note fade out; from a frame to come on, where that is above 0."""
+    players[note + of.NOTE_RELEASED] = 1
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address != 0 and frame > 0:
+            _whole(address)[at.RELEASE_AT] = frame
+        elif address != 0:
+            _release(address, _frames(player, seconds))
+
+
+@njit(**COMPILED)
+def _due(address: int, now: int) -> int:
+    """The latest frame for which modes count with a voice's next quantum."""
+    counts = _whole(address)
+    due, before = now + counts[at.LATE], counts[at.BEFORE]
+    if counts[at.STATE] == at.WAITING:
+        due = max(due, counts[at.BEGIN_AT])
+        if before != 0 and counts[at.STOPS_IN] == 0 and _whole(before)[at.STATE] == at.SOUNDING:
+            due = now + _whole(before)[at.LATE]
+    return due
+
+
+@njit(**COMPILED)
+def _wish(
+    player: np.ndarray,
+    players: np.ndarray,
+    number: int,
+    source: int,
+    address: int,
+    seconds: float,
+    frame: int,
+    now: int,
+) -> int:
+    """The slot of the block for the modes that a voice is to have from a frame on: linked, and to be filled.
+
+    At most two are still to be reached: those that are due in this quantum, and those for the next.
+    """
+    counts, modes = _whole(address), players[of.PLAYER_MODES]
+    latest, taken, due = counts[at.RESONATOR], counts[at.TAKEN], _due(address, now)
+    first = counts[at.WISHES] if latest == 0 else _whole(latest)[at.B_NEXT]
+    tail, wished = 0, first
+    while wished != 0:
+        tail = wished
+        wished = _whole(wished)[at.B_NEXT]
+    base, found = players[of.PLAYER_HERE], 0
+    if tail == 0 or (_whole(tail)[at.B_AT] <= due) != (frame <= due):
+        blocks = _slots_of_voice(players, number, source + 1) - of.BLOCKS * (at.B_HEADER + 4 * modes)
+        for place in range(of.BLOCKS):
+            block = base + 8 * (blocks + place * (at.B_HEADER + 4 * modes))
+            used, wished = block in (latest, taken), first
+            while wished != 0 and not used:
+                used = wished == block
+                wished = _whole(wished)[at.B_NEXT]
+            if not used:
+                found = block
+    if found == 0:
+        found = tail  # the latest counts
+    wishes = _whole(found)
+    wishes[at.B_QUANTA], wishes[at.B_NEXT], wishes[at.B_AT] = _quanta(player, seconds), 0, frame
+    if found != tail and tail != 0:
+        _whole(tail)[at.B_NEXT] = found
+    elif found != tail and latest != 0:
+        _whole(latest)[at.B_NEXT] = found
+    elif found != tail:
+        counts[at.WISHES] = found
+    return (found - base) // 8 + at.B_HEADER
+
+
+@njit(**COMPILED)
+def _retune(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    number: int,
+    seconds: float,
+    frame: int,
+    now: int,
+) -> None:
+    """Lets a note glide to its string as knobs, wheels and damper have changed it, where they have."""
+    note, string, changed = _note(number), _moment(player, 2), False
+    if players[note + of.NOTE_PREPARED] != 0:
+        return
+    _string_now(player, players, table, tables, note, string)
+    for place in range(of.STRING):
+        changed = changed or string[place] != player[note + of.NOTE_STRING_NOW + place]
+        player[note + of.NOTE_STRING_NOW + place] = string[place]
+    if not changed:
+        return
+    n, filled = players[note + of.NOTE_MODES], 0
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address == 0 or _voice_over(address):
+            continue
+        slot = _wish(player, players, number, source, address, seconds, frame, now)
+        if filled == 0:
+            strings.rows(string, n, player[slot : slot + 4 * n])
+            filled = slot
+        else:
+            for place in range(4 * n):
+                player[slot + place] = player[filled + place]
+
+
+@njit(**COMPILED)
+def _damp(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    number: int,
+    frame: int,
+    now: int,
+) -> None:
+    """Puts the damper on a string that nothing holds. A prepared voice without modes fades."""
+    note = _note(number)
+    held = players[note + of.NOTE_HELD] + players[note + of.NOTE_KEPT] + players[note + of.NOTE_DAMPED]
+    if held != 0 or tables[of.TABLE_LET_RING] != 0:
+        return
+    players[note + of.NOTE_DAMPED] = 1
+    if players[note + of.NOTE_PREPARED] == 0:
+        _retune(player, players, table, tables, number, DAMPER_S, frame, now)
+        return
+    t60_s = _value(player, players, table, tables, of.RELEASE_S)
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address == 0 or _voice_over(address):
+            continue
+        voice, kind, n = _at(address), _whole(address)[at.KIND], _whole(address)[at.MODES]
+        if kind in (at.TRUTH, at.TENSION) and n <= players[of.PLAYER_MODES]:
+            slot = _wish(player, players, number, source, address, DAMPER_S, frame, now)
+            first = at.state(n) + at.OMEGA_SQUARED * n
+            for place in range(4 * n):
+                player[slot + place] = voice[first + place]
+                if n <= place < 2 * n:  # σ
+                    player[slot + place] += math.log(1000.0) / t60_s
+        else:
+            _release(address, _frames(player, t60_s))
+
+
+# Notes
+
+
+@njit(**COMPILED)
+def _report(
+    player: np.ndarray, players: np.ndarray, kind: int, id: int, channel: int, key: int, frame: int, velocity: float
+) -> int:
+    """One more report; its first slot, for what else is in it. `_reported` publishes it."""
+    slot = of.PLAYER_REPORTS + players[of.PLAYER_REPORTED] % of.REPORTS * of.REPORT_SLOTS
+    players[slot + of.REPORT_KIND] = kind
+    players[slot + of.REPORT_ID] = id
+    players[slot + of.REPORT_CHANNEL] = channel
+    players[slot + of.REPORT_KEY] = key
+    players[slot + of.REPORT_FRAME] = frame
+    player[slot + of.REPORT_VELOCITY] = velocity
+    return slot
+
+
+@njit(inline="always", **COMPILED)
+def _reported(players: np.ndarray) -> None:
+    fence()
+    players[of.PLAYER_REPORTED] += 1
+
+
+@njit(**COMPILED)
+def _refuse(player: np.ndarray, players: np.ndarray, event: int) -> None:
+    """Reports a note that no string can play, or that was cancelled; voices that were prepared for it are over."""
+    for source in range(of.MOST_SOURCES):
+        address = players[event + of.EVENT_VOICES + source]
+        if address != 0:
+            _whole(address)[at.STATE] = at.OVER
+    id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
+    frame, velocity = players[event + of.EVENT_FRAME], player[event + of.EVENT_VALUE]
+    _report(player, players, of.REFUSED, id, channel, key, frame, velocity)
+    _reported(players)
+
+
+@njit(**COMPILED)
+def _forget(player: np.ndarray, players: np.ndarray, note: int, frame: int) -> None:
+    """A note has ended: its slots are free."""
+    players[note + of.NOTE_STATE] = of.FREE
+    id, channel, key = players[note + of.NOTE_ID], players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY]
+    _report(player, players, of.ENDED, id, channel, key, frame, 0.0)
+    _reported(players)
+
+
+@njit(**COMPILED)
+def _free_note(player: np.ndarray, players: np.ndarray, mixers: np.ndarray) -> int:
+    """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
+    best, best_rank, best_age = 0, 3, 0
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if players[note + of.NOTE_STATE] == of.FREE:
+            return number
+        if _over(players, note):
+            _forget(player, players, note, mixers[at.M_FRAMES])
+            return number
+        begun = False
+        for source in range(of.MOST_SOURCES):
+            address = players[note + of.NOTE_VOICES + source]
+            begun = begun or (address != 0 and _whole(address)[at.STATE] != at.WAITING)
+        rank = 2
+        if players[note + of.NOTE_RELEASED] != 0 or players[note + of.NOTE_HAS_PLACE] == 0:
+            rank = 1 if begun else 0
+        age = players[note + of.NOTE_AGE]
+        if rank < best_rank or (rank == best_rank and age < best_age):
+            best, best_rank, best_age = number, rank, age
+    for source in range(of.MOST_SOURCES):
+        address = players[_note(best) + of.NOTE_VOICES + source]
+        if address != 0:
+            _take_out(mixers, address)
+    players[of.PLAYER_CUT] += 1
+    _forget(player, players, _note(best), mixers[at.M_FRAMES])
+    return best
+
+
+@njit(**COMPILED)
+def _take_out(mixers: np.ndarray, address: int) -> None:
+    """Takes a voice out of the mixer at once; it is over."""
+    kept = 0
+    for place in range(mixers[at.M_ACTIVE]):
+        each = mixers[at.M_VOICES + place]
+        if each != address:
+            mixers[at.M_VOICES + kept] = each
+            kept += 1
+            if _whole(each)[at.BEFORE] == address:
+                _whole(each)[at.BEFORE] = 0
+    mixers[at.M_ACTIVE] = kept
+    fence()
+    _whole(address)[at.STATE] = at.OVER
+
+
+@njit(**COMPILED)
+def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: int, before: int) -> None:
+    """A note has the string of the one before, which is stopped, or whose motion goes on in it."""
+    stops = _frames(player, PLUCK_STOPS_S)
+    for source in range(of.MOST_SOURCES):
+        address, other = players[note + of.NOTE_VOICES + source], players[before + of.NOTE_VOICES + source]
+        if other == 0 or _voice_over(other):
+            continue
+        if address == 0:
+            _release(other, stops)
+            continue
+        counts = _whole(address)
+        moves = counts[at.KIND] in (at.TRUTH, at.TENSION) and _whole(other)[at.KIND] == counts[at.KIND]
+        counts[at.BEFORE] = other
+        counts[at.STOPS_IN] = stops if tables[of.TABLE_STOPS] != 0 or not moves else 0
+
+
+@njit(**COMPILED)
+def _make_room(player: np.ndarray, players: np.ndarray) -> None:
+    """Releases the oldest notes where more ring than may."""
+    while True:
+        ringing, oldest, age = 0, 0, 0
+        for number in range(of.MOST_NOTES):
+            note = _note(number)
+            free = players[note + of.NOTE_STATE] == of.FREE or players[note + of.NOTE_RELEASED] != 0
+            if free or _over(players, note):
+                continue
+            if ringing == 0 or players[note + of.NOTE_AGE] < age:
+                oldest, age = note, players[note + of.NOTE_AGE]
+            ringing += 1
+        if ringing <= players[of.PLAYER_MOST]:
+            return
+        _release_note(player, players, oldest, STOLEN_S, 0)
+
+
+@njit(**COMPILED)
+def _note_on(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, mixers: np.ndarray, event: int
+) -> None:
+    channel, key, velocity = (
+        players[event + of.EVENT_CHANNEL],
+        players[event + of.EVENT_KEY],
+        player[event + of.EVENT_VALUE],
+    )
+    frame, mode, prepared = (
+        players[event + of.EVENT_FRAME],
+        tables[of.TABLE_MODE],
+        players[event + of.EVENT_VOICES] != 0,
+    )
+    players[_channel(channel) + of.CHANNEL_PLAYS] = 1
+    place, string = (256 * (channel + 1) if mode == of.MPE else 0) + key + 1, -1
+    if _is_string(players, tables, channel):
+        place, count = 256 * (channel + 1), tables[of.TABLE_STRINGS]
+        string = channel if count > 0 and _chosen(table, count, key) != channel else -1
+    own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
+    position = amplitude_mm = width = 0.0
+    if not prepared:
+        pitch_hz = _pitch_hz(table, tables, key, player[event + of.EVENT_PITCH_HZ])
+        gain = abs(table[of.TABLE_GAINS + key * of.GAINS + 1 + string])
+        shortened = 1.0
+        if pitch_hz > 0.0 and gain >= 0.0:
+            modes, shortened = _string_of(player, players, table, tables, key, string, pitch_hz, False, own)
+        if modes < 1 or strings.overdamped(own, modes):
+            _refuse(player, players, event)
+            return
+        if gain == 0.0:
+            gain = 1.0
+        curve, soft = (
+            _value(player, players, table, tables, of.CURVE),
+            _value(player, players, table, tables, of.SOFTEST_MM),
+        )
+        share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
+        harder = _value(player, players, table, tables, of.HARDEST_MM) / soft
+        amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
+        width = _value(player, players, table, tables, of.WIDTH)
+        width += (_value(player, players, table, tables, of.WIDTH_HARD) - width) * share
+        position, slide = (
+            _value(player, players, table, tables, of.POSITION),
+            players[_channel(channel) + of.CHANNEL_SLIDE],
+        )
+        given = player[event + of.EVENT_POSITION]
+        if given > 0.0:
+            position = min(max(given, POSITION_RANGE[0]), POSITION_RANGE[1])
+        elif mode == of.MPE and slide >= 0:
+            position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
+        highest_m = _pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
+    number = _free_note(player, players, mixers)
+    note = _note(number)
+    for slot in range(of.NOTE_SLOTS):
+        players[note + slot] = 0
+    players[of.PLAYER_AGE] += 1
+    players[note + of.NOTE_STATE] = of.RINGS
+    players[note + of.NOTE_ID] = players[event + of.EVENT_ID]
+    players[note + of.NOTE_AGE] = players[of.PLAYER_AGE]
+    players[note + of.NOTE_CHANNEL] = channel
+    players[note + of.NOTE_KEY] = key
+    players[note + of.NOTE_PLACE] = place
+    players[note + of.NOTE_STRING] = string
+    players[note + of.NOTE_HELD] = 1
+    players[note + of.NOTE_PREPARED] = prepared
+    players[note + of.NOTE_MODES] = modes
+    players[note + of.NOTE_FRAME] = frame
+    player[note + of.NOTE_GAIN] = gain
+    player[note + of.NOTE_PITCH_HZ] = player[event + of.EVENT_PITCH_HZ]
+    for each in range(of.STRING):
+        player[note + of.NOTE_OWN + each] = own[each]
+        player[note + of.NOTE_STRING_NOW + each] = own[each]
+    players[note + of.NOTE_POINTS] = tables[of.TABLE_POINTS]
+    players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
+    for point in range(2):
+        player[note + of.NOTE_POINT + point] = table[of.TABLE_POINT + point]
+    for source in range(of.MOST_SOURCES):
+        address = players[event + of.EVENT_VOICES + source]
+        if not prepared and source < tables[of.TABLE_SOURCES]:
+            address = players[of.PLAYER_HERE] + 8 * _slots_of_voice(players, number, source)
+            kind, program = tables[of.TABLE_KINDS + source], tables[of.TABLE_PROGRAMS + source]
+            _make_voice(player, players, address, note, kind, program, tables[of.TABLE_VELOCITY], highest_m)
+            voice, begun = _at(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
+            voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
+        players[note + of.NOTE_VOICES + source] = address
+    for each in range(of.MOST_NOTES):
+        before = _note(each)
+        has_place = players[before + of.NOTE_STATE] == of.RINGS and players[before + of.NOTE_HAS_PLACE] != 0
+        if has_place and players[before + of.NOTE_PLACE] == place:
+            players[before + of.NOTE_HAS_PLACE] = 0
+            _follow(player, players, tables, note, before)
+    players[note + of.NOTE_HAS_PLACE] = 1
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address == 0:
+            continue
+        _whole(address)[at.BEGIN_AT] = frame
+        _at(address)[at.STRUCK_S] = player[event + of.EVENT_STRUCK_S]
+        if mixers[at.M_ACTIVE] < at.MOST_VOICES:
+            mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address
+            mixers[at.M_ACTIVE] += 1
+        else:
+            _whole(address)[at.STATE] = at.OVER
+    _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
+    _make_room(player, players)
+    slot = _report(player, players, of.BEGAN, players[event + of.EVENT_ID], channel, key, frame, velocity)
+    players[slot + of.REPORT_STRING] = string
+    players[slot + of.REPORT_TABLE] = tables[of.TABLE_SERIAL]
+    players[slot + of.REPORT_MODES] = modes
+    players[slot + of.REPORT_NOTE] = number
+    player[slot + of.REPORT_POSITION] = position
+    player[slot + of.REPORT_AMPLITUDE_MM] = amplitude_mm
+    player[slot + of.REPORT_WIDTH] = width
+    player[slot + of.REPORT_GAIN] = gain
+    for each in range(of.STRING):
+        player[slot + of.REPORT_OWN + each] = player[note + of.NOTE_OWN + each]
+    _reported(players)
+
+
+@njit(**COMPILED)
+def _note_off(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    channel: int,
+    key: int,
+    frame: int,
+    now: int,
+) -> None:
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        same = players[note + of.NOTE_KEY] == key and players[note + of.NOTE_CHANNEL] == channel
+        if same and players[note + of.NOTE_HELD] != 0 and _sounds(players, note):
+            players[note + of.NOTE_HELD] = 0
+            players[note + of.NOTE_KEPT] = _pedal(players, tables[of.TABLE_MODE], channel)
+            _damp(player, players, table, tables, number, frame, now)
+
+
+# Controllers
+
+
+@njit(**COMPILED)
+def _damp_unkept(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, frame: int, now: int
+) -> None:
+    """Puts the damper on strings that a pedal kept, and keeps no longer."""
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if players[note + of.NOTE_KEPT] == 0 or not _sounds(players, note):
+            continue
+        if not _pedal(players, tables[of.TABLE_MODE], players[note + of.NOTE_CHANNEL]):
+            players[note + of.NOTE_KEPT] = 0
+            _damp(player, players, table, tables, number, frame, now)
+
+
+@njit(**COMPILED)
+def _glide(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    channel: int,
+    seconds: float,
+    frame: int,
+    now: int,
+) -> None:
+    """Lets strings follow the wheels of a channel; -1: all, whatever has changed."""
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        moved = channel < 0 or _acts_on(tables[of.TABLE_MODE], channel, players[note + of.NOTE_CHANNEL])
+        if moved and _sounds(players, note):
+            _retune(player, players, table, tables, number, seconds, frame, now)
+
+
+@njit(**COMPILED)
+def _stop(player: np.ndarray, players: np.ndarray, seconds: float, frame: int) -> None:
+    """Lets all strings fade out, and forgets their places."""
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if players[note + of.NOTE_STATE] == of.RINGS:
+            _release_note(player, players, note, seconds, frame)
+            players[note + of.NOTE_HAS_PLACE] = 0
+
+
+@njit(**COMPILED)
+def _controller(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    channel: int,
+    number: int,
+    value: int,
+    frame: int,
+    now: int,
+) -> None:
+    mode, own, turns = tables[of.TABLE_MODE], _channel(channel), 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
+    if number == SUSTAIN:
+        players[own + of.CHANNEL_PEDAL] = value >= PEDAL_DOWN
+        _damp_unkept(player, players, table, tables, frame, now)
+    elif number == SLIDE:
+        players[own + of.CHANNEL_SLIDE] = max(value, 0)
+    elif number == MOD_WHEEL:
+        players[of.PLAYER_WHEEL] = value
+        players[of.PLAYER_WHEEL_BY] = channel
+        if turns:
+            _glide(player, players, table, tables, -1, KNOB_S, frame, now)
+    elif number == SOUND_OFF:
+        _stop(player, players, STOP_S, frame)
+    elif number == NOTES_OFF:
+        for each in range(of.MOST_NOTES):
+            note = _note(each)
+            if _is_master(mode, channel, players[note + of.NOTE_CHANNEL]) and _sounds(players, note):
+                players[note + of.NOTE_HELD] = 0
+                players[note + of.NOTE_KEPT] = 0
+                _damp(player, players, table, tables, each, frame, now)
+    elif number == RESET:
+        for each in range(of.CHANNELS):
+            if _is_master(mode, channel, each):
+                _rest(player, players, each, 0, 0)
+        if _is_master(mode, channel, players[of.PLAYER_WHEEL_BY]):
+            players[of.PLAYER_WHEEL] = 0
+        _damp_unkept(player, players, table, tables, frame, now)
+        _glide(player, players, table, tables, channel, BEND_S, frame, now)
+        if turns:
+            _glide(player, players, table, tables, -1, KNOB_S, frame, now)
+    elif _set_range(player, players, own, number, value):
+        _glide(player, players, table, tables, channel, BEND_S, frame, now)
+
+
+@njit(**COMPILED)
+def _take_table(player: np.ndarray, players: np.ndarray, address: int, frame: int, now: int) -> None:
+    """Plays another instrument, or the same with a knob turned; strings that ring glide to it.
+
+    Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
+    """
+    table, tables, before = _at(address), _whole(address), players[of.PLAYER_TABLE]
+    for which in range(of.VALUES):
+        player[of.PLAYER_VALUES + which] = table[of.TABLE_VALUES + which]
+    players[of.PLAYER_TABLE] = address
+    if before != 0 and _whole(before)[of.TABLE_INSTRUMENT] != tables[of.TABLE_INSTRUMENT]:
+        players[of.PLAYER_WHEEL] = 0
+        for each in range(of.CHANNELS):
+            own = _channel(each)
+            _rest(player, players, each, players[own + of.CHANNEL_PEDAL], players[own + of.CHANNEL_PLAYS])
+    _glide(player, players, table, tables, -1, KNOB_S, frame, now)
+    fence()
+    players[of.PLAYER_SERIAL] = tables[of.TABLE_SERIAL]  # those before may be freed from here on
+
+
+@njit(**COMPILED)
+def _cancel(player: np.ndarray, players: np.ndarray, now: int) -> None:
+    """Forgets the events whose frames are to come; but a table counts at once, for later events go by it."""
+    for place in range(players[of.PLAYER_QUEUED]):
+        event = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
+        if players[event + of.EVENT_KIND] == of.NOTE_ON:
+            _refuse(player, players, event)
+        elif players[event + of.EVENT_KIND] == of.TABLE:
+            _take_table(player, players, players[event + of.EVENT_TABLE], 0, now)
+    players[of.PLAYER_QUEUED] = 0
+
+
+# Events
+
+
+@njit(**COMPILED)
+def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: int) -> None:
+    """Plays an event now. Those of a player without a table do nothing, but for a note, which is refused."""
+    kind, frame, now = players[event + of.EVENT_KIND], players[event + of.EVENT_FRAME], mixers[at.M_FRAMES]
+    channel, key = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
+    value, address = player[event + of.EVENT_VALUE], players[of.PLAYER_TABLE]
+    if kind == of.TABLE:
+        _take_table(player, players, players[event + of.EVENT_TABLE], frame, now)
+        return
+    if kind == of.CANCEL:
+        _cancel(player, players, now)
+        return
+    if kind == of.STOP:
+        _stop(player, players, value, frame)
+        return
+    if not (0 <= channel < of.CHANNELS and 0 <= key < of.KEYS and address != 0):
+        if kind == of.NOTE_ON:
+            _refuse(player, players, event)
+        return
+    table, tables = _at(address), _whole(address)
+    if kind == of.NOTE_ON and value > 0.0:
+        _note_on(player, players, table, tables, mixers, event)
+    elif kind in (of.NOTE_ON, of.NOTE_OFF):
+        _note_off(player, players, table, tables, channel, key, frame, now)
+    elif kind == of.BEND:
+        player[_channel(channel) + of.CHANNEL_BEND] = min(max(value, -1.0), 1.0)
+        _glide(player, players, table, tables, channel, BEND_S, frame, now)
+    elif kind == of.CONTROLLER:
+        _controller(player, players, table, tables, channel, key, int(value), frame, now)
+    elif kind == of.PARAMETER and key < of.VALUES:
+        player[of.PLAYER_VALUES + key] = value
+        _glide(player, players, table, tables, -1, KNOB_S, frame, now)
+
+
+@njit(**COMPILED)
+def _queue(players: np.ndarray, event: int) -> None:
+    """Puts an event behind those of its frame and of earlier ones."""
+    place, size = players[of.PLAYER_QUEUED], of.EVENT_SLOTS
+    while place > 0:
+        before = of.PLAYER_QUEUE + (place - 1) * size
+        if players[before + of.EVENT_FRAME] <= players[event + of.EVENT_FRAME]:
+            break
+        for each in range(size):
+            players[before + size + each] = players[before + each]
+        place -= 1
+    for each in range(size):
+        players[of.PLAYER_QUEUE + place * size + each] = players[event + each]
+    players[of.PLAYER_QUEUED] += 1
+
+
+@njit(**COMPILED)
+def _tend(player: np.ndarray, players: np.ndarray, now: int) -> None:
+    """Reports notes that have ended."""
+    for number in range(of.MOST_NOTES):
+        if players[_note(number) + of.NOTE_STATE] == of.RINGS and _over(players, _note(number)):
+            _forget(player, players, _note(number), now)
+
+
+@njit(**COMPILED)
+def _hear(player: np.ndarray, players: np.ndarray) -> None:
+    """Lets notes follow the gains of sources and the listening points."""
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if players[note + of.NOTE_STATE] == of.RINGS and players[note + of.NOTE_PREPARED] == 0:
+            for source in range(of.MOST_SOURCES):
+                address = players[note + of.NOTE_VOICES + source]
+                if address != 0:
+                    wanted = player[note + of.NOTE_GAIN] * player[of.PLAYER_SOURCE_GAINS + source]
+                    _at(address)[at.WANTED_GAIN] = wanted
+            _listen(player, players, note)
+
+
+@njit(**COMPILED)
+def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
+    """Lets a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
+    table, tables = _at(players[of.PLAYER_TABLE]), _whole(players[of.PLAYER_TABLE])
+    moved = players[note + of.NOTE_SOLO] != tables[of.TABLE_SOLO]
+    for point in range(2):
+        moved = moved or player[note + of.NOTE_POINT + point] != table[of.TABLE_POINT + point]
+    if not moved or players[note + of.NOTE_POINTS] != tables[of.TABLE_POINTS]:
+        return
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address != 0:
+            counts = _whole(address)
+            if counts[at.NEXT_WEIGHTS] != 0 or counts[at.VELOCITY] != tables[of.TABLE_VELOCITY]:
+                return
+    players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
+    for point in range(2):
+        player[note + of.NOTE_POINT + point] = table[of.TABLE_POINT + point]
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address != 0:
+            _weigh(player, players, _at(address), 1, note)
+            _whole(address)[at.WEIGHTS_FADED] = 0
+            _whole(address)[at.NEXT_WEIGHTS] = 1
+
+
+@njit(**COMPILED)
+def play(player_address: int, mixer_address: int) -> None:
+    """Plays all events that are due in the mixer's next quantum, before it is rendered."""
+    player, players, mixers = _at(player_address), _whole(player_address), _whole(mixer_address)
+    now, pushed = mixers[at.M_FRAMES], players[of.PLAYER_PUSHED]
+    fence()
+    _tend(player, players, now)
+    while players[of.PLAYER_TAKEN] < pushed:
+        event = of.PLAYER_EVENTS + players[of.PLAYER_TAKEN] % of.EVENTS * of.EVENT_SLOTS
+        if players[event + of.EVENT_FRAME] <= now or players[event + of.EVENT_KIND] == of.CANCEL:
+            _handle(player, players, mixers, event)
+        elif players[of.PLAYER_QUEUED] < of.QUEUED:
+            _queue(players, event)
+        else:
+            break
+        fence()
+        players[of.PLAYER_TAKEN] += 1
+    done = 0
+    while done < players[of.PLAYER_QUEUED]:
+        event = of.PLAYER_QUEUE + done * of.EVENT_SLOTS
+        if players[event + of.EVENT_FRAME] >= now + at.QUANTUM:
+            break
+        _handle(player, players, mixers, event)
+        done += 1
+    if done > 0:
+        players[of.PLAYER_QUEUED] -= done
+        for each in range(players[of.PLAYER_QUEUED] * of.EVENT_SLOTS):
+            players[of.PLAYER_QUEUE + each] = players[of.PLAYER_QUEUE + done * of.EVENT_SLOTS + each]
+    _hear(player, players)
+
+
+@njit(**COMPILED)
+def begin(player_address: int) -> None:
+    """Puts all wheels and pedals of a new player at rest."""
+    player, players = _at(player_address), _whole(player_address)
+    players[of.PLAYER_HERE] = player_address
+    for each in range(of.CHANNELS):
+        _rest(player, players, each, 0, 0)

@@ -1,0 +1,189 @@
+"""What lies where in what is played: events, an instrument's table, a player with its notes, and its reports.
+
+Flat arrays of eight-byte numbers as in `layout`. A player and a table hold no reference to Python: a table is
+written by whoever prepares it, then handed over by its address, and only read from then on.
+"""
+
+from __future__ import annotations
+
+from engine.kernels import layout as at
+
+HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
+MOST_MODES = 99  # of a key's string: the shipped model's grid holds no more
+MOST_SLACKENED = 5  # keys by which a guitar's string may be tuned lower than the set's
+
+# A string: the fields of `StringParameters`, in their order
+LENGTH, AREA, MOMENT, DENSITY, MODULUS, D1, D3, TENSION = range(8)
+STRING = 8
+# Multipliers of a string, the first of an instrument's values
+STIFFNESS, DECAY, BRIGHTNESS_DECAY, MODULUS_FACTOR, DENSITY_FACTOR, GAUGE, TENSION_FACTOR, LENGTH_FACTOR = range(8)
+KNOBS = 8
+# An instrument's values, which events and the modulation wheel may change
+POSITION, WIDTH, WIDTH_HARD, SOFTEST_MM, HARDEST_MM, CURVE, RELEASE_S, BEND_SEMITONES = range(KNOBS, KNOBS + 8)
+VALUES = KNOBS + 8
+
+# Kinds of events
+NOTE_ON, NOTE_OFF, BEND, CONTROLLER, PRESSURE, PARAMETER, TABLE, CANCEL, STOP = range(9)
+# Slots of an event (W: whole number, R: real)
+EVENT_FRAME = 0  # W of the mixer, at which it counts; 0: at once
+EVENT_KIND = 1  # W
+EVENT_CHANNEL = 2  # W 0 … 16
+EVENT_KEY = 3  # W of a note; the number of a controller, or of one of the values
+EVENT_VALUE = 4  # R velocity, bend in -1 … 1, value of a controller or a parameter, seconds of a stop
+EVENT_ID = 5  # W which reports of a note carry
+EVENT_POSITION = 6  # R of the pluck; not a number: the instrument's
+EVENT_PITCH_HZ = 7  # R not a number: the key's
+EVENT_TABLE = 8  # W address of a table
+EVENT_STRUCK_S = 9  # R the device clock's time of the gesture
+EVENT_VOICES = 10  # W four addresses of voices that were prepared; 0: none
+MOST_SOURCES = 4
+EVENT_SLOTS = 16
+
+# Slots of an instrument's table
+POLY, GUITAR, MPE = 0, 1, 2
+GAUSSIAN, TRIANGULAR, RAISED_COSINE = 0, 1, 2
+BY_TENSION, BY_LENGTH = 0, 1
+KEYS = 128
+GUITAR_STRINGS = 8  # at most, of a guitar that sends MIDI
+GAINS = 1 + GUITAR_STRINGS  # of a key: on the string that it chooses, and on each of the first strings
+TABLE_SERIAL = 0  # W rises from table to table
+TABLE_INSTRUMENT = 1  # W the same where only knobs were turned
+TABLE_MODE = 2  # W
+TABLE_LOW = 3  # W lowest key
+TABLE_HIGH = 4  # W
+TABLE_STRINGS = 5  # W of a set; 0: one string is fretted for all keys
+TABLE_SHAPE = 6  # W of plucks
+TABLE_STOPS = 7  # W whether a pluck stops its string, or is added to its motion
+TABLE_LET_RING = 8  # W
+TABLE_BEND_BY = 9  # W
+TABLE_POINTS = 10  # W listening points, 1 or 2
+TABLE_POINT = 11  # R two
+TABLE_VELOCITY = 13  # W whether the pick-up senses velocity
+TABLE_SOLO = 14  # W the mode that alone is heard; 0: all are
+TABLE_WHEEL = 15  # W which of the values the modulation wheel turns; -1: none
+TABLE_WHEEL_GOAL = 16  # R where it leads
+TABLE_GRID = 17  # W points of the grid on which plucks have their shape
+TABLE_SOURCES = 18  # W voices of a note
+TABLE_KINDS = 19  # W four
+TABLE_PROGRAMS = 23  # W four addresses
+TABLE_VALUES = 32  # R
+TABLE_PITCHES = TABLE_VALUES + VALUES  # R of keys in Hz; 0: silent
+TABLE_GAINS = TABLE_PITCHES + KEYS  # R (KEYS, GAINS); below 0: a guess; 0: none is known; not a number: impossible
+TABLE_OPEN = TABLE_GAINS + KEYS * GAINS  # R (strings, OPEN_SLOTS), the highest string first
+OPEN_NOTE = 0  # R key of the whole string
+OPEN_HZ = 1  # R its pitch
+OPEN_STRING = 2  # R
+OPEN_SLOTS = OPEN_STRING + STRING
+MOST_STRINGS = 128
+TABLE_SINES = TABLE_OPEN + MOST_STRINGS * OPEN_SLOTS  # R sin(π k / (grid - 1)), k below 2 (grid - 1)
+
+
+def table_slots(grid_points: int) -> int:
+    """Of a table for plucks on a grid of so many points."""
+    return TABLE_SINES + 2 * (grid_points - 1)
+
+
+# Slots of a channel
+CHANNELS = 17  # of MIDI, then the keys of the computer and the screen
+FIRST, ON_SCREEN = 0, 16
+CHANNEL_BEND = 0  # R
+CHANNEL_PEDAL = 1  # W
+CHANNEL_SLIDE = 2  # W 0 … 127; -1: never moved
+CHANNEL_RANGE = 3  # R semitones; below 0: the instrument's
+CHANNEL_PLAYS = 4  # W whether a note has come
+CHANNEL_COARSE = 5  # W the registered parameter that is chosen
+CHANNEL_FINE = 6  # W
+CHANNEL_SLOTS = 8
+
+# Slots of a note
+FREE, RINGS = 0, 1
+NOTE_STATE = 0  # W
+NOTE_ID = 1  # W of its event
+NOTE_AGE = 2  # W rises from note to note
+NOTE_CHANNEL = 3  # W
+NOTE_KEY = 4  # W
+NOTE_PLACE = 5  # W which string of the instrument it is
+NOTE_STRING = 6  # W on which of a set it is played, from the highest, 0; -1: the key chooses
+NOTE_HELD = 7  # W whether its key is down
+NOTE_KEPT = 8  # W whether the pedal was down as it was released
+NOTE_DAMPED = 9  # W
+NOTE_HAS_PLACE = 10  # W whether it is the latest of its place
+NOTE_RELEASED = 11  # W whether it fades out: it made room, or was stopped
+NOTE_PREPARED = 12  # W whether its voices were built elsewhere
+NOTE_MODES = 13  # W
+NOTE_GAIN = 14  # R
+NOTE_PITCH_HZ = 15  # R given with it; not a number: the key's
+NOTE_POINTS = 16  # W of the points where it is heard, or goes to be heard
+NOTE_POINT = 17  # R two
+NOTE_SOLO = 19  # W
+NOTE_VOICES = 20  # W four addresses; 0: none
+NOTE_FRAME = 24  # W at which it was to begin; 0: at once
+NOTE_OWN = 32  # R its string as its key had it when it was struck
+NOTE_STRING_NOW = NOTE_OWN + STRING  # R with bends, slides, dampers and knobs
+NOTE_SLOTS = NOTE_STRING_NOW + STRING
+MOST_NOTES = 128
+
+# Slots of a report
+BEGAN, ENDED, REFUSED = 0, 1, 2
+REPORT_KIND = 0  # W
+REPORT_ID = 1  # W
+REPORT_CHANNEL = 2  # W
+REPORT_KEY = 3  # W
+REPORT_FRAME = 4  # W of the mixer
+REPORT_VELOCITY = 5  # R
+REPORT_STRING = 6  # W
+REPORT_TABLE = 7  # W serial of the table
+REPORT_POSITION = 8  # R of the pluck
+REPORT_AMPLITUDE_MM = 9  # R
+REPORT_WIDTH = 10  # R
+REPORT_GAIN = 11  # R
+REPORT_MODES = 12  # W
+REPORT_NOTE = 13  # W which of the notes it is
+REPORT_OWN = 16  # R its string
+REPORT_SLOTS = REPORT_OWN + STRING
+
+# Slots of a player; its voices follow
+EVENTS = 1024
+QUEUED = 1024
+REPORTS = 512
+PLAYER_TABLE = 0  # W address; 0: nothing is played
+PLAYER_SERIAL = 1  # W of that table: all before are free
+PLAYER_MOST = 2  # W notes that ring at once; the oldest makes room
+PLAYER_MODES = 3  # W a voice has at most
+PLAYER_PUSHED = 4  # W events that were handed over
+PLAYER_TAKEN = 5  # W and taken
+PLAYER_QUEUED = 6  # W of them, whose frame is to come
+PLAYER_REPORTED = 7  # W reports so far
+PLAYER_WHEEL = 8  # W the modulation wheel, 0 … 127
+PLAYER_WHEEL_BY = 9  # W the channel that moved it
+PLAYER_AGE = 10  # W of the youngest note
+PLAYER_CUT = 11  # W notes that were cut, for all places of notes were taken
+PLAYER_RATE = 12  # R frames a second
+PLAYER_HERE = 13  # W its own address
+PLAYER_SOURCE_GAINS = 16  # R four
+PLAYER_VALUES = 24  # R
+PLAYER_CHANNELS = PLAYER_VALUES + VALUES
+PLAYER_EVENTS = PLAYER_CHANNELS + CHANNELS * CHANNEL_SLOTS
+PLAYER_QUEUE = PLAYER_EVENTS + EVENTS * EVENT_SLOTS
+PLAYER_REPORTS = PLAYER_QUEUE + QUEUED * EVENT_SLOTS
+PLAYER_NOTES = PLAYER_REPORTS + REPORTS * REPORT_SLOTS
+PLAYER_STRINGS = PLAYER_NOTES + MOST_NOTES * NOTE_SLOTS  # R four, for a moment
+PLAYER_AMPLITUDES = PLAYER_STRINGS + 4 * STRING  # R of a pluck's modes, for a moment
+PLAYER_PULLED = PLAYER_AMPLITUDES + at.MOST_MODES  # R of a pluck on its grid, for a moment
+MOST_GRID = 1024
+PLAYER_VOICES = PLAYER_PULLED + MOST_GRID
+BLOCKS = 4  # of modes that a voice is to have
+
+
+def block_slots(modes: int) -> int:
+    return at.B_HEADER + 4 * modes
+
+
+def voice_slots(modes: int) -> int:
+    """Of a voice with so many modes, and of the blocks of modes that it is to have."""
+    return at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM + at.TRUTH_ROWS * modes + BLOCKS * block_slots(modes)
+
+
+def player_slots(modes: int) -> int:
+    """Of a player whose voices have at most so many modes."""
+    return PLAYER_VOICES + MOST_NOTES * MOST_SOURCES * voice_slots(modes)

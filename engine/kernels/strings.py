@@ -1,0 +1,147 @@
+"""The string of a key and how a bend, a slide, a damper or a knob changes it, in closed form.
+
+A string is a row of eight numbers, the fields of `StringParameters`. Pitch is that of the first partial of a quiet
+pluck, √(ω₁² - σ₁²)/2π. Without fast mathematics: whoever computes a string again finds the same numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from engine import bounds
+from engine.kernels import playing_layout as of
+from engine.kernels.compiled import COMPILED
+
+EXACT = {**COMPILED, "fastmath": False}
+_BOUNDS = tuple(bounds.STRING.values())
+_MAY_BE_ZERO = (of.MOMENT, of.MODULUS, of.D1, of.D3)
+ROUNDS = 4  # σ₁ depends on the length, a little
+
+
+@njit(**EXACT)
+def possible(string: np.ndarray) -> bool:
+    """Whether all numbers are finite and within bounds: as `StringParameters` checks them."""
+    for place in range(of.STRING):
+        value = string[place]
+        low, high = _BOUNDS[place]
+        if not low <= value <= high or (value == 0.0 and place not in _MAY_BE_ZERO):
+            return False
+    return True
+
+
+@njit(**EXACT)
+def mass(string: np.ndarray) -> float:
+    """ρA in kg/m."""
+    return string[of.DENSITY] * string[of.AREA]
+
+
+@njit(**EXACT)
+def decay_rate(string: np.ndarray, mode: int) -> float:
+    """σ in 1/s."""
+    eta = mode * math.pi / string[of.LENGTH]
+    return (string[of.D1] + string[of.D3] * eta * eta) / (2 * mass(string))
+
+
+@njit(**EXACT)
+def omega_squared(string: np.ndarray, mode: int) -> float:
+    """ω² in 1/s²."""
+    eta = mode * math.pi / string[of.LENGTH]
+    squared = eta * eta
+    return (string[of.MODULUS] * string[of.MOMENT] * squared * squared + string[of.TENSION] * squared) / mass(string)
+
+
+@njit(**EXACT)
+def modes_below(string: np.ndarray, frequency_hz: float) -> int:
+    """The number of modes whose undamped frequency lies below: as `StringParameters.modes_below`."""
+    omega = 2 * math.pi * frequency_hz
+    count = int(string[of.LENGTH] / math.pi * math.sqrt(_eta_squared(string, mass(string) * omega * omega)))
+    while count > 0 and math.sqrt(omega_squared(string, count)) >= omega:
+        count -= 1
+    while math.sqrt(omega_squared(string, count + 1)) < omega:
+        count += 1
+    return count
+
+
+@njit(**EXACT)
+def _eta_squared(string: np.ndarray, load: float) -> float:
+    """η² of EIη⁴ + T₀η² = load, without the difference of near numbers."""
+    tension, bending = string[of.TENSION], string[of.MODULUS] * string[of.MOMENT]
+    return 2 * load / (tension + math.sqrt(tension * tension + 4 * bending * load))
+
+
+@njit(**EXACT)
+def pitch_hz(string: np.ndarray) -> float:
+    """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
+    sigma = decay_rate(string, 1)
+    return math.sqrt(max(0.0, omega_squared(string, 1) - sigma * sigma)) / (2 * math.pi)
+
+
+@njit(**EXACT)
+def turned(string: np.ndarray, knobs: np.ndarray, out: np.ndarray) -> None:
+    """The string with multipliers, as `app.patches.patch.Knobs` says; pitch and decay rates stay, nearly."""
+    area = knobs[of.GAUGE] ** 2
+    heavier = area * knobs[of.DENSITY_FACTOR]
+    out[of.LENGTH] = string[of.LENGTH] * knobs[of.LENGTH_FACTOR] * math.sqrt(knobs[of.TENSION_FACTOR])
+    out[of.AREA] = string[of.AREA] * area
+    out[of.MOMENT] = string[of.MOMENT] * knobs[of.STIFFNESS] * knobs[of.GAUGE] ** 4
+    out[of.DENSITY] = string[of.DENSITY] * knobs[of.DENSITY_FACTOR]
+    out[of.MODULUS] = string[of.MODULUS] * knobs[of.MODULUS_FACTOR]
+    out[of.D1] = string[of.D1] * knobs[of.DECAY] * heavier
+    out[of.D3] = string[of.D3] * knobs[of.BRIGHTNESS_DECAY] * heavier
+    out[of.TENSION] = string[of.TENSION] * heavier * knobs[of.TENSION_FACTOR] * knobs[of.LENGTH_FACTOR] ** 2
+
+
+@njit(**EXACT)
+def fretted(string: np.ndarray, wanted_hz: float) -> float:
+    """The length in m that gives the string a pitch."""
+    sigma, squared = decay_rate(string, 1), 0.0
+    for _ in range(ROUNDS):
+        load = mass(string) * ((2 * math.pi * wanted_hz) ** 2 + sigma * sigma)
+        squared = _eta_squared(string, load)
+        sigma = (string[of.D1] + string[of.D3] * squared) / (2 * mass(string))
+    return math.pi / math.sqrt(squared)
+
+
+@njit(**EXACT)
+def bent(string: np.ndarray, ratio: float) -> float:
+    """The tension in N that raises the string's pitch by a ratio; not above 0 where there is none."""
+    if ratio == 1.0:
+        return string[of.TENSION]
+    eta, sigma = math.pi / string[of.LENGTH], decay_rate(string, 1)
+    wanted = ratio * 2 * math.pi * pitch_hz(string)
+    bending, squared = string[of.MODULUS] * string[of.MOMENT], eta * eta
+    return (mass(string) * (wanted * wanted + sigma * sigma) - bending * squared * squared) / squared
+
+
+@njit(**EXACT)
+def slid(string: np.ndarray, ratio: float) -> float:
+    """The length in m that raises the string's pitch by a ratio."""
+    return string[of.LENGTH] if ratio == 1.0 else fretted(string, ratio * pitch_hz(string))
+
+
+@njit(**EXACT)
+def damped(string: np.ndarray, t60_s: float) -> float:
+    """d₁ with which each partial decays by 60 dB more in so many seconds."""
+    return string[of.D1] + 2 * mass(string) * math.log(1000.0) / t60_s
+
+
+@njit(**EXACT)
+def overdamped(string: np.ndarray, modes: int) -> bool:
+    """Whether the first or the last mode does not swing; otherwise all do."""
+    first = decay_rate(string, 1) < math.sqrt(omega_squared(string, 1))
+    return not (first and decay_rate(string, modes) < math.sqrt(omega_squared(string, modes)))
+
+
+@njit(**EXACT)
+def rows(string: np.ndarray, modes: int, out: np.ndarray) -> None:
+    """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,)."""
+    stiffness = string[of.MODULUS] * string[of.AREA] / (4 * mass(string))
+    for mode in range(modes):
+        eta = (mode + 1) * (math.pi / string[of.LENGTH])
+        out[mode] = omega_squared(string, mode + 1)
+        out[modes + mode] = decay_rate(string, mode + 1)
+        out[2 * modes + mode] = stiffness * eta * eta
+        out[3 * modes + mode] = eta * eta

@@ -1,0 +1,321 @@
+"""The compiled player's memory, as Python sees it: events go in, reports and levels come out.
+
+Any thread may give events; the mixer's thread takes them up with its next quantum, and neither locks nor allocates.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import threading
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels.memory import publish
+from engine.resonators.string import StringParameters
+from engine.voices.mixer import Mixer
+from engine.voices.voice import Voice
+
+NONE = math.nan
+LOG_DB = 20 / math.log(10)
+
+# An event and a report as records: the slots of `playing_layout`, in their order
+EVENT = np.dtype(
+    [
+        *((name, np.int64) for name in ("frame", "kind", "channel", "key")),
+        ("value", np.float64),
+        ("id", np.int64),
+        ("position", np.float64),
+        ("pitch_hz", np.float64),
+        ("table", np.int64),
+        ("struck_s", np.float64),
+        ("voices", np.int64, of.MOST_SOURCES),
+        ("spare", np.int64, of.EVENT_SLOTS - of.EVENT_VOICES - of.MOST_SOURCES),
+    ]
+)
+REPORT = np.dtype(
+    [
+        *((name, np.int64) for name in ("kind", "id", "channel", "key", "frame")),
+        ("velocity", np.float64),
+        ("string", np.int64),
+        ("table", np.int64),
+        *((name, np.float64) for name in ("position", "amplitude_mm", "width", "gain")),
+        *((name, np.int64) for name in ("modes", "note")),
+        ("spare", np.int64, of.REPORT_OWN - of.REPORT_NOTE - 1),
+        ("own", np.float64, of.STRING),
+    ]
+)
+REPORTED = tuple(name for name in REPORT.fields or () if name not in ("spare", "own"))
+assert EVENT.itemsize == 8 * of.EVENT_SLOTS
+assert REPORT.itemsize == 8 * of.REPORT_SLOTS
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """An instrument as the kernels read it, with the memory that it points to.
+
+    Attributes:
+        memory: see `playing_layout`.
+        programs: of the sources of its notes.
+    """
+
+    memory: NDArray[np.float64]
+    programs: tuple[NDArray[np.float64], ...] = ()
+
+    @property
+    def address(self) -> int:
+        return int(self.memory.ctypes.data)
+
+    @property
+    def serial(self) -> int:
+        return int(self.memory.view(np.int64)[of.TABLE_SERIAL])
+
+
+@dataclass(frozen=True)
+class Report:
+    """What became of a note.
+
+    Attributes:
+        kind: BEGAN, ENDED or REFUSED of `playing_layout`; for others than BEGAN only the first five count.
+        id: of its event.
+        frame: of the mixer.
+        string: on which of a set it is played, from the highest, 0; -1: the key chooses.
+        table: serial of its instrument's table.
+        position, amplitude_mm, width: of the pluck.
+        parameters: of its string as its key had it; None for prepared voices.
+        note: which of the player's notes it is.
+    """
+
+    kind: int
+    id: int
+    channel: int
+    key: int
+    frame: int
+    velocity: float = 0.0
+    string: int = -1
+    table: int = 0
+    position: float = 0.0
+    amplitude_mm: float = 0.0
+    width: float = 0.0
+    gain: float = 0.0
+    modes: int = 0
+    note: int = 0
+    parameters: StringParameters | None = None
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """A note that rings.
+
+    Attributes:
+        level_db: of its loudest voice, in dB of full scale.
+        seconds: how long it has been ringing, as far as the device was given it.
+    """
+
+    id: int
+    channel: int
+    key: int
+    level_db: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Where the wheels and pedals of a channel stand; `slide` and `range_semitones`: None where never moved."""
+
+    bend: float
+    pedal: bool
+    slide: int | None
+    range_semitones: float | None
+
+
+@dataclass(eq=False)
+class _Prepared:
+    """Voices of a note that were built elsewhere, whose memory is in use."""
+
+    voices: tuple[Voice, ...] = field(default_factory=tuple)
+
+    @property
+    def over(self) -> bool:
+        return all(voice.over for voice in self.voices)
+
+
+class CompiledPlayer:
+    """Plays the instrument of its latest table in the mixer that it is given to.
+
+    Args:
+        modes: that a voice has at most.
+        most_notes: that ring at once; the oldest makes room.
+    """
+
+    def __init__(self, rate_hz: int, modes: int = of.MOST_MODES, most_notes: int = 40) -> None:
+        from engine.kernels.player import begin  # Numba only when it is needed
+
+        self.rate_hz = rate_hz
+        self.memory = memory = np.zeros(of.player_slots(modes))
+        self._counts = counts = memory.view(np.int64)
+        self._lock = threading.Lock()
+        self._ids = itertools.count(1)
+        self._backlog: deque[tuple[object, ...]] = deque()  # for which the ring has no room
+        self._tables: deque[Table] = deque()  # which the kernel may be reading, or will
+        self._prepared: list[_Prepared] = []
+        self._read = 0
+        memory[of.PLAYER_RATE] = rate_hz
+        counts[of.PLAYER_MODES], counts[of.PLAYER_MOST] = modes, most_notes
+        memory[of.PLAYER_SOURCE_GAINS : of.PLAYER_SOURCE_GAINS + of.MOST_SOURCES] = 1.0
+        begin(self.address)
+        self._events = self._records(of.PLAYER_EVENTS, of.EVENTS, EVENT)
+        self._reports = self._records(of.PLAYER_REPORTS, of.REPORTS, REPORT)
+
+    def _records(self, first: int, count: int, kind: np.dtype[np.void]) -> NDArray[np.void]:
+        return self.memory[first : first + count * kind.itemsize // 8].view(kind)
+
+    @property
+    def address(self) -> int:
+        return int(self.memory.ctypes.data)
+
+    # Events
+
+    def give(
+        self,
+        kind: int,
+        channel: int = 0,
+        key: int = 0,
+        value: float = 0.0,
+        frame: int = 0,
+        position: float = NONE,
+        pitch_hz: float = NONE,
+        struck_s: float = 0.0,
+        voices: Sequence[Voice] = (),
+    ) -> int:
+        """Hands an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
+
+        Args:
+            kind: one of `playing_layout`, as all that follows.
+            frame: of the mixer, at which it counts; 0: at once.
+            voices: of a note, which were built elsewhere, with their gains; they are in use until they are over.
+        """
+        addresses = [voice.address for voice in voices] + [0] * (of.MOST_SOURCES - len(voices))
+        with self._lock:
+            number = next(self._ids)
+            if voices:
+                self._prepared = [each for each in self._prepared if not each.over]
+                self._prepared.append(_Prepared(tuple(voices)))
+            self._push((frame, kind, channel, key, value, number, position, pitch_hz, 0, struck_s, addresses, 0))
+        return number
+
+    def take(self, table: Table, frame: int = 0) -> None:
+        """Plays another table from a frame on; strings that ring glide to it. Any thread."""
+        with self._lock:
+            self._tables.append(table)
+            while self._tables[0].serial < int(self._counts[of.PLAYER_SERIAL]):
+                self._tables.popleft()
+            self._push((frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0))
+
+    def _push(self, record: tuple[object, ...]) -> None:
+        self._backlog.append(record)
+        self._flush()
+
+    def _flush(self) -> None:
+        """Hands over what waits, as far as the ring has room. Under the lock."""
+        counts = self._counts
+        pushed = int(counts[of.PLAYER_PUSHED])
+        room = of.EVENTS - (pushed - int(counts[of.PLAYER_TAKEN]))
+        for number in range(min(room, len(self._backlog))):
+            self._events[(pushed + number) % of.EVENTS] = self._backlog.popleft()
+            publish(counts, of.PLAYER_PUSHED, pushed + number + 1)
+
+    @property
+    def waiting(self) -> int:
+        """Events that are still to be played."""
+        with self._lock:
+            self._flush()
+            counts = self._counts
+            ring = int(counts[of.PLAYER_PUSHED] - counts[of.PLAYER_TAKEN])
+            return ring + int(counts[of.PLAYER_QUEUED]) + len(self._backlog)
+
+    def catch_up(self, mixer: Mixer) -> None:
+        """Plays what is due in the mixer's next quantum now, where no device takes its frames."""
+        from engine.kernels.player import play
+
+        with self._lock:
+            while True:
+                self._flush()
+                play(self.address, mixer.address)
+                if not self._backlog or self._counts[of.PLAYER_QUEUED] == of.QUEUED:
+                    return
+
+    def set_source_gains(self, gains: Iterable[float]) -> None:
+        """The factor of each source, of notes whose voices are the player's own; those that ring fade to it."""
+        for source, gain in enumerate(gains):
+            self.memory[of.PLAYER_SOURCE_GAINS + source] = gain
+
+    # What there is
+
+    def reports(self) -> list[Report]:
+        """Those since this was asked for the last time; of very many only the latest. One thread asks."""
+        with self._lock:
+            self._flush()
+            self._prepared = [each for each in self._prepared if not each.over]
+        total, found = int(self._counts[of.PLAYER_REPORTED]), []
+        for number in range(max(self._read, total - of.REPORTS), total):
+            record = self._reports[number % of.REPORTS].copy()
+            if int(self._counts[of.PLAYER_REPORTED]) - number >= of.REPORTS:
+                continue  # written anew meanwhile
+            known = {name: record[name].item() for name in REPORTED}
+            struck = record["kind"] == of.BEGAN and record["modes"] > 0
+            parameters = StringParameters(*record["own"].tolist()) if struck else None
+            found.append(Report(**known, parameters=parameters))
+        self._read = total
+        return found
+
+    def ringing(self) -> list[Ringing]:
+        """The notes that have their places and ring. Any thread; the levels are those of the latest quantum."""
+        found = []
+        stride = of.voice_slots(int(self._counts[of.PLAYER_MODES]))
+        notes = self._counts[of.PLAYER_NOTES : of.PLAYER_NOTES + of.MOST_NOTES * of.NOTE_SLOTS].copy()
+        for number, note in enumerate(notes.reshape(of.MOST_NOTES, of.NOTE_SLOTS)):
+            if note[of.NOTE_STATE] != of.RINGS or not note[of.NOTE_HAS_PLACE]:
+                continue
+            voices = []
+            for source in range(of.MOST_SOURCES):
+                address = int(note[of.NOTE_VOICES + source])
+                own = of.PLAYER_VOICES + (number * of.MOST_SOURCES + source) * stride
+                if address == self.address + 8 * own:
+                    voices.append(self.memory[own : own + at.HEADER])
+                elif address:
+                    voices += [each for each in self._memories() if int(each.ctypes.data) == address]
+            alive = [v for v in voices if v.view(np.int64)[at.STATE] in (at.WAITING, at.SOUNDING)]
+            if alive:
+                level = max(float(voice[at.LOUDNESS]) for voice in alive) * LOG_DB
+                frames = max(int(voice.view(np.int64)[at.FRAME]) for voice in alive)
+                id, channel, key = (int(note[of.NOTE_ID + place]) for place in (0, 2, 3))
+                found.append(Ringing(id, channel, key, level, frames / self.rate_hz))
+        return found
+
+    def _memories(self) -> list[NDArray[np.float64]]:
+        """Of prepared voices."""
+        return [voice.memory for each in list(self._prepared) for voice in each.voices]
+
+    @property
+    def wheel(self) -> tuple[int, int]:
+        """The modulation wheel, 0 … 127, and the channel that moved it."""
+        return int(self._counts[of.PLAYER_WHEEL]), int(self._counts[of.PLAYER_WHEEL_BY])
+
+    def channel(self, number: int) -> Channel:
+        """Where wheels and pedals of a channel stand."""
+        first = of.PLAYER_CHANNELS + number * of.CHANNEL_SLOTS
+        slots, counts = (each[first : first + of.CHANNEL_SLOTS].copy() for each in (self.memory, self._counts))
+        slide, wide = int(counts[of.CHANNEL_SLIDE]), float(slots[of.CHANNEL_RANGE])
+        return Channel(
+            float(slots[of.CHANNEL_BEND]),
+            bool(counts[of.CHANNEL_PEDAL]),
+            slide if slide >= 0 else None,
+            wide if wide >= 0 else None,
+        )

@@ -1,0 +1,442 @@
+"""The compiled player against the one in Python, event for event, on rendered sound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.instrument import events
+from app.instrument.compiled import InstrumentPlayer, event_of, record_of
+from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.player import Player, Struck
+from app.instrument.strings import pitch_hz_of
+from app.instrument.table import VALUES
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import Patch, TuningChoice
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels.layout import QUANTUM
+from engine.presets import Preset
+from engine.voices import Ear, Mixer, Voice, plain_program
+
+RATE_HZ = 48_000
+GAINS = {"model": 1.0, "truth": -0.5}
+CLOSE = 1e-9
+Framed = Sequence[tuple[int, Event]]
+
+
+class Reference:
+    """The player in Python, as files were rendered by it."""
+
+    def __init__(self, patch: Patch, preset: Preset, most: int) -> None:
+        self.mixer, self._most, self._struck = Mixer(RATE_HZ, limited=False), most, list[Struck]()
+        self.player = Player(patch, preset, RATE_HZ, self._take, tuple(GAINS))
+
+    def _take(self, struck: Struck) -> None:
+        self._struck = [each for each in self._struck if not each.over]
+        for source, voice in struck.voices.items():
+            voice.start_with_gain(GAINS[source] * struck.gain)
+        self._struck.append(struck)
+        self.mixer.add(*struck.voices.values())
+        ringing = [each for each in self._struck if not self._released(each)]
+        for each in ringing[: max(0, len(ringing) - self._most)]:
+            for voice in each.voices.values():
+                voice.release(0.03)
+
+    def _released(self, struck: Struck) -> bool:
+        released = (voice.memory.view(np.int64)[at.RELEASE] > 0 for voice in struck.voices.values())
+        return any(released) or struck.over
+
+    def handle(self, event: Event, frame: int) -> None:
+        self.player.handle(event, frame)
+
+    def before(self) -> None:
+        ear = Ear(tuple(self.player.patch.pickup.points), self.player.patch.pickup.kind)
+        for struck in self._struck:
+            for voice in struck.voices.values():
+                voice.listen(ear)
+
+
+class Compiled:
+    def __init__(self, patch: Patch, preset: Preset, most: int = 40) -> None:
+        self.mixer = Mixer(RATE_HZ, limited=False)
+        self.player = InstrumentPlayer(patch, preset, RATE_HZ, GAINS, most_notes=most)
+        self.mixer.set_player(self.player.compiled)
+
+    def handle(self, event: Event, frame: int) -> None:
+        self.player.handle(event, frame)
+
+    def before(self) -> None:
+        return
+
+
+def quantum(mixer: Mixer) -> NDArray[np.float64]:
+    """The next one as it is mixed, in double precision."""
+    mixer.render(QUANTUM)
+    return mixer.memory[at.M_MIX : at.M_MIX + 2 * QUANTUM].copy()
+
+
+def rendered(stage: Reference | Compiled, played: Framed, quanta: int) -> NDArray[np.float64]:
+    """(frames, 2), events being handed over with the quantum of their frames."""
+    sound, left = [], list(played)
+    for number in range(quanta):
+        while left and left[0][0] < (number + 1) * QUANTUM:
+            frame, event = left.pop(0)
+            stage.handle(event, frame)
+        stage.before()
+        sound.append(quantum(stage.mixer))
+    return np.concatenate(sound).reshape(-1, 2)
+
+
+def difference(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Relative to the highest sample of both."""
+    highest = max(np.abs(one).max(), np.abs(other).max())
+    assert highest > 1e-4
+    return float(np.abs(one - other).max() / highest)
+
+
+def compared(patch: Patch, preset: Preset, played: Framed, quanta: int, most: int = 40) -> float:
+    reference = rendered(Reference(patch, preset, most), played, quanta)
+    return difference(rendered(Compiled(patch, preset, most), played, quanta), reference)
+
+
+@pytest.fixture(scope="session")
+def shipped() -> dict[str, Patch]:
+    return {path.stem: read_patch(path) for path in PATCHES.glob("*.json")}
+
+
+def changed(patch: Patch, **parts: object) -> Patch:
+    return Patch.model_validate({**dict(patch), **parts})
+
+
+CONTROLLERS = (
+    *(events.SUSTAIN, events.MOD_WHEEL, events.SLIDE, events.RESET, events.NOTES_OFF),
+    *(events.REGISTERED, events.FINE_REGISTERED, events.VALUE, events.FINE_VALUE, events.OTHER),
+)
+KNOBS = ("knobs.tension", "knobs.gauge", "knobs.decay", "knobs.stiffness", "damping.release_t60_s", "pluck.position")
+
+
+def drawn(patch: Patch, other: Patch, seed: int, seconds: float, count: int = 60) -> list[tuple[int, Event]]:
+    """Random events, in their order; keys are often struck again, and two events often share a frame."""
+    draw = np.random.default_rng(seed)
+    low, high = patch.range
+    keys = draw.integers(low, high + 1, 5).tolist()
+    channels = {"poly": (0, 0, 1, KEYS), "guitar": (0, 1, 2, 3, 4, 9, KEYS), "mpe": (0, 1, 2, 3, KEYS)}[patch.mode]
+    frames = np.sort(draw.integers(1, round(seconds * RATE_HZ), count))
+    frames[::7] = frames[::7] // QUANTUM * QUANTUM
+    frames = np.sort(frames)
+    present, found = patch, list[tuple[int, Event]]()
+    for number, frame in enumerate(frames.tolist()):
+        channel, kind = int(draw.choice(channels)), draw.random()
+        key, value = int(draw.choice(keys)), int(draw.integers(0, 128))
+        if number < 3 or kind < 0.4:
+            found.append((frame, NoteOn(key, max(1, value), channel)))
+        elif kind < 0.6:
+            found.append((frame, NoteOff(key, channel)))
+        elif kind < 0.75:
+            found.append((frame, Bend(float(draw.uniform(-1.2, 1.2)), channel)))
+        elif kind < 0.97:
+            number = int(draw.choice(CONTROLLERS))
+            chooses = number in (events.REGISTERED, events.FINE_REGISTERED)
+            found.append((frame, Controller(number, 0 if chooses else value, channel)))
+        elif kind < 0.98:
+            found.append((frame, Controller(events.SOUND_OFF, 0, channel)))
+        else:
+            name = str(draw.choice(KNOBS))
+            turned = present.with_value(name, present.value(name) * float(draw.uniform(0.8, 1.2)))
+            present = turned if draw.random() < 0.8 else other
+            found.append((frame, PatchTurned(present)))
+    return found
+
+
+INSTRUMENTS = [
+    ("classical_guitar", {}),  # wheel on a knob
+    ("electric_bass", {}),  # velocity
+    ("concert_harp", {}),  # rings
+    ("cimbalom", {}),  # added to the motion
+    ("felt_on_wires", {"mod_wheel": "knobs.tension"}),
+    ("guitar_in_nineteen_tones", {}),
+    ("fretless_bass", {}),  # guitar, by length, wheel on the pluck, velocity
+    ("oud", {"mod_wheel": "damping.release_t60_s"}),  # guitar
+    ("sitar", {"pluck": "stops"}),  # guitar, velocity, added
+    ("koto", {"mode": "mpe", "mod_wheel": "pluck.curve"}),
+    ("jazz_guitar", {"mode": "mpe"}),
+]
+
+
+def instrument(shipped: dict[str, Patch], name: str, parts: dict[str, object]) -> Patch:
+    patch = shipped[name]
+    if parts == {"pluck": "stops"}:
+        parts = {"pluck": patch.pluck.model_copy(update={"stops": False})}
+    return changed(patch, **parts)
+
+
+@pytest.mark.parametrize(("name", "parts"), INSTRUMENTS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_events_sound_as_by_the_player_in_python(
+    shipped: dict[str, Patch], preset: Preset, name: str, parts: dict[str, object], seed: int
+) -> None:
+    patch = instrument(shipped, name, parts)
+    played = drawn(patch, shipped["kora"], seed, 0.4)
+    assert compared(patch, preset, played, 400) < CLOSE
+
+
+def test_cancel_leaves_what_has_begun(shipped: dict[str, Patch], preset: Preset) -> None:
+    sounds = []
+    for stage in (Reference(shipped["cimbalom"], preset, 40), Compiled(shipped["cimbalom"], preset)):
+        stage.handle(NoteOn(50, 90), 0)
+        stage.handle(NoteOn(57, 90), 200)
+        for frame, key in ((5000, 50), (5003, 57), (6000, 62)):
+            stage.handle(NoteOn(key, 120), frame)
+        first = rendered(stage, (), 20)
+        stage.player.cancel()
+        sounds.append(np.concatenate([first, rendered(stage, (), 150)]))
+    assert difference(*sounds) < CLOSE
+
+
+def test_a_cancelled_note_is_reported_and_its_voices_are_over(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    number = stage.player.handle(NoteOn(60, 90), 5000)
+    voice = samples(np.ones((1000, 1), np.float32))
+    prepared = stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, 5001, voices=[voice])
+    rendered(stage, (), 2)
+    stage.player.cancel()
+    rendered(stage, (), 1)
+    assert [(each.kind, each.id) for each in stage.player.reports()] == [(of.REFUSED, number), (of.REFUSED, prepared)]
+    assert voice.over and not stage.mixer.active
+
+
+def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = changed(shipped["damped_harp"], mod_wheel="knobs.tension")
+    draw, burst = np.random.default_rng(3), list[tuple[int, Event]]()
+    for number in range(500):
+        frame = 640 + number // 8
+        if number % 10 == 0:
+            burst.append((frame, NoteOn(40 + int(draw.integers(0, 25)), 80)))
+        elif number % 10 == 5:
+            burst.append((frame, NoteOff(40 + int(draw.integers(0, 25)))))
+        elif number % 3 == 0:
+            burst.append((frame, Bend(float(draw.uniform(-1, 1)))))
+        else:
+            burst.append((frame, Controller(int(draw.choice([events.MOD_WHEEL, events.SUSTAIN])), number % 128)))
+    assert burst[0][0] // QUANTUM == burst[-1][0] // QUANTUM
+    assert compared(patch, preset, burst, 100) < CLOSE
+
+
+def test_more_notes_than_there_are_places_all_begin(shipped: dict[str, Patch], preset: Preset) -> None:
+    """The oldest are cut before they are heard."""
+    patch = changed(shipped["concert_harp"], mode="mpe")
+    stage = Compiled(patch, preset)
+    stage.player.prepare([30, 50, 70])
+    given = [stage.player.handle(NoteOn(30 + 20 * (number % 3), 80, number % 16)) for number in range(300)]
+    sound = rendered(stage, (), 40)
+    begun = [each.id for each in stage.player.reports() if each.kind == of.BEGAN]
+    assert begun == given[-len(begun) :] and len(begun) > 200
+    assert np.isfinite(sound).all()
+    assert len(stage.player.ringing()) <= 40
+
+
+def test_more_events_than_the_ring_holds_are_played_later(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    count = 2 * of.EVENTS + 500
+    for number in range(count):
+        stage.player.handle(Bend(number / count), 10 + number)
+    assert stage.player.compiled.waiting == count + 1  # with the table
+    for _ in range(count // QUANTUM + 2):
+        rendered(stage, (), 1)
+        _ = stage.player.compiled.waiting
+    assert stage.player.compiled.waiting == 0
+    assert stage.player.compiled.channel(0).bend == (count - 1) / count
+
+
+def test_the_same_events_give_the_same_samples(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = shipped["oud"]
+    played = drawn(patch, shipped["kora"], 5, 0.2)
+    one, other = (rendered(Compiled(patch, preset), played, 100) for _ in range(2))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_the_oldest_make_room(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = shipped["concert_harp"]
+    played = [(1 + 480 * number, NoteOn(30 + 3 * number, 90)) for number in range(12)]
+    assert compared(patch, preset, played, 200, most=5) < CLOSE
+
+
+# Voices that were built elsewhere
+
+
+def samples(sound: NDArray[np.float32]) -> Voice:
+    voice = Voice.of_samples(plain_program(RATE_HZ), sound)
+    voice.begin_at_once()
+    return voice
+
+
+def tone(frames: int) -> NDArray[np.float32]:
+    return (0.1 * np.sin(np.arange(frames) / 30))[:, None].astype(np.float32)
+
+
+def test_prepared_voices_sound_at_their_frame_and_end(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    number = stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, 100, voices=[samples(tone(6000))])
+    sound = rendered(stage, (), 200)[:, 0]
+    assert not sound[:100].any()
+    np.testing.assert_allclose(sound[100:5900], tone(5800)[:, 0], atol=1e-6)
+    kinds = [(each.kind, each.id, each.frame) for each in stage.player.reports()]
+    assert kinds[0] == (of.BEGAN, number, 100) and [kind for kind, *_ in kinds] == [of.BEGAN, of.ENDED]
+
+
+def test_a_prepared_voice_without_modes_fades_when_its_key_is_released(
+    shipped: dict[str, Patch], preset: Preset
+) -> None:
+    patch = shipped["jazz_guitar"]  # releases in 0.25 s
+    stage = Compiled(patch, preset)
+    stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, 0, voices=[samples(tone(90_000))])
+    sound = rendered(stage, [(6400, NoteOff(60))], 400)[:, 0]
+    middle = 6400 + 6000
+    assert np.abs(sound[:6400]).max() == pytest.approx(0.1, rel=0.01)
+    assert np.abs(sound[middle - 200 : middle + 200]).max() == pytest.approx(0.05, rel=0.1)
+    assert not sound[6400 + 12_064 :].any()
+
+
+def test_a_prepared_voice_is_stopped_by_what_has_its_place_next(shipped: dict[str, Patch], preset: Preset) -> None:
+    for patch in (shipped["koto"], shipped["cimbalom"]):  # a voice without modes cannot be added to
+        stage = Compiled(patch, preset)
+        for frame in (0, 6400):
+            stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, frame, voices=[samples(tone(20_000))])
+        sound = rendered(stage, (), 150)[:, 0]
+        np.testing.assert_allclose(sound[6400 + 300 : 9000], tone(2600)[300:, 0], atol=1e-6)
+
+
+def test_prepared_voices_with_modes_are_damped_like_the_players_own(
+    shipped: dict[str, Patch], preset: Preset
+) -> None:
+    patch = shipped["classical_guitar"]
+    own = Compiled(patch, preset)
+    reference = Player(patch, preset, RATE_HZ, lambda struck: None, tuple(GAINS))
+    struck = reference.handle(NoteOn(52, 90))
+    assert struck is not None
+    for source, voice in struck.voices.items():
+        voice.start_with_gain(GAINS[source] * struck.gain)
+    prepared = Compiled(patch, preset)
+    prepared.player.compiled.give(of.NOTE_ON, 0, 52, 90, 0, voices=list(struck.voices.values()))
+    own.handle(NoteOn(52, 90), 0)
+    one, other = (rendered(stage, [(6400, NoteOff(52))], 300) for stage in (own, prepared))
+    assert difference(one, other) < 1e-7  # σ is raised, not d₁ / 2ρA
+
+
+def test_prepared_notes_make_room_with_the_others(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset, most=2)
+    stage.player.compiled.give(of.NOTE_ON, 0, 50, 90, 0, voices=[samples(tone(90_000))])
+    rendered(stage, [(64, NoteOn(60, 90)), (128, NoteOn(62, 90))], 100)
+    assert [each.key for each in stage.player.ringing()] == [60, 62]
+
+
+# What comes back
+
+
+def test_reports_say_what_was_plucked(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = shipped["fretless_bass"]
+    reference, stage = Reference(patch, preset, 40), Compiled(patch, preset)
+    for frame, event in drawn(patch, shipped["koto"], 9, 0.2):
+        reference.handle(event, frame)
+        stage.handle(event, frame)
+    expected = list(reference._struck)
+    rendered(stage, (), 200)
+    reports = [each for each in stage.player.reports() if each.kind == of.BEGAN]
+    assert len(reports) == len(expected) > 3
+    for report, struck in zip(reports, expected, strict=True):
+        assert (report.key, report.channel, report.velocity) == (
+            struck.event.key,
+            struck.event.channel,
+            struck.event.velocity,
+        )
+        assert report.frame == struck.begin_frame and report.string == (
+            -1 if struck.string is None else struck.string
+        )
+        assert report.parameters == struck.key.string.parameters and report.modes == struck.key.resonator.modes
+        assert report.gain == struck.gain
+        plucked = report.position, report.amplitude_mm
+        assert plucked == pytest.approx((struck.pluck.position, struck.pluck.amplitude_mm), rel=1e-12)
+        if struck.pluck.shape != "triangular":
+            assert report.width == pytest.approx(struck.pluck.width, rel=1e-12)
+
+
+def test_wheels_and_pedals_can_be_read(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = shipped["concert_harp"]  # the wheel turns its room
+    reference, stage = Reference(patch, preset, 40), Compiled(patch, preset)
+    for _, event in drawn(patch, patch, 11, 0.2, 80):
+        if not isinstance(event, NoteOn):
+            reference.handle(event, 0)
+            stage.handle(event, 0)
+    stage.player.compiled.catch_up(stage.mixer)
+    assert stage.player.controllers == reference.player.at_hand != []
+    assert stage.player.heard_through == reference.player.heard_through
+
+
+def test_levels_can_be_read(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["concert_harp"], preset)
+    rendered(stage, [(1, NoteOn(50, 30)), (2, NoteOn(57, 120))], 100)
+    soft, hard = stage.player.ringing()
+    assert (soft.key, hard.key) == (50, 57)
+    assert hard.level_db > soft.level_db + 6
+    assert soft.seconds == pytest.approx(100 * QUANTUM / RATE_HZ, abs=0.003)
+
+
+def test_tables_are_freed_when_the_kernel_has_left_them(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    for number in range(20):
+        turned = shipped["koto"].with_value("knobs.decay", 1 + number / 100)
+        rendered(stage, [(0, PatchTurned(turned))], 1)
+    assert len(stage.player.compiled._tables) <= 2
+
+
+def test_a_note_may_have_its_own_pitch_and_place(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    stage.player.prepare([60])
+    stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, position=0.4, pitch_hz=271.0)
+    rendered(stage, (), 2)
+    (report,) = stage.player.reports()
+    assert report.parameters is not None
+    assert pitch_hz_of(report.parameters) == pytest.approx(271.0, rel=1e-9) and report.position == 0.4
+
+
+def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = shipped["koto"]
+    one, other = Compiled(patch, preset), Compiled(patch, preset)
+    for stage in (one, other):
+        rendered(stage, [(1, NoteOn(60, 90))], 10)
+    one.handle(PatchTurned(patch.with_value("knobs.decay", 3.0)), 0)
+    other.player.compiled.give(of.PARAMETER, key=VALUES.index("knobs.decay"), value=3.0)
+    sounds = [rendered(stage, (), 200) for stage in (one, other)]
+    np.testing.assert_array_equal(*sounds)
+
+
+def test_gains_of_sources_may_change_while_notes_ring(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    rendered(stage, [(1, NoteOn(60, 90))], 50)
+    stage.player.compiled.set_source_gains((0.0, 0.0))
+    sound = rendered(stage, (), 60)
+    assert sound[:200].any() and not sound[round(0.025 * RATE_HZ) :].any()
+
+
+def test_a_key_without_a_string_is_an_error_and_one_out_of_range_is_silent(
+    shipped: dict[str, Patch], preset: Preset
+) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    stage.player.handle(NoteOn(10, 90))
+    rendered(stage, (), 2)
+    assert [each.kind for each in stage.player.reports()] == [of.REFUSED] and not stage.mixer.active
+    impossible = changed(shipped["koto"], range=(0, 127), tuning=TuningChoice(a4_hz=880, transpose=48))
+    with pytest.raises(ValueError, match="key 127"):
+        Compiled(impossible, preset).player.handle(NoteOn(127, 90))
+
+
+@pytest.mark.parametrize(
+    "event", [NoteOn(60, 5, 3), NoteOff(60, KEYS), Bend(-0.25, 2), Controller(events.SLIDE, 17, 1)]
+)
+def test_an_event_and_its_record(event: NoteOn | NoteOff | Bend | Controller) -> None:
+    assert event_of(record_of(event)) == event

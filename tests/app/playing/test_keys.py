@@ -1,0 +1,473 @@
+"""A patch played by events, with a mixer that the test turns."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.instrument.events import (
+    KEYS,
+    NOTES_OFF,
+    SOUND_OFF,
+    SUSTAIN,
+    Bend,
+    Controller,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+)
+from app.instrument.loudness import peak_db
+from app.instrument.player import Player, Struck
+from app.patches.instrument import SingleString
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import Body, Patch
+from app.playing.due import Due
+from app.playing.note import Note
+from app.playing.notes import Notes
+from app.playing.playback import Playback
+from app.playing.sources import Sources
+from engine.effects import Effects
+from engine.voices import Ear, Mixer
+from engine.voices.voice import FADE_S
+from tests.app.monitors import find_shipped, hears
+
+Wait = Callable[[Callable[[], bool]], None]
+EAR = Ear((0.3,))
+
+
+@pytest.fixture
+def patch() -> Patch:
+    return read_patch(PATCHES / "steel_string_acoustic.json").model_copy(update={"body": Body()})
+
+
+@pytest.fixture
+def wishes() -> list[Effects | None]:
+    return []
+
+
+@pytest.fixture
+def told() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def played(sound: Any, patch: Patch, wait: Wait, wishes: list[Effects | None], told: list[str]) -> Iterator[Notes]:
+    """Notes whose instrument is the patch."""
+    made = Notes(sound, Sources(), find_shipped, lambda message, details: told.append(message), wishes.append)
+    made.set_monitor(hears("model"))
+    made.set_instrument(patch, EAR)
+    wait(lambda: made.keys.player is not None)
+    yield made
+    made.close()
+
+
+def player_of(notes: Notes) -> Player:
+    assert notes.keys.player is not None
+    return notes.keys.player
+
+
+def strike(notes: Notes, event: NoteOn, due: Due | None = None) -> tuple[Struck, Note]:
+    """The string of a key, and its note."""
+    note = notes.handle(event, due)
+    assert note is not None and note.struck is not None
+    return note.struck, note
+
+
+def settle(notes: Notes, wait: Wait) -> None:
+    """Until what was asked for is done."""
+    done = Event()
+    notes.in_background(done.set)
+    wait(done.is_set)
+
+
+def test_a_key_waits_for_no_knob(played: Notes, patch: Patch, wait: Wait, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the loudness of the turned patch takes: here it takes until the key has sounded."""
+    struck, _ = strike(played, NoteOn(45, 60))
+    before = struck.parameters
+    begun, held = Event(), Event()
+
+    def slow(*args: Any) -> float:
+        begun.set()
+        held.wait(30)
+        return peak_db(*args)
+
+    monkeypatch.setattr("app.instrument.loud_keys.peak_db", slow)
+    turned, begun_notes = patch.with_value("knobs.stiffness", 3.0), list[object]()
+    knob = Thread(target=played.set_instrument, args=(turned, EAR))
+    key = Thread(target=lambda: begun_notes.append(played.handle(NoteOn(52, 60))))
+    knob.start()
+    wait(begun.is_set)
+    key.start()
+    key.join(5)
+    try:
+        assert not key.is_alive()
+        assert begun_notes != [None]
+    finally:
+        held.set()
+        knob.join()
+        key.join()
+    wait(lambda: struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
+
+
+def test_the_last_of_many_turns_counts(played: Notes, patch: Patch, wait: Wait) -> None:
+    struck, _ = strike(played, NoteOn(45, 60))
+    before = struck.parameters
+    played.keys.begin_recording()
+    for stiffness in np.linspace(1.1, 3.0, 20):
+        played.set_instrument(patch.with_value("knobs.stiffness", float(stiffness)), EAR)
+    played.listen(Ear((0.1,)))
+    made = strike(played, NoteOn(50, 60))
+    assert made[0].ear.points == (0.1,)
+    assert made[0].key.patch.knobs.stiffness == 3.0
+    settle(played, wait)
+    assert struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
+    exact = played.keys.player
+    assert exact is not None
+    fresh = Player(exact.patch, exact.preset, 48_000, lambda struck: None, ear=exact.ear)
+    assert exact.gain_of(struck) == fresh.gain_of(struck) != made[0].gain
+    turned = [each.event.patch for each in played.keys.recorder.end() if isinstance(each.event, PatchTurned)]
+    assert (turned[-1].knobs.stiffness, turned[-1].pickup.points) == (3.0, (0.1,)), "it is recorded as it was played"
+
+
+def test_another_patch_is_played_at_once(played: Notes, patch: Patch) -> None:
+    """As by a note that is played to hear it."""
+    other = read_patch(PATCHES / "classical_guitar.json")
+    assert other.preset == patch.preset
+    played.set_instrument(other, EAR)
+    made = strike(played, NoteOn(45, 60))
+    played.set_instrument(patch, EAR)
+    again = strike(played, NoteOn(45, 60))
+    assert made[0].key.string.parameters != again[0].key.string.parameters
+
+
+def test_an_impossible_tuning_is_reported_and_what_was_played_stays(
+    played: Notes, patch: Patch, wait: Wait, told: list[str]
+) -> None:
+    made = strike(played, NoteOn(45, 60))
+    tuning = patch.tuning.model_copy(update={"scale": "no scale"})  # as no patch of a file could have it
+    played.set_instrument(patch.model_copy(update={"tuning": tuning}), EAR)
+    wait(lambda: bool(told))
+    played.listen(Ear((0.1,)))
+    settle(played, wait)
+    again = strike(played, NoteOn(45, 60))
+    assert again[0].parameters == made[0].parameters
+    assert again[0].ear == Ear((0.1,))
+    assert len(told) == 1
+
+
+def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(played: Notes, patch: Patch, wait: Wait) -> None:
+    held, done = Event(), Event()
+
+    def hold() -> None:
+        held.wait(30)
+
+    played.set_instrument(SingleString(), EAR)
+    played.in_background(hold)
+    played.set_instrument(patch, EAR)
+    played.set_instrument(SingleString(), EAR)
+    played.in_background(done.set)
+    held.set()
+    wait(done.is_set)
+    assert not (played.keys.player is not None)
+    played.set_instrument(patch, EAR)
+    wait(lambda: played.keys.player is not None)
+
+
+def test_a_key_sounds_with_the_next_frame_and_is_damped_when_let_go(played: Notes, sound: Any) -> None:
+    struck, note = strike(played, NoteOn(45, 100))
+    assert not note.pending
+    assert set(note.voices) == {"model", "truth"}
+    heard = sound.mixer.render(24_000)[:, 0]
+    assert np.abs(heard[:200]).max() > 1e-4
+    assert played.keys.sounding()[45] > 0.2
+    played.handle(NoteOff(45))
+    sound.mixer.render(48_000)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-3 * np.abs(heard).max()
+    assert struck.damped
+
+
+def test_model_truth_and_difference_are_of_one_moment(played: Notes, sound: Any) -> None:
+    played.handle(NoteOn(45, 100))
+    loud = np.abs(sound.mixer.render(9_600)).max()
+    played.set_monitor(hears("truth"))
+    assert np.abs(sound.mixer.render(9_600)).max() > 0.1 * loud
+    played.set_monitor(hears("difference"))
+    sound.mixer.render(9_600)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-4 * loud
+
+
+def test_pedal_bend_and_another_patch_reach_strings_that_ring(
+    played: Notes, sound: Any, patch: Patch, wishes: list[Effects | None], wait: Wait
+) -> None:
+    played.handle(Controller(SUSTAIN, 127))
+    struck, _ = strike(played, NoteOn(45, 60))
+    played.handle(NoteOff(45))
+    assert not struck.damped
+    before = struck.parameters
+    played.handle(Bend(1.0))
+    assert struck.parameters.tension_n > before.tension_n
+    played.handle(Controller(SUSTAIN, 0))
+    assert struck.damped
+    stiff = patch.with_value("knobs.stiffness", 3.0).model_copy(update={"body": Body(name="guitar", mix=0.5)})
+    played.set_instrument(stiff, EAR)
+    wait(lambda: struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
+
+    def hears_guitar() -> bool:
+        """The room that the patch begins with, which has no body, may come late."""
+        last = wishes[-1] if wishes else None
+        return last is not None and last.body is not None
+
+    wait(hears_guitar)
+    played.hear_dry(True)
+    wait(lambda: wishes[-1] is None)
+
+
+def test_what_is_played_is_recorded_from_its_first_note_on(played: Notes, patch: Patch) -> None:
+    played.keys.begin_recording()
+    assert played.keys.recorder.recording
+    played.handle(NoteOn(45, 60))
+    played.handle(NoteOff(45))
+    events = played.keys.recorder.end()
+    assert [type(each.event) for each in events] == [PatchTurned, NoteOn, NoteOff]
+    assert events[1].time_s == 0
+    played.keys.begin_recording()
+    assert played.keys.recorder.end() == []
+
+
+def test_a_recording_begins_and_ends_as_the_hands_are(played: Notes) -> None:
+    """With the pedal down and a wheel turned; and no key of it is down for ever."""
+    for event in (Controller(SUSTAIN, 127), Bend(0.5), Controller(101, 0), Controller(100, 0), Controller(6, 12)):
+        played.handle(event)
+    heard = played.handle(NoteOn(50, 60))
+    assert heard is not None
+    played.keys.begin_recording()
+    played.handle(NoteOn(45, 60))
+    played.handle(NoteOff(45))
+    played.handle(NoteOn(52, 60))
+    events = played.keys.recorder.end()
+    assert [each.event for each in events[-2:]] == [Controller(SUSTAIN, 0), NoteOff(52)]
+    assert played.keys.player is not None
+    again = Player(played.keys.player.patch, played.keys.player.preset, 48_000, lambda struck: None)
+    for each in events[:-2]:
+        again.handle(each.event)
+    as_heard, played = (
+        {struck.event.key: struck for struck in one.sounding()} for one in (played.keys.player, again)
+    )
+    assert played.keys() == {45, 52}
+    for key, struck in played.items():
+        assert (struck.parameters, struck.damped) == (as_heard[key].parameters, False)
+    assert played[45].parameters.tension_n > played[45].key.string.parameters.tension_n
+
+
+def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Notes, sound: Any, wait: Wait) -> None:
+    """So that the other modes do not thunder when the solo ends, and a pluck by hand does not either."""
+    made = strike(played, NoteOn(45, 100))
+    whole = made[0].gain
+    played.listen(replace(EAR, solo=5))
+    made = strike(played, NoteOn(45, 100))
+    assert made[0].gain == pytest.approx(whole)
+    played.listen(Ear((0.0,)))
+    made = strike(played, NoteOn(45, 100))
+    assert made[0].gain <= 1, "nothing is heard of it: no gain would help"
+    played.listen(EAR)
+    settle(played, wait)
+    assert played.keys.gain_of(made[0].key.string.parameters) == pytest.approx(whole)
+
+
+@pytest.mark.parametrize(("rate_hz", "channels"), [(48_000, 1), (44_100, 2)])
+def test_keys_of_a_device_that_is_gone_go_out_and_leave_no_motion(
+    played: Notes, sound: Any, rate_hz: int, channels: int
+) -> None:
+    played.handle(NoteOn(45, 127))
+    sound.mixer.render(4_800)
+    assert played.keys.sounding()
+    sound.mixer = type(sound.mixer)(rate_hz, channels)
+    played.poll()
+    assert played.keys.sounding() == {}
+    played.handle(NoteOn(45, 1))
+    soft = np.abs(sound.mixer.render(rate_hz // 10)).max()
+    played.handle(NoteOff(45))
+    played.handle(NoteOn(57, 1))
+    assert soft < 3 * np.abs(sound.mixer.render(rate_hz // 10)).max()
+
+
+def test_the_strings_end_with_the_devices_rate_and_new_ones_sound(played: Notes, sound: Any) -> None:
+    made = strike(played, NoteOn(45, 60))
+    sound.mixer = type(sound.mixer)(44_100)
+    strike(played, NoteOn(45, 60))
+    assert np.abs(sound.mixer.render(4_410)).max() > 1e-4
+    played.poll()
+    assert made[1].cut
+
+
+def test_a_preset_that_is_not_there_is_told(played: Notes, patch: Patch, wait: Wait, told: list[str]) -> None:
+    played.set_instrument(patch.model_copy(update={"preset": "gone"}), EAR)
+    wait(lambda: bool(told))
+    assert "gone" in told[0]
+    assert played.handle(NoteOn(45, 60)) is None
+
+
+def test_a_full_recording_is_told_once(played: Notes, told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.playing.recorder.LONGEST_RECORDING", 3)
+    played.keys.begin_recording()
+    for _ in range(3):
+        played.handle(NoteOn(45, 60))
+        played.handle(NoteOff(45))
+    assert len(played.keys.recorder.end()) == 3
+    assert [line for line in told if "recording is full" in line] == told
+    assert len(told) == 1
+
+
+def test_the_pick_up_through_which_it_is_heard_is_recorded(played: Notes, patch: Patch) -> None:
+    played.keys.begin_recording()
+    played.handle(NoteOn(45, 60))
+    played.listen(Ear((0.1, 0.2), "velocity"))
+    turned = [each.event.patch.pickup for each in played.keys.recorder.end() if isinstance(each.event, PatchTurned)]
+    assert [(each.points, each.kind) for each in turned] == [
+        (EAR.points, EAR.pickup),
+        ((0.1, 0.2), "velocity"),
+    ]
+
+
+class TurnedClock:
+    """Frames are taken by whoever looks at it: by the playback, in its thread."""
+
+    def __init__(self, sound: Any) -> None:
+        self._sound, self.buffer_s, self.heard = sound, 0.0, list[np.ndarray]()
+
+    @property
+    def mixer(self) -> Mixer:
+        self.heard.append(self._sound.mixer.render(100))
+        mixer: Mixer = self._sound.mixer
+        return mixer
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.04])
+def test_the_notes_of_a_file_begin_with_their_frames(
+    played: Notes, sound: Any, monkeypatch: pytest.MonkeyPatch, late_s: float
+) -> None:
+    """Exactly, model and truth, also where Python is late and keys are struck again."""
+    times_s = [0.0, 0.0101, 0.05, 0.1, 0.1, 0.15003, 0.2]
+    keys = [45, 52, 57, 45, 60, 45, 52]
+    made: list[Note] = []
+    ended = Event()
+
+    def handle(event: Any, due: Due | None) -> None:
+        if len(made) in (2, 5):
+            sound.mixer.render(round(late_s * 48_000))
+        if (found := played.handle(event, due)) is not None:
+            made.append(found)
+
+    playback = Playback(handle, TurnedClock(sound), played.cancel, ended.set)
+    playback.play([TimedEvent(t, NoteOn(key, 90)) for t, key in zip(times_s, keys, strict=True)])
+    assert ended.wait(30)
+    sound.mixer.render(4_800)
+    begins = [{voice.began_frame for voice in note.voices.values()} for note in made]
+    assert all(len(each) == 1 for each in begins)
+    first = min(begins[0])
+    assert [min(each) - first for each in begins] == [round(t * 48_000) for t in times_s]
+
+
+def test_releases_and_bends_of_a_file_count_at_their_frames(played: Notes, sound: Any, patch: Patch) -> None:
+    """As if each had come at its time; the first of them when all have been handed over."""
+    begin, events = (
+        1_024,
+        (NoteOn(45, 90), Bend(0.5), Bend(1.0), NoteOff(45), NoteOn(45, 60), Controller(SOUND_OFF, 0)),
+    )
+    frames = (0, 4_800, 9_600, 14_400, 17_280, 24_000)
+    for frame, event in zip(frames, events, strict=True):
+        played.handle(event, Due(sound.mixer, begin + frame, 0.0))
+    assert sound.mixer.frames == 64
+    heard = sound.mixer.render(begin - 64 + 28_800)[begin - 64 :, 0]
+    assert played.keys.player is not None
+    mixer, struck = Mixer(48_000), list[Struck]()
+    mixer.render(begin)
+    player = Player(patch, played.keys.player.preset, 48_000, struck.append, ("model",), EAR)
+    expected = []
+    for frame, event, end in zip(frames, events, (*frames[1:], 28_800), strict=True):
+        if isinstance(event, Controller):  # it fades in 20 ms, where one at once fades in 30
+            struck[-1].voices["model"].release(FADE_S)
+        elif (made := player.handle(event)) is not None:
+            made.voices["model"].start_with_gain(made.gain)
+            mixer.add(made.voices["model"])
+        expected.append(mixer.render(end - frame)[:, 0])
+    np.testing.assert_allclose(heard, np.concatenate(expected), atol=1e-6)
+
+
+def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Notes, sound: Any, wait: Wait) -> None:
+    ringing, _ = strike(played, NoteOn(45, 90))
+    sound.mixer.render(4_800)
+    played.keys.begin_recording()
+    soon = Due(sound.mixer, sound.mixer.frames + 2_000, time.monotonic() + 0.04)
+    later = [strike(played, NoteOn(key, 127), soon)[1] for key in (45, 50)]
+    played.cancel()
+    played.handle(Controller(NOTES_OFF, 0))
+    sound.mixer.render(2_000)
+    assert all(each.over and each.began_frame == 0 for each in later)
+    assert ringing.damped, "it has its place again"
+    assert not ringing.over
+    assert NoteOn(50, 127) not in [each.event for each in played.keys.recorder.end()]
+    sound.mixer.render(24_000)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-4
+
+
+def test_a_key_that_is_struck_while_its_next_note_waits_sounds_at_once(played: Notes, sound: Any) -> None:
+    """And not twice."""
+    soon = Due(sound.mixer, sound.mixer.frames + 2_000, 0.0)
+    (_, waits), (_, struck) = strike(played, NoteOn(45, 90), soon), strike(played, NoteOn(45, 90))
+    sound.mixer.render(4_800)
+    assert struck.began_frame == 64
+    assert (waits.over, waits.began_frame) == (True, 0)
+
+
+def test_of_another_device_an_event_counts_at_once(played: Notes, sound: Any) -> None:
+    gone = Due(Mixer(48_000), 10_000_000, 0.0)
+    made = strike(played, NoteOn(45, 90), gone)
+    played.handle(NoteOff(45), gone)
+    assert made[0].begin_frame == 0
+    sound.mixer.render(64)
+    assert made[1].began_frame == 64
+
+
+def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Notes, sound: Any) -> None:
+    played.keys.begin_recording()
+    now_s = time.monotonic()
+    for key, after_s in ((45, 0.2), (50, 0.25), (62, 60.0)):
+        played.handle(NoteOn(key, 90), Due(sound.mixer, round(48_000 * after_s), now_s + after_s))
+    played.handle(NoteOn(57, 90))
+    while time.monotonic() < now_s + 0.3:
+        time.sleep(0.01)
+    found = played.keys.recorder.end()
+    notes = {each.event.key: each.time_s for each in found if isinstance(each.event, NoteOn)}
+    assert list(notes) == [57, 45, 50], "in their order; the last is not due yet"
+    assert notes[50] - notes[45] == pytest.approx(0.05)
+    assert {each.event.key for each in found if isinstance(each.event, NoteOff)} == {45, 50, 57}
+
+
+def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(played: Notes, wait: Wait) -> None:
+    playback = Playback(played.handle, played, played.cancel)
+    bent = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.0, Bend(1.0)), TimedEvent(600.0, NoteOff(45))]
+    playback.play(bent)
+    wait(lambda: played.keys.player is not None and played.keys.player._hands.of(0).bend == 1.0)
+    playback.stop()
+    for channel in (0, KEYS):
+        struck, _ = strike(played, NoteOn(57, 60, channel))
+        assert struck.parameters == struck.key.string.parameters
+
+
+def test_a_patch_that_is_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(
+    played: Notes, patch: Patch
+) -> None:
+    played.set_instrument(SingleString(preset="gone"), EAR, patch)
+    assert played.handle(NoteOn(45, 60)) is None
+    assert played.handle(NoteOff(45)) is None
+    played.set_instrument(patch, EAR)
+    strike(played, NoteOn(45, 60))
